@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import fourbar
-from fourbar.quantities import QUANTITIES
+from fourbar.quantities import QUANTITIES, Quantities
 
 TARGET = Path(__file__).with_suffix(".md")
 HEAD = """\
@@ -27,7 +27,7 @@ METHODS = {"Solution": ("status", "assembled", "evaluated", "to_csv", "to_pandas
 
 
 def fields(kind: type) -> list[tuple[str, str, str]]:
-    """Name, type and docstring of the fields of a class, as its source has them."""
+    """Name, type and docstring of the fields of a class, as its source has them; then the quantities it inherits."""
     body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
     found: list[tuple[str, str, str]] = []
     for statement in body:
@@ -36,7 +36,7 @@ def fields(kind: type) -> list[tuple[str, str, str]]:
         elif found and isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
             name, of, _ = found.pop()
             found.append((name, of, " ".join(str(statement.value.value).split())))
-    return found
+    return found + (fields(Quantities) if Quantities in kind.__bases__ else [])
 
 
 def signature(thing: Any) -> str:
@@ -58,7 +58,7 @@ def signature(thing: Any) -> str:
 def row(name: str, of: str, what: str) -> str:
     """One field as a row of a table; what a quantity is stands in the table of quantities."""
     known = MEANINGS.get(name)
-    what = what or (f"{known.meaning}, {known.unit}" if known else "")
+    what = what or (f"{known.meaning}, {known.unit}".removesuffix(", 1") if known else "")
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in (f"`{name}`", f"`{of}`", what)) + " |"
 
 

@@ -43,10 +43,9 @@ JUDGED_BY = {
     "studies style symbols transmission view",
     "validation/engines/mujoco/test_picture.py": "fourbar/mjcf: appearance",
     # a comparison is tested by witnesses with given answers
-    "validation/run/test_judge.py": "validation/compare: answer basis compare effects identities rows "
-    "tolerance; validation/run: answers command pictures question run values",
-    "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limits ranges "
-    "transmission",
+    "validation/run/test_judge.py": "validation/compare: answer compare effects rows; "
+    "validation/run: answers command formulas pictures question run",
+    "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limits transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
     "validation/engines/test_engines.py": "validation/engines: balls description drake exudyn exudyn_elements limits "
     "loaded loop opensim pinocchio prediction tree witnesses; validation/scenes: random; "

@@ -13,15 +13,14 @@ from fourbar.formulas.pin_forces import PinForces
 from fourbar.quantities import FORCES, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
 from fourbar.solution import Solution
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.identities import FORMULAS, IDENTITIES
-from fourbar_validation.compare.rows import COLUMNS, Row
-from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.compare.rows import COLUMNS, FORMULAS, IDENTITIES, Row
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES
 from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, WORK
 from fourbar_validation.regression.change import WHOLE
 from fourbar_validation.regression.record import ACCEPTED, baseline
+from fourbar_validation.run.answers import statements
 from fourbar_validation.run.judge import CHECKS
 from fourbar_validation.run.released import ENGINES, FULL
 from fourbar_validation.run.run import RunOptions, run

@@ -11,7 +11,7 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
-from fourbar_validation.compare.error import magnitude
+from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
 from fourbar_validation.run import printed

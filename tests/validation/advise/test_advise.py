@@ -67,14 +67,14 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
 def test_what_lies_between_two_steps_is_judged_too() -> None:
     """Two steps are right at both of their ends, and miss what the pin forces do amid them."""
     scene = replace(turning(), motion=fourbar.Motion(fourbar.Sweep(0.0, 1.0, 36), 10.0))
-    rig = TrialSetup(scene, advise.looked_at(scene))
-    trial = rig.try_out(advise.dialled(12.0, 6.0))
+    setup = TrialSetup(scene, advise.looked_at(scene))
+    trial = setup.try_out(advise.dialled(12.0, 6.0))
     assert trial.steps == 2 and errors(scene, trial.at, trial.quantities).worst < 2e-3
     assert matters.judged(scene, trial).worst > 0.1
-    found = advise.advise(scene, 1e-2, rig)
+    found = advise.advise(scene, 1e-2, setup)
     assert found.reached and found.best.steps > 4
     largest = [np.linalg.norm(fourbar.solve(scene, "force", at=at).F12, axis=1).max()
-               for at in (rig.command, rig.try_out(found.best.settings).at)]  # fmt: skip
+               for at in (setup.command, setup.try_out(found.best.settings).at)]  # fmt: skip
     assert largest[1] == pytest.approx(largest[0], rel=1e-2)
 
 
@@ -120,11 +120,11 @@ def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> Non
 
 def test_the_search_knows_when_nothing_serves() -> None:
     scene = turning(positions=12)
-    rig = TrialSetup(scene, command(scene))
-    assert cheapest(rig, 1e-3, {("RK4", True): 1.0}) is not None
+    setup = TrialSetup(scene, command(scene))
+    assert cheapest(setup, 1e-3, {("RK4", True): 1.0}) is not None
     trials: list[object] = []
-    rig.try_out = lambda settings, build=None: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
-    assert cheapest(rig, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
+    setup.try_out = lambda settings, build=None: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
+    assert cheapest(setup, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
 
 
 def hopeless(scene: fourbar.Scene) -> object:
@@ -138,9 +138,9 @@ def test_a_count_that_cannot_decide_says_which_one_can(
 ) -> None:
     case = measure.AdviceCase(0, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
     monkeypatch.setattr(measure, "case", lambda seed, index, costs: replace(case, index=index))
-    monkeypatch.setattr(measure, "relative_costs", lambda rig: {})
+    monkeypatch.setattr(measure, "relative_costs", lambda setup: {})
     for count, status in ((40, 1), (73, 0)):
-        assert ended(["advise", "--study", "--count", str(count), "--out", str(tmp_path / f"{count}.csv")]) == status
+        assert ended(["advise", "--study", "--count", str(count), "--out", str(tmp_path / str(count))]) == status
         stated = "undecided: with 0 not met the bound is reached from --count 73 on" in capsys.readouterr().out
         assert stated == (status == 1)
 
@@ -153,8 +153,8 @@ def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         return measure.AdviceCase(index, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
 
     monkeypatch.setattr(measure, "case", case)
-    monkeypatch.setattr(measure, "relative_costs", lambda rig: {})
-    out = tmp_path / "study.csv"
+    monkeypatch.setattr(measure, "relative_costs", lambda setup: {})
+    out = tmp_path / "study"
     list(measure.measure(3, 2, out))
     cases = list(measure.measure(3, 4, out))
     assert made == [0, 1, 2, 3] and [each.index for each in cases] == made and all(each.met for each in cases)
@@ -193,8 +193,8 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
     hood = fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),))
     for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
                                 (turning(10.0, 36), "the timestep", "fourth power")):  # fmt: skip
-        rig = TrialSetup(scene, advise.looked_at(scene))
-        first, *others = found = matters.influences(scene, rig, advise.dialled(40.0, 12.0))
+        setup = TrialSetup(scene, advise.looked_at(scene))
+        first, *others = found = matters.influences(scene, setup, advise.dialled(40.0, 12.0))
         assert first.setting == setting and first.times > 10.0 and why in matters.sentence(found)
         assert all(first.times >= other.times for other in others)
     quiet = [replace(each, times=1.5) for each in found]

@@ -20,7 +20,7 @@ from fourbar_validation.check.judge import Allowance
 from fourbar_validation.check.judgement import Judgement, judge_table
 from fourbar_validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
 from fourbar_validation.cli import status
-from fourbar_validation.compare.scales import TERMS, yardstick
+from fourbar_validation.compare.scales import TERMS, scale_of
 from fourbar_validation.compare.tolerance import POWER
 
 MODELS = Path(__file__).parents[3] / "models"
@@ -284,7 +284,7 @@ def test_a_quantity_of_no_known_scale_is_not_judged_by_another() -> None:
     assert {UNITS[name] for name in EVERY_QUANTITY} == TERMS.keys() == POWER.keys()
     for quantity in ("time", "wheel"):
         with pytest.raises(KeyError):
-            yardstick(quantity, scene, solve(scene), np.ones(1))
+            scale_of(quantity, scene, solve(scene), np.ones(1))
 
 
 @pytest.mark.parametrize("letter", "xy")

@@ -28,7 +28,7 @@ from fourbar_validation.check.differences import differences
 from fourbar_validation.check.screen import DEEPEST, LARGEST_MJCF, read_mjcf
 from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.memory import WORKER_MEMORY
@@ -57,7 +57,7 @@ def errors(scene: Scene, examined: Examined, how: str) -> dict[str, float]:
     assert answer.refusal is None, answer.refusal
     return {
         row.quantity: row.error
-        for row in compare("", scene, answer, solve(scene, at=answer.at), SIMULATED, UNKNOWNS)
+        for row in Comparison("", scene, answer, solve(scene, at=answer.at), SIMULATED, UNKNOWNS).rows()
         if row.quantity != "assembled"
     }
 
@@ -229,7 +229,7 @@ def test_the_one_thing_that_is_wrong_has_all_of_the_error(key: str, old: str, ne
     wanted = {d.key: d.generated for d in differences(generated(BARE).described, found.described)}
     entries = [(key, wanted[key]), ("option.tolerance", wanted["option.tolerance"])]
     before, *after = (
-        [row for row in compare("", BARE, answers[0], solve(BARE, at=answers[0].at), SIMULATED, UNKNOWNS)]
+        [row for row in Comparison("", BARE, answers[0], solve(BARE, at=answers[0].at), SIMULATED, UNKNOWNS).rows()]
         for answers in (found.answers, *(each or [] for each in examine_corrected(BARE, spoilt, found.names, entries)))
     )
     chosen = [d for d in differences(generated(BARE).described, found.described) if d.key in dict(entries)]

@@ -17,7 +17,7 @@ from fourbar_validation.check.model import ModelReport
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer, Released
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, write_results
 from fourbar_validation.compare.tolerance import EQUIVALENCE
@@ -171,7 +171,7 @@ def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
 
 def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "fourbar_validation.compare.identities.reversing", lambda scene, solution, _: np.ones(len(solution), bool)
+        "fourbar_validation.run.question.reversing", lambda scene, solution, _: np.ones(len(solution), bool)
     )
     verdicts = {row.quantity: row.verdict for row in judge("scene", crank_rocker(), []).rows}
     expected = {"closure": AGREES, "force_sum": UNDECIDED, "moment_sum": UNDECIDED}
@@ -183,7 +183,9 @@ def test_formulas_without_an_answer_fail() -> None:
     at = command(scene)
     answer = Echo().answer(scene, at)
     positions = fourbar.solve(scene, "position", at=at)
-    (row,) = [r for r in compare("", scene, answer, positions, EQUIVALENCE, ("torque",)) if r.quantity == "torque"]
+    (row,) = [
+        r for r in Comparison("", scene, answer, positions, EQUIVALENCE, ("torque",)).rows() if r.quantity == "torque"
+    ]
     assert (row.verdict, row.reason) == (FAILS, "the formulas have no answer")
 
 

@@ -8,7 +8,7 @@ from fourbar.linkage import uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solve import solve
-from fourbar_validation.compare.scales import yardstick
+from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED
 
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
@@ -26,7 +26,7 @@ def test_the_scale_is_the_greatest_value_of_the_well_conditioned_positions_and_e
         values = getattr(solution, quantity)
         size = np.abs(values) if values.ndim == 1 else np.hypot(*values.T)
         expected = np.append(np.full(7, size[:-1].max()), size[-1])
-        np.testing.assert_allclose(yardstick(quantity, scene, solution, values), expected)
+        np.testing.assert_allclose(scale_of(quantity, scene, solution, values), expected)
 
 
 def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel() -> None:
@@ -34,6 +34,6 @@ def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel() 
     loads = (Load(2, (50.0, 0.0), (0.05, 0.0)), Load(2, (-50.0, 0.0), (0.05, 0.0)))
     scene = Scene(ROCKER, Motion(Sweep(0.5, 0.6, 3), 0.0), loads=loads)
     solution = solve(scene)
-    scale = yardstick("torque", scene, solution, solution.torque)
+    scale = scale_of("torque", scene, solution, solution.torque)
     assert np.all(scale >= 0.25 * 100.0)
     assert np.all(scale <= 4.0 * 0.25 * 100.0)

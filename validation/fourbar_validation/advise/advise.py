@@ -63,28 +63,28 @@ class Advice:
     def reason(self) -> str:
         """One line for the reader."""
         s, e = self.best.settings, self.best.errors
-        found = f"torque {e.torque:.1e}, worst pin force {e.force:.1e}"
+        result = f"torque {e.torque:.1e}, worst pin force {e.force:.1e}"
         dial = (
             f"RK4, {self.best.steps} steps ({self.best.steps_per_revolution:.0f} per revolution), "
             f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad}, tolerance 0, flywheel {s.flywheel:g}"
         )
         if self.reached:
-            return f"{dial}: {found}, required {self.required:g}"
+            return f"{dial}: {result}, required {self.required:g}"
         return (
             f"no setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.required:g}; "
-            f"the best was {dial}: {found}. "
+            f"the best was {dial}: {result}. "
             f"The formulas, and inverse dynamics of either engine with loop multipliers, reach round-off"
         )
 
 
-def advise(scene: Scene, error: float, rig: TrialSetup | None = None) -> Advice:
+def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> Advice:
     """Search the number of steps, and the time constant around what the law says, by runs of the scene.
 
     Raises LimitError for a scene that cannot be run through in time.
     """
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return _CheapestSearch(scene, error, rig or TrialSetup(scene, looked_at(scene))).advice()
+    return _CheapestSearch(scene, error, setup or TrialSetup(scene, looked_at(scene))).advice()
 
 
 def looked_at(scene: Scene) -> Command:
@@ -100,8 +100,8 @@ def looked_at(scene: Scene) -> Command:
 class _CheapestSearch:
     """Settings tried on one scene, for one required error."""
 
-    def __init__(self, scene: Scene, error: float, rig: TrialSetup) -> None:
-        self.scene, self.error, self.rig = scene, error, rig
+    def __init__(self, scene: Scene, error: float, setup: TrialSetup) -> None:
+        self.scene, self.error, self.setup = scene, error, setup
         self.attempts: list[Attempt] = []
 
     def advice(self) -> Advice:
@@ -166,10 +166,10 @@ class _CheapestSearch:
 
     def _try(self, n: float, tc: float) -> Attempt:
         settings = dialled(n, tc)
-        steps = self.rig.steps(settings)
+        steps = self.setup.steps(settings)
         if steps > MOST_STEPS:
             settings = dialled(n * MOST_STEPS / steps, tc)
-        trial = self.rig.try_out(settings)
+        trial = self.setup.try_out(settings)
         attempt = Attempt(settings, max(trial.steps, 1), judged(self.scene, trial), trial.steps_per_revolution)
         self.attempts.append(attempt)
         return attempt
@@ -202,20 +202,20 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
     rows, reached = [], True
     for file, scene in loaded:
         try:
-            rig = TrialSetup(scene, looked_at(scene))
-            advice = advise(scene, wanted, rig)
+            setup = TrialSetup(scene, looked_at(scene))
+            advice = advise(scene, wanted, setup)
         except LimitError as error:
             reason = f"cannot be simulated: {error}; inverse dynamics with loop multipliers can answer it"
             click.echo(f"{file.name}: {reason}")
             rows.append((file.name, "-", "-", "-", "cannot be simulated"))
             reached = False
             continue
-        found = influences(scene, rig, advice.best.settings)
+        result = influences(scene, setup, advice.best.settings)
         click.echo(f"{file.name}: {advice.reason}")
-        click.echo(f"{sentence(found)}")
+        click.echo(f"{sentence(result)}")
         click.echo(f"{len(advice.attempts)} runs of the scene, {sum(a.steps for a in advice.attempts)} steps")
         reached &= advice.reached
-        rows.append((file.name, *advice.cells(), found[0].setting if found[0].times >= MATTERS else "none by itself"))
+        rows.append((file.name, *advice.cells(), result[0].setting if result[0].times >= MATTERS else "none by itself"))
         if output is not None and advice.reached:
             write_text(output, mjcf(scene, advice.best.settings))
             click.echo(f"written to {output}")

@@ -11,8 +11,8 @@ from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.compare import turning
-from fourbar_validation.compare.error import relative_error
-from fourbar_validation.compare.scales import yardstick
+from fourbar_validation.compare.scales import scale_of
+from fourbar_validation.compare.tolerance import relative_error
 
 
 class WorstErrors(NamedTuple):
@@ -56,7 +56,7 @@ def errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> WorstErro
         ours, where = getattr(formulas, name), judged
         if name == "torque" and scene.drive_bar != 2:
             where = judged & turning(getattr(formulas, f"omega_{scene.drive_bar}"))
-        error = relative_error(name, ours, quantities[name], yardstick(name, scene, formulas, ours))
+        error = relative_error(name, ours, quantities[name], scale_of(name, scene, formulas, ours))
         worst[name] = greatest(error[where])
     return WorstErrors(**worst)
 

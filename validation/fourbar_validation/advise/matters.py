@@ -46,10 +46,10 @@ def judged(scene: Scene, trial: Trial) -> WorstErrors:
     """Compute the errors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
     if trial.broken:
         return NO_ANSWER
-    found = [errors(scene, trial.at, trial.quantities)]
+    result = [errors(scene, trial.at, trial.quantities)]
     if scene.drive_bar == 2:  # the torque of another bar has poles, through which no curve can be drawn
-        found += [each for segment in trial.segments for each in between(scene, trial, *segment)]
-    return WorstErrors(*map(max, *found)) if len(found) > 1 else found[0]
+        result += [each for segment in trial.segments for each in between(scene, trial, *segment)]
+    return WorstErrors(*map(max, *result)) if len(result) > 1 else result[0]
 
 
 def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[WorstErrors]:
@@ -76,15 +76,15 @@ def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[
     yield errors(scene, at, there)
 
 
-def influences(scene: Scene, rig: TrialSetup, settings: Settings) -> list[SettingInfluence]:
+def influences(scene: Scene, setup: TrialSetup, settings: Settings) -> list[SettingInfluence]:
     """Every setting changed alone, the one that matters most first."""
-    before = judged(scene, rig.try_out(settings)).worst
-    found = []
+    before = judged(scene, setup.try_out(settings)).worst
+    result = []
     for name, changed, other, why in _changes(scene, settings):
-        worst = judged(scene, rig.try_out(other)).worst
+        worst = judged(scene, setup.try_out(other)).worst
         times = worst / before if before > 0.0 and math.isfinite(before) else math.nan
-        found.append(SettingInfluence(name, changed, worst, times, why(rig)))
-    return sorted(found, key=lambda each: -each.times if each.times == each.times else math.inf)
+        result.append(SettingInfluence(name, changed, worst, times, why(setup)))
+    return sorted(result, key=lambda each: -each.times if each.times == each.times else math.inf)
 
 
 def sentence(found: list[SettingInfluence]) -> str:
@@ -128,12 +128,12 @@ def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Setti
         )
 
 
-def _why_timestep(rig: TrialSetup) -> str:
-    motion = solve(rig.scene, "position", at=rig.command)
+def _why_timestep(setup: TrialSetup) -> str:
+    motion = solve(setup.scene, "position", at=setup.command)
     sines = np.abs(motion.sin_mu)
     nearest = int(np.nanargmin(sines))
     if sines[nearest] < IN_LINE:
-        near, where = (math.degrees(x) for x in (math.asin(sines[nearest]), float(rig.command.theta_2[nearest])))
+        near, where = (math.degrees(x) for x in (math.asin(sines[nearest]), float(setup.command.theta_2[nearest])))
         return f"bars 3 and 4 come within {near:.2g} deg of one line at theta_2 = {where:.4g} deg and speed up there"
     return "the error of RK4 goes as the fourth power of it"
 

@@ -55,17 +55,17 @@ def causes(differences: Sequence[Difference], before: Sequence[Row], after: Sequ
     after : for each difference, rows of the file with that one mended; empty where it was not.
     """
     errors = _errors(before)
-    found = []
+    result = []
     for number, difference in enumerate(differences):
         mended = _errors(after[number]) if number < len(after) else {}
         gains = {key: errors[key] - mended[key] for key in errors if key in mended and errors[key] > 0.0}
         if not gains:
-            found.append(Cause(difference))
+            result.append(Cause(difference))
             continue
         key = max(gains, key=lambda each: gains[each])
         share = max(gains[key] / errors[key], 0.0)
-        found.append(Cause(difference, share, key[1], max(gains[key], 0.0)))
-    return sorted(found, key=lambda cause: (cause.share is None, -cause.gain))
+        result.append(Cause(difference, share, key[1], max(gains[key], 0.0)))
+    return sorted(result, key=lambda cause: (cause.share is None, -cause.gain))
 
 
 def _errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:

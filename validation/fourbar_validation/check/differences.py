@@ -54,13 +54,13 @@ def differences(generated: Described, theirs: Described, called: Mapping[str, st
     """Find what differs, in the order of the description; `called`: what their file calls a part of a key."""
     scale = max(value for key, value in generated.items() if _is_length(key) and isinstance(value, float))
     generated = _numbered_like(theirs, generated)
-    found = []
+    result = []
     for key in [*theirs, *(key for key in generated if key not in theirs)]:
         ours, other = (file.get(key, _without(key)) for file in (generated, theirs))
         if ours is not None and other is not None and not _same(key, ours, other, scale) and _acts(key, theirs):
             name = _named(key, theirs if key in theirs else generated)
-            found.append(Difference(name, ours, other, _remark(key, ours, other), _written(key, theirs, called or {})))
-    return found
+            result.append(Difference(name, ours, other, _remark(key, ours, other), _written(key, theirs, called or {})))
+    return result
 
 
 def _numbered_like(theirs: Described, generated: Described) -> Described:
@@ -101,8 +101,8 @@ def _acts(key: str, theirs: Described) -> bool:
     if ATTACHED.fullmatch(key) and key.endswith(".name"):
         return False
     for pattern, (switch, off) in NEEDS.items():
-        if found := re.fullmatch(pattern, key):
-            return theirs.get(found.expand(switch), off) != off
+        if result := re.fullmatch(pattern, key):
+            return theirs.get(result.expand(switch), off) != off
     return True
 
 

@@ -16,7 +16,7 @@ from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import Array, quantity_of
-from fourbar_validation.compare.error import difference, in_own_unit
+from fourbar_validation.compare.tolerance import difference, in_own_unit
 from fourbar_validation.scenes.hard_linkages import with_bars
 
 OTHER_UNITS = {
@@ -115,9 +115,9 @@ def _change(judge: Judge, wrong: Solution, keys: list[str]) -> Array:
 
 
 def _residual(judge: Judge, key: str, one: Array, other: Array) -> Array:
-    yard = judge.yard(key)
-    where = judge.where(key) & (yard > 0.0)
-    scaled = (one[where] - other[where]) / (yard[where][:, None] if one.ndim == 2 else yard[where])
+    scale = judge.size(key)
+    where = judge.where(key) & (scale > 0.0)
+    scaled = (one[where] - other[where]) / (scale[where][:, None] if one.ndim == 2 else scale[where])
     stated = np.isfinite(judge.table.values[key][where])
     return np.asarray(np.where(stated, scaled, 0.0)).ravel()
 
@@ -160,7 +160,7 @@ def _factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
 
 def _offset(judge: Judge) -> Iterator[Mistake]:
     """Try the crank angle from another zero: the offset at which theirs fit best, refined by Gauss and Newton."""
-    keys = [key for key in judge.table.values if judge.yard(key).any()]
+    keys = [key for key in judge.table.values if judge.size(key).any()]
     rows = np.unique(np.linspace(0, len(judge.at.theta_2) - 1, TRIED).round().astype(int))
 
     def residuals(offsets: Array, rows: NDArray[np.int_]) -> Array:
@@ -179,7 +179,7 @@ def _offset(judge: Judge) -> Iterator[Mistake]:
             apart = judge.ours(key, moved).reshape(m, *theirs.shape) - theirs
             if quantity_of(key).startswith("theta"):
                 apart = np.remainder(apart + np.pi, 2.0 * np.pi) - np.pi
-            scaled = apart / in_own_unit(judge.yard(key)[rows])[:, None]
+            scaled = apart / in_own_unit(judge.size(key)[rows])[:, None]
             parts.append(np.where(np.isfinite(theirs), scaled, 0.0).reshape(m, -1))
         return np.concatenate(parts, axis=1)
 
@@ -211,15 +211,15 @@ def _offset(judge: Judge) -> Iterator[Mistake]:
 def _order(judge: Judge) -> Iterator[Mistake]:
     """Try the right numbers in other rows: each row of theirs goes to the nearest of ours."""
     table, n = judge.table, len(judge.at.theta_2)
-    keys = [key for key in table.values if judge.where(key).all() and judge.yard(key).all()]
+    keys = [key for key in table.values if judge.where(key).all() and judge.size(key).all()]
     if not ENOUGH <= n <= MOST_ROWS or not keys:
         return
     apart = np.zeros((n, n))
     for key in keys:
-        ours, theirs, yard = judge.ours(key), table.values[key], judge.yard(key).max()
+        ours, theirs, scale = judge.ours(key), table.values[key], judge.size(key).max()
         for i in range(n):
             there = np.where(np.isnan(theirs[i]), ours, theirs[i]) if ours.ndim == 2 else np.full(n, theirs[i])
-            apart[i] += difference(quantity_of(key), ours, there) / yard
+            apart[i] += difference(quantity_of(key), ours, there) / scale
     nearest = np.argmin(apart, axis=1)
     if len(np.unique(nearest)) < n - 1 or np.array_equal(nearest, np.arange(n)):  # a revolution ends where it began
         return

@@ -15,9 +15,17 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.check.theirs import Array, TheirTable, quantity_of
-from fourbar_validation.compare.error import difference, in_own_unit, magnitude, relative
-from fourbar_validation.compare.scales import yardstick
-from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, NOTHING_TO_TELL, condition_of
+from fourbar_validation.compare.scales import scale_of
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    EQUIVALENCE,
+    NOTHING_TO_TELL,
+    condition_of,
+    difference,
+    in_own_unit,
+    magnitude,
+    relative,
+)
 
 Mask = NDArray[np.bool_]
 
@@ -78,7 +86,7 @@ class Judge:
         self.stage = "position" if self.at.omega_2 is None else "force"
         self.right = solve(scene, self.stage, at=self.at)
         self.ok = self.right.status_code == OK
-        self._yards: dict[str, Array] = {}
+        self._sizes: dict[str, Array] = {}
         for key in table.values:
             if getattr(self.right, quantity_of(key)) is None:
                 if self.at.omega_2 is None:
@@ -94,12 +102,12 @@ class Judge:
         """Mark the rows in which both have a number, (n,)."""
         return np.asarray(self._answered(key) & self.table.stated(key))
 
-    def yard(self, key: str) -> Array:
+    def size(self, key: str) -> Array:
         """Compute what the error of a key is divided by at each position, (n,)."""
-        if key not in self._yards:
+        if key not in self._sizes:
             quantity = quantity_of(key)
-            self._yards[key] = yardstick(quantity, self.scene, self.right, getattr(self.right, quantity))
-        return self._yards[key]
+            self._sizes[key] = scale_of(quantity, self.scene, self.right, getattr(self.right, quantity))
+        return self._sizes[key]
 
     @cached_property
     def near(self) -> list[Solution]:
@@ -112,8 +120,8 @@ class Judge:
 
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
         """(error, allowed, apart) of the table where `ours` is taken for the right numbers, each (n,)."""
-        quantity, yard = quantity_of(key), self.yard(key)
-        scale = in_own_unit(yard)  # what all its terms leave 0
+        quantity, size = quantity_of(key), self.size(key)
+        scale = in_own_unit(size)  # what all its terms leave 0
         theirs = self.table.values[key]
         theirs = np.where(np.isnan(theirs), ours, theirs)  # a component that their table does not have
         apart = difference(quantity, ours, theirs)
@@ -125,7 +133,7 @@ class Judge:
             larger = np.maximum(np.nanmax(magnitude(ours)[self.ok], initial=0.0) / scale, 1.0)
         moves = [difference(quantity, there, self.ours(key, other)) for other in self.near]
         spread = relative(np.fmax.reduce(moves), scale) if moves else 0.0
-        exact = np.where(yard == 0.0, 0.0, EQUIVALENCE.allowed(condition))
+        exact = np.where(size == 0.0, 0.0, EQUIVALENCE.allowed(condition))
         allowed = (exact + spread) * larger + relative(self.table.rounding[key], scale)
         return relative(apart, scale), np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf), apart
 
@@ -147,7 +155,7 @@ class Judge:
 
     def findings(self) -> list[Discrepancy]:
         """Every number that the table states where the formulas have one."""
-        found = []
+        result = []
         for key, theirs in self.table.values.items():
             ours, label = self.ours(key), self.table.label(key)
             error, allowed, apart = self.judged(key, ours)
@@ -157,10 +165,10 @@ class Judge:
                 yours, mine = (tuple(np.atleast_1d(values[i])[stated].tolist()) for values in (theirs, ours))
                 numbers = (float(error[i]), float(allowed[i]), float(apart[i]))
                 most = None if permitted is None else float(permitted[i])
-                found.append(
+                result.append(
                     Discrepancy(self.table.lines[i], label, yours, mine, *numbers, most, float(self.at.theta_2[i]))
                 )
-        return found
+        return result
 
     def without_answer(self) -> list[int]:
         """Lines that state a number where this linkage does not assemble, or is singular: none is right there."""

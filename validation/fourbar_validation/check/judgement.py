@@ -77,8 +77,8 @@ def judge_table(scene: Scene, table: TheirTable, tolerance: Allowance | None = N
     """
     judge = Judge(scene, table, tolerance)
     findings = judge.findings()
-    found = {finding.quantity for finding in findings if finding.judged and not finding.agrees}
-    differing = sorted(key for key in table.values if table.label(key) in found)
+    result = {finding.quantity for finding in findings if finding.judged and not finding.agrees}
+    differing = sorted(key for key in table.values if table.label(key) in result)
     known = explain(judge, differing) if differing else []
     return Judgement(findings, judge.without_answer(), known, tolerance)
 
@@ -86,7 +86,7 @@ def judge_table(scene: Scene, table: TheirTable, tolerance: Allowance | None = N
 def as_json(judgement: Judgement, table: TheirTable) -> str:
     """One object in SI: the counts, every number that differs with theirs and ours, and what explains it."""
     tolerance = judgement.tolerance
-    found = {
+    result = {
         "schema": 1,
         "verdict": judgement.sentence(),
         "holds": judgement.status == 0,
@@ -103,7 +103,7 @@ def as_json(judgement: Judgement, table: TheirTable) -> str:
         ],
         "explanations": [asdict(explanation) for explanation in judgement.explanations],
     }
-    return json.dumps(found, indent=1, allow_nan=False) + "\n"
+    return json.dumps(result, indent=1, allow_nan=False) + "\n"
 
 
 def _is_json(value: object) -> bool:

@@ -196,7 +196,7 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
 
     A mistake that breaks a quantity which agreed as it was is none.
     """
-    found: list[Explanation] = []
+    result: list[Explanation] = []
     table = judge.table
     for mistake in chain(hypotheses(judge.scene, judge.at), fitted(judge, differing)):
         explained, nearer, broken = [], [], False
@@ -216,5 +216,5 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
                     nearer.append(table.label(key))
         if (explained or nearer) and not broken:
             complete = len(explained) == len(differing)
-            found.append(Explanation(mistake.text, tuple(explained), complete, tuple(nearer)))
-    return sorted(found, key=lambda e: (-len(e.quantities), -len(e.nearer)))[:SHOWN]
+            result.append(Explanation(mistake.text, tuple(explained), complete, tuple(nearer)))
+    return sorted(result, key=lambda e: (-len(e.quantities), -len(e.nearer)))[:SHOWN]

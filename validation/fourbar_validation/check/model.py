@@ -25,7 +25,7 @@ from fourbar_validation.check.causes import Cause, causes
 from fourbar_validation.check.differences import differences
 from fourbar_validation.check.screen import read_mjcf
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.compare import compare
+from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import Row, plain, write_results
 from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, simulated_within
@@ -104,20 +104,20 @@ def examine_model(
         ours = {(row.engine, row.quantity): row.error for row in _rows(name, scene, generated.answers, SIMULATED)}
         rows = _rows(name, scene, theirs.answers, tolerance)
         costs = [CostOfModel(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
-        found = differences(generated.described, theirs.described, theirs.called)
-        entries = [(difference.key, difference.generated) for difference in found]
+        result = differences(generated.described, theirs.described, theirs.called)
+        entries = [(difference.key, difference.generated) for difference in result]
         failed = any(row.failed for row in rows)
         corrected = examined(CORRECTED, scene, text, dict(theirs.names), entries) if failed else []
     after = [[] if answers is None else _rows(name, scene, answers, tolerance) for answers in corrected]
-    return ModelReport(causes(found, rows, after), costs, theirs.notes)
+    return ModelReport(causes(result, rows, after), costs, theirs.notes)
 
 
 def _rows(name: str, scene: Scene, answers: list[Answer], tolerance: ErrorBound) -> list[Row]:
-    found = []
+    result = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
-        found += compare(name, scene, answer, formulas, tolerance, UNKNOWNS)
-    return found
+        result += Comparison(name, scene, answer, formulas, tolerance, UNKNOWNS).rows()
+    return result
 
 
 @contextmanager

@@ -152,14 +152,14 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
     delimiter = next((mark for mark in ";\t" if mark in header), ",")
     try:
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-        found = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+        result = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except csv.Error:
         raise InputError("table", path.name, "must be a CSV file", str(path)) from None
-    if len(found) < 2:
+    if len(result) < 2:
         raise InputError("table", path.name, "needs a header and at least one row", str(path))
     if delimiter != ",":  # there a comma is a decimal comma
-        found[1:] = [(line, [cell.replace(",", ".") for cell in cells]) for line, cells in found[1:]]
-    return found
+        result[1:] = [(line, [cell.replace(",", ".") for cell in cells]) for line, cells in result[1:]]
+    return result
 
 
 def _is_unit_line(cells: list[str]) -> bool:
@@ -174,16 +174,16 @@ def _columns(
     columns: dict[int, tuple[str, Unit]] = {}
     left_out: dict[str, str] = {}
     for index, heading in enumerate(headings):
-        found = HEADING.fullmatch(heading.strip())
-        name = found["name"] + (found["letter"] or "") if found else heading.strip()
+        result = HEADING.fullmatch(heading.strip())
+        name = result["name"] + (result["letter"] or "") if result else heading.strip()
         quantity = name[:-2] if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS else name
         if not name and index >= len(headings) - 1:
             continue  # what a spreadsheet leaves at the end of a line
-        if found is None or quantity in NOT_JUDGED or quantity not in UNITS:
+        if result is None or quantity in NOT_JUDGED or quantity not in UNITS:
             left_out[heading.strip() or f"column {index + 1}"] = NOT_JUDGED.get(quantity, "not a known column")
             continue
         below = unit_line[index].strip(" []()") if index < len(unit_line) else ""
-        text = (found["square"] or found["round"] or below).strip()
+        text = (result["square"] or result["round"] or below).strip()
         columns[index] = f"|{name}|" if name in VECTORS else name, _unit(path, heading, quantity, text)
     return columns, left_out
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -22,25 +22,33 @@ from fourbar.quantities import (
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
-from fourbar_validation.compare.error import in_own_unit, magnitude, relative, relative_error, used
 from fourbar_validation.compare.reversals import reversing
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, plain
-from fourbar_validation.compare.scales import of_length
+from fourbar_validation.compare.scales import reference_of, smallest_scale, strictest_condition
 from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import (
     EPS,
+    IDENTITY,
     NOTHING_TO_TELL,
     Array,
     ErrorBound,
+    Mask,
+    closing_gap,
+    half_turns,
+    in_own_unit,
+    magnitude,
+    relative,
+    relative_error,
+    touching,
+    used,
+    worst,
 )
 
-Mask = NDArray[np.bool_]
 Predicted = Callable[[str, Mask], Array]
 """The error to be expected of a quantity, in its own unit, (n,); it matters at the positions of the mask alone."""
 Nearby = Callable[[Mask], dict[str, Array]]
 """Every quantity again at the positions of a mask, each within the rounding of its theta_2; NaN elsewhere."""
-Yardsticks = dict[str, tuple[Array, Array]]
+Scales = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
 OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, "torque_error", "force_error")
@@ -53,70 +61,55 @@ MOST_UNDECIDED = 0.5
 SLOW_DRIVE = 0.1
 """T3 and T4 have poles where omega_3, omega_4 vanish: a simulation is judged where the driven bar
 turns at more than this part of its greatest speed."""
+CLOSURE = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
+NOWHERE = "no position at which it is demanded"
 NUMBERS = ("error", "allowed", "theta_2", "condition")
 """Of a row."""
-TOUCHING_MARGIN = 32.0 * EPS
-"""A loop that closes, or misses, by less than this part of the sum of its lengths does so by the
-rounding of the data, and the engines may differ on whether it closes."""
-
-
-def compare(
-    name: str,
-    scene: Scene,
-    answer: Answer,
-    formulas: Solution,
-    tolerance: ErrorBound,
-    expected: Iterable[str],
-    predicted: Predicted | None = None,
-    basis: Solution | None = None,
-    yardsticks: Yardsticks | None = None,
-    nearby: Nearby | None = None,
-) -> list[Row]:
-    """Compare an answer; `formulas` is the solution at `answer.at`, `expected` what the engine must answer.
-
-    What the formulas may be wrong by is decided by the stricter of their own conditions and sizes and those of
-    `basis`, another derivation at the same positions; left out: the answer itself.
-
-    `yardsticks` are those of `formulas` and `basis` where another answer was held to them before.
-
-    With `nearby` an error beyond the tolerance is taken again within the rounding of theta_2, where that then has no
-    other excuse.
-
-    With `predicted` an error beyond the tolerance must be within DEGRADED times the error to be expected there.
-    """
-    if answer.refusal is not None:
-        return [Row.unmeasured(name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
-    if answer.assembled is None or len(answer.assembled) != len(formulas):
-        what = "the engine did not say where the loop closes"
-        return [Row.unmeasured(name, answer.engine, answer.setting, "assembled", FAILS, what)]
-    own = basis_of(scene, answer)
-    held_to = own if basis is None else basis
-    known = {} if yardsticks is None or basis is None else yardsticks
-    each = _Comparison(name, scene, answer, formulas, tolerance, predicted, own, held_to, known, nearby)
-    rows = [each.assembled()]
-    rows += [row for quantity in STAGE_OF if quantity in expected for row in each.judged(quantity)]
-    rows += [each.row("watch", FAILS, alarm) for alarm in answer.alarms]
-    return [*rows, *each.undecided()]
 
 
 @dataclass(slots=True)
-class _Comparison:
-    """One answer, quantity by quantity; counts how many numbers there are and of how many a verdict is drawn."""
+class Comparison:
+    """One answer held to the formulas; counts how many numbers there are and of how many a verdict is drawn."""
 
     name: str
     scene: Scene
     answer: Answer
     formulas: Solution
+    """At `answer.at`."""
     tolerance: ErrorBound
-    predicted: Predicted | None
-    own: Solution | None
-    basis: Solution | None
-    yardsticks: Yardsticks
-    nearby: Nearby | None
-    numbers: int = 0
-    decided: int = 0
-    again: dict[str, Array] | None = None
+    expected: Iterable[str]
+    """What the engine must answer."""
+    predicted: Predicted | None = None
+    """With it an error beyond the tolerance must be within DEGRADED times the error to be expected there."""
+    reference: Solution | None = None
+    """Another derivation at the same positions: the stricter of its conditions and sizes and the formulas' own decides
+    what they may be wrong by; left out: the answer itself."""
+    scales: Scales = field(default_factory=dict)
+    """Of `formulas` and `reference`, where another answer was held to them before."""
+    nearby: Nearby | None = None
+    """With it an error beyond the tolerance is taken again within the rounding of theta_2."""
+    own: Solution | None = field(default=None, init=False)
+    """The answer as a solution."""
+    numbers: int = field(default=0, init=False)
+    decided: int = field(default=0, init=False)
+    again: dict[str, Array] | None = field(default=None, init=False)
     """What `nearby` answered, once that was required."""
+
+    def rows(self) -> list[Row]:
+        """Compare where the loop closes, each quantity, and what the engine says of itself."""
+        answer = self.answer
+        if answer.refusal is not None:
+            return [Row.unmeasured(self.name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
+        if answer.assembled is None or len(answer.assembled) != len(self.formulas):
+            what = "the engine did not say where the loop closes"
+            return [Row.unmeasured(self.name, answer.engine, answer.setting, "assembled", FAILS, what)]
+        self.own = reference_of(self.scene, answer)
+        if self.reference is None:
+            self.reference, self.scales = self.own, {}
+        rows = [self.assembled()]
+        rows += [row for quantity in STAGE_OF if quantity in self.expected for row in self.compared(quantity)]
+        rows += [self.row("watch", FAILS, alarm) for alarm in answer.alarms]
+        return [*rows, *self.undecided()]
 
     def row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
         """Make a row of this answer."""
@@ -124,11 +117,24 @@ class _Comparison:
         engine, setting = self.answer.engine, self.answer.setting or "-"
         return Row(self.name, engine, setting, quantity, error, allowed, verdict, plain(reason), theta_2, condition)
 
+    def closure(self) -> Row:
+        """Check that the own angles of an engine close the loop."""
+        answer, linkage = self.answer, self.scene.linkage
+        assert answer.at is not None and answer.assembled is not None
+        theta_2, theta_3, theta_4 = answer.at.theta_2, answer.quantities["theta_3"], answer.quantities["theta_4"]
+        error = np.where(answer.assembled, closing_gap(linkage, theta_2, theta_3, theta_4), 0.0)
+        index, condition = worst(error), 1.0 / half_turns(linkage.ground_angle, theta_2)
+        allowed = (IDENTITY if answer.setting == "exact" else self.tolerance).factor / condition
+        verdict = AGREES if error[index] <= allowed else FAILS
+        verdict, reason = (verdict, f"identity: {CLOSURE}") if answer.assembled.any() else (UNDECIDED, NOWHERE)
+        at = {"theta_2": theta_2[index], "condition": condition}
+        return self.row("closure", verdict, reason, error=error[index], allowed=allowed, **at)
+
     def assembled(self) -> Row:
         """Compare where both close the loop."""
         theirs, ours = self.answer.assembled, self.formulas
         assert theirs is not None
-        differ = (theirs != ours.assembled) & ~touching(self.scene, ours.theta_2)
+        differ = (theirs != ours.assembled) & ~touching(self.scene.linkage, ours.theta_2)
         count = np.count_nonzero(differ)
         return self.row(
             "assembled",
@@ -140,7 +146,7 @@ class _Comparison:
             condition=1.0,
         )
 
-    def judged(self, quantity: str) -> Iterator[Row]:
+    def compared(self, quantity: str) -> Iterator[Row]:
         """Compare a quantity, if either side has it."""
         formulas, scene, tolerance = self.formulas, self.scene, self.tolerance
         ours, theirs = getattr(formulas, quantity, None), self.answer.quantities.get(quantity)
@@ -156,7 +162,7 @@ class _Comparison:
         both = formulas.assembled & self.answer.assembled
         judged = both & _stated(quantity, formulas, ours)
         self.numbers += int(np.count_nonzero(both))
-        withheld = counted(formulas.status_code[both & ~judged])
+        withheld = _count(formulas.status_code[both & ~judged])
         if withheld and not judged.any():
             yield self.row(quantity, REFUSES, f"the formulas state no value: {withheld}")
             return
@@ -171,21 +177,21 @@ class _Comparison:
         if not where.any():
             yield self.row(quantity, UNDECIDED, "no position at which both may be held to it" + note)
             return
-        found, error, condition = self._measured(quantity, ours, theirs, where)
-        self.decided += found.decided
-        at = {"theta_2": formulas.theta_2[found.worst], "condition": condition[found.worst]}
+        result, error, condition = self._measured(quantity, ours, theirs, where)
+        self.decided += result.decided
+        at = {"theta_2": formulas.theta_2[result.worst], "condition": condition[result.worst]}
         yield self.row(
-            quantity, found.verdict, found.reason + note, error=error[found.worst], allowed=found.allowed, **at
+            quantity, result.verdict, result.reason + note, error=error[result.worst], allowed=result.allowed, **at
         )
 
     def _measured(self, quantity: str, ours: Array, theirs: Array, where: Mask) -> "tuple[_Finding, Array, Array]":
         """Compare at the positions `where`: the result, the errors and the conditions, (n,)."""
-        if quantity not in self.yardsticks:
-            self.yardsticks[quantity] = (
-                smallest_yardstick(quantity, self.scene, self.formulas, self.basis),
-                strictest_condition(quantity, self.scene.linkage, self.formulas, self.basis),
+        if quantity not in self.scales:
+            self.scales[quantity] = (
+                smallest_scale(quantity, self.scene, self.formulas, self.reference),
+                strictest_condition(quantity, self.scene.linkage, self.formulas, self.reference),
             )
-        size, condition = self.yardsticks[quantity]
+        size, condition = self.scales[quantity]
         full, predicted, expected = self.tolerance.allowed(condition), self.predicted, None
         if predicted is not None:
             full, size = np.where(size == 0.0, 0.0, full), in_own_unit(size)
@@ -204,8 +210,8 @@ class _Comparison:
                 of_data = relative(predicted(quantity, where), size)
                 return np.where(np.isfinite(again), np.fmin(of_data, full), of_data)
 
-        found = _found(error, condition, where, full, self.tolerance, expected)
-        return found._replace(reason=found.reason + note), error, condition
+        result = _judge_errors(error, condition, where, full, self.tolerance, expected)
+        return result._replace(reason=result.reason + note), error, condition
 
     def undecided(self) -> Iterator[Row]:
         """Fail a scene of which most numbers are undecided."""
@@ -229,7 +235,7 @@ class _Finding(NamedTuple):
     """Positions of which a verdict is drawn."""
 
 
-def _found(
+def _judge_errors(
     error: Array,
     condition: Array,
     where: Mask,
@@ -273,11 +279,6 @@ def _found(
     return _Finding(index, verdict, reason + note, allowed[index], int(np.count_nonzero(decidable & ~lost)))
 
 
-def turned(ground_angle: float, theta_2: Array | float = 0.0) -> float:
-    """Give the largest angle in half turns, at least 1: many turns away it has fewer digits of its direction."""
-    return max(1.0, abs(ground_angle) / np.pi, float(np.abs(theta_2).max(initial=0.0)) / np.pi)
-
-
 def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     """Mark where the formulas have one value: beyond the range of doubles the motion, up to the stage that met it."""
     if quantity in OF_FORCES:
@@ -290,22 +291,10 @@ def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     return np.asarray((formulas.status_code != SINGULAR) & ~beyond & ~jammed)
 
 
-def counted(codes: NDArray[np.uint8]) -> str:
+def _count(codes: NDArray[np.uint8]) -> str:
     """Count positions by status: "3 singular, 5 no_torque"."""
     counts = np.bincount(codes, minlength=len(STATUS_NAMES)).tolist()
     return ", ".join(f"{count} {name}" for name, count in zip(STATUS_NAMES, counts, strict=True) if count)
-
-
-def closing_margin(scene: Scene, theta_2: Array) -> Array:
-    """Compute by what part of the sum of the lengths the loop closes (> 0) or misses (< 0)."""
-    d, a, b, c = scene.linkage.lengths
-    e = np.abs(d * np.exp(1j * scene.linkage.ground_angle) - a * np.exp(1j * theta_2))
-    return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / of_length(scene))
-
-
-def touching(scene: Scene, theta_2: Array) -> Mask:
-    """Mark positions at which rounding decides whether the loop closes."""
-    return np.asarray(np.abs(closing_margin(scene, theta_2)) < TOUCHING_MARGIN)
 
 
 def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:

@@ -4,8 +4,18 @@ from collections import Counter
 from collections.abc import Iterable
 
 from fourbar.errors import FAILED, HOLDS
-from fourbar_validation.compare.identities import FORMULAS, IDENTITIES
-from fourbar_validation.compare.rows import AGREES, COMPARED, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row
+from fourbar_validation.compare.rows import (
+    AGREES,
+    COMPARED,
+    DEGRADED,
+    FAILS,
+    FORMULAS,
+    IDENTITIES,
+    REFUSES,
+    UNDECIDED,
+    VERDICTS,
+    Row,
+)
 
 WORDING = {
     AGREES: ("agrees", "agree"),

@@ -11,9 +11,8 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, FourBar
 from fourbar.solution import Solution
-from fourbar_validation.compare.error import magnitude
 from fourbar_validation.compare.reversals import slip_at
-from fourbar_validation.compare.tolerance import Array
+from fourbar_validation.compare.tolerance import Array, magnitude
 
 if TYPE_CHECKING:
     from fourbar.effects import Effect

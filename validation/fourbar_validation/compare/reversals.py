@@ -52,7 +52,7 @@ def reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
     pins = [pin for effect in scene.effects for pin in effect.dry_pins]
     if not pins or at.omega_2 is None or solution.omega_3 is None or np.ndim(at.omega_2) or np.ndim(at.alpha_2):
         return []
-    found = []
+    result = []
     for pin in dict.fromkeys(pins):
         slip = slip_at(solution, pin)
         at_rest = _resting(solution, pin, EPS * K)
@@ -62,9 +62,9 @@ def reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
                 last = None
             elif not at_rest[i]:
                 if last is not None and slip[last] * slip[i] < 0.0 and at.branch[last] == at.branch[i]:
-                    found.append(_between(scene, at, pin, last, i, float(slip[last])))
+                    result.append(_between(scene, at, pin, last, i, float(slip[last])))
                 last = i
-    return sorted(found, key=lambda reversal: reversal.position)
+    return sorted(result, key=lambda reversal: reversal.position)
 
 
 def reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bool = False) -> NDArray[np.bool_]:

@@ -20,6 +20,13 @@ HELD = (AGREES, DEGRADED)
 COMPARED = (*HELD, FAILS)
 """Of the others nothing was compared: no digit of the quantity is left to decide by, or the engine declared a limit."""
 
+FORMULAS = "formulas"
+IDENTITIES = (
+    *("closure", "force_sum", "moment_sum", "status", "blocks", "points", "law", "sweep"),
+    *("torque", "torque_error", "force_error", "friction_residual"),
+)
+"""Rows of the formulas that no engine answers: they do not count as compared."""
+
 LONGEST = 500
 """Characters of what somebody else's code gives as a reason."""
 

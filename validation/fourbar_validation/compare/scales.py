@@ -1,29 +1,31 @@
-"""How large a quantity is: the yardstick of its error.
+"""How large a quantity is and how well conditioned: the scale of its error, by the formulas and by another derivation.
 
 The scale of a quantity is its largest magnitude over the well-conditioned positions; a position
 below that is judged relative to its own magnitude, or the forces that diverge near a limit would
 excuse every other row. A quantity that (nearly) vanishes is judged against the sum of the
 absolute terms of its equation; if those vanish too, the answer must be exactly zero.
+
+A wrong formula would widen what it is allowed: an angle between bars 3 and 4 that is too small, an acceleration that
+is too large. So another derivation, the reference, is asked too, and the stricter of the two decides.
 """
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 
-from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import UNITS
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.quantities import OK, UNITS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.effects import size as size_of
-from fourbar_validation.compare.error import magnitude
-from fourbar_validation.compare.tolerance import WELL_CONDITIONED, Array, K
+from fourbar_validation.compare.tolerance import WELL_CONDITIONED, Array, K, condition_of, magnitude, of_length
 
 VANISHING = 1.0 / K
 """A quantity below this part of the sum of its terms has lost more to cancellation than K covers."""
 
 
-def yardstick(quantity: str, scene: Scene, formulas: Solution, values: Array) -> Array:
+def scale_of(quantity: str, scene: Scene, formulas: Solution, values: Array) -> Array:
     """Compute what the error of a quantity is divided by at each position, (n,)."""
     if UNITS[quantity] in ("rad", "1"):
         return np.ones(len(formulas))
@@ -55,7 +57,7 @@ def _one(quantity: str, scene: Scene, formulas: Solution) -> Array:
 
 
 def _lengths(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    return np.full(len(formulas), of_length(scene) + sum(_arm(scene, number) for number in MOVING_BARS))
+    return np.full(len(formulas), of_length(scene.linkage) + sum(_arm(scene, number) for number in MOVING_BARS))
 
 
 def _speeds(quantity: str, scene: Scene, formulas: Solution) -> Array:
@@ -133,6 +135,61 @@ def _force_terms(scene: Scene, formulas: Solution) -> Array:
     return total
 
 
-def of_length(scene: Scene) -> float:
-    """Sum of the four lengths, m: the terms of the loop closure."""
-    return math.fsum(scene.linkage.lengths)
+SIZED_BY = ("omega_3", "alpha_3", "a_G2", "a_G3", "a_G4")
+"""What the size of a force is made of; a reference without them has none."""
+
+
+def reference_of(scene: Scene, answer: Answer) -> Solution | None:
+    """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
+    if answer.at is None or not {"theta_3", "theta_4"} <= answer.quantities.keys():
+        return None
+    theta_2, known = answer.at.theta_2, answer.quantities
+    theta = {2: theta_2, 3: known["theta_3"], 4: known["theta_4"]}
+    code = np.full(len(theta_2), OK, dtype=np.uint8)
+    reference = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2)
+    for name in UNITS:
+        if name in known:
+            setattr(reference, name, known[name])
+    if answer.at.omega_2 is not None:
+        reference.omega_2, reference.alpha_2 = (
+            np.broadcast_to(np.asarray(x, float), theta_2.shape) for x in (answer.at.omega_2, answer.at.alpha_2)
+        )
+        if reference.omega_3 is not None and reference.omega_4 is not None:
+            _add_velocities(scene.linkage, theta, reference)
+    one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
+    reference.sin_mu = np.sin(theta[4] - theta[3])
+    reference.condition = np.abs(reference.sin_mu)
+    if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
+        # not of their difference: of an angle many turns away that has fewer digits than its sine
+        reference.drive_condition = np.abs(np.sin(other) * np.cos(one) - np.cos(other) * np.sin(one))
+    return reference
+
+
+def _add_velocities(linkage: FourBar, theta: dict[int, Array], reference: Solution) -> None:
+    """Add those of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
+
+    def swung(bar: int, distance: float, angle: float) -> Array:
+        speed, direction = distance * getattr(reference, f"omega_{bar}"), theta[bar] + angle
+        return np.stack((-speed * np.sin(direction), speed * np.cos(direction)), axis=1)
+
+    reference.v_A, reference.v_B = swung(2, linkage.input.length, 0.0), swung(4, linkage.output.length, 0.0)
+    for bar in MOVING_BARS:
+        centre = swung(bar, *linkage.bar(bar).mass_centre)
+        setattr(reference, f"v_G{bar}", centre + reference.v_A if bar == 3 else centre)
+
+
+def strictest_condition(quantity: str, linkage: FourBar, formulas: Solution, reference: Solution | None) -> Array:
+    """Take the better of two conditions of a quantity at each position, (n,)."""
+    ours = condition_of(quantity, linkage, formulas)
+    return ours if reference is None else np.fmin(np.fmax(ours, condition_of(quantity, linkage, reference)), 1.0)
+
+
+def smallest_scale(quantity: str, scene: Scene, formulas: Solution, reference: Solution | None) -> Array:
+    """Take the smaller of two sizes of a quantity at each position, (n,)."""
+    ours = scale_of(quantity, scene, formulas, getattr(formulas, quantity))
+    of_motion = reference is not None and (
+        reference.omega_2 is None or all(getattr(reference, q) is not None for q in SIZED_BY)
+    )
+    if reference is None or not of_motion or getattr(reference, quantity) is None:
+        return ours
+    return np.fmin(ours, scale_of(quantity, scene, reference, getattr(reference, quantity)))

@@ -1,11 +1,13 @@
-"""How much may differ, and why: four classes of tolerance, each a named object.
+"""How far two numbers are apart, how far they may be, and why: four classes of tolerance, each a named object.
 
 `condition` lies in (0, 1], 1 is best; an exact comparison is allowed K eps / condition. The motion
 condition is s = |sin(theta_4 - theta_3)|, the drive condition the sine between the two bars that
 are not driven, the lever the shorter of bars 3 and 4 over the longest bar.
 """
 
+import math
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,10 @@ from fourbar.quantities import UNITS
 from fourbar.solution import Solution
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TURN = 2.0 * math.pi
+Angle = TypeVar("Angle", float, Array)
 
 EPS = 2.0**-52
 K = 50.0
@@ -87,6 +93,11 @@ OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_
 """Quantities that the input alone decides: they lose none."""
 
 
+TOUCHING_MARGIN = 32.0 * EPS
+"""A loop that closes, or misses, by less than this part of the sum of its lengths does so by the
+rounding of the data, and the engines may differ on whether it closes."""
+
+
 def simulated_within(error: float, why: str) -> ErrorBound:
     """Hold what runs through time to a wanted error."""
     if not 0.0 < error < 1.0:
@@ -113,3 +124,87 @@ def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
         assert formulas.drive_condition is not None
         condition = condition * formulas.drive_condition
     return np.asarray(condition, dtype=float)
+
+
+def wrapped(angle: Angle) -> Angle:
+    """Wrap into [-pi, pi)."""
+    return (angle + math.pi) % TURN - math.pi
+
+
+def half_turns(ground_angle: float, theta_2: Array | float = 0.0) -> float:
+    """Give the largest angle in half turns, at least 1: many turns away it has fewer digits of its direction."""
+    return max(1.0, abs(ground_angle) / np.pi, float(np.abs(theta_2).max(initial=0.0)) / np.pi)
+
+
+def roundoff(linkage: FourBar) -> float:
+    """Compute what two derivations of an angle may differ by, rad: it is one against the ground's."""
+    return EQUIVALENCE.factor * half_turns(linkage.ground_angle)
+
+
+def of_length(linkage: FourBar) -> float:
+    """Sum of the four lengths, m: the terms of the loop closure."""
+    return math.fsum(linkage.lengths)
+
+
+def closing_margin(linkage: FourBar, theta_2: Array) -> Array:
+    """Compute by what part of the sum of the lengths the loop closes (> 0) or misses (< 0)."""
+    d, a, b, c = linkage.lengths
+    e = np.abs(d * np.exp(1j * linkage.ground_angle) - a * np.exp(1j * theta_2))
+    return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / of_length(linkage))
+
+
+def closing_gap(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> Array:
+    """Compute by what part of the sum of the lengths three angles miss the closure of the loop, (n,)."""
+    d, a, b, c = linkage.lengths
+    ground = d * np.exp(1j * linkage.ground_angle)
+    gap = a * np.exp(1j * theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4)
+    return relative(np.abs(gap), of_length(linkage))
+
+
+def touching(linkage: FourBar, theta_2: Array) -> Mask:
+    """Mark positions at which rounding decides whether the loop closes."""
+    return np.asarray(np.abs(closing_margin(linkage, theta_2)) < TOUCHING_MARGIN)
+
+
+def magnitude(values: Array) -> Array:
+    """Absolute value of a scalar, Euclidean norm of a vector, (n,)."""
+    return np.asarray(np.hypot(values[:, 0], values[:, 1]) if values.ndim == 2 else np.abs(values))
+
+
+def difference(quantity: str, ours: Array, theirs: Array) -> Array:
+    """Angles modulo 2 pi, vectors by Euclidean norm, (n,); NaN where the shapes are not the same."""
+    if theirs.shape != ours.shape:
+        return np.full(len(ours), np.nan)
+    apart = ours - theirs
+    if quantity.startswith("theta"):
+        apart = wrapped(apart)
+    return magnitude(apart)
+
+
+def relative(apart: Array | float, size: Array | float) -> Array:
+    """Divide a difference by a size; a size of 0 demands exactly 0: over the least double any other is huge."""
+    with np.errstate(over="ignore"):
+        return np.asarray(apart / np.where(size == 0.0, np.nextafter(0.0, 1.0), size))
+
+
+def relative_error(quantity: str, ours: Array, theirs: Array, size: Array) -> Array:
+    """Compute the error of an answer in parts of the size of the quantity, (n,)."""
+    return relative(difference(quantity, ours, theirs), size)
+
+
+def in_own_unit(size: Array) -> Array:
+    """Replace a size by 1 of its unit where there is nothing to be relative to."""
+    return np.where(size == 0.0, 1.0, size)
+
+
+def used(error: Array | float, allowed: Array | float) -> Array:
+    """error/allowed: how much of its allowance an error uses; infinite where it is no number, 0 where it is 0."""
+    error, allowed = np.asarray(error, dtype=float), np.asarray(allowed, dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        share = np.where(error == 0.0, 0.0, error / allowed)
+    return np.where(np.isfinite(error) & ~np.isnan(share), share, np.inf)
+
+
+def worst(errors: Array) -> int:
+    """Index of the largest error; what is no number is beyond all."""
+    return int(np.argmax(np.where(np.isnan(errors), np.inf, errors)))

@@ -19,8 +19,7 @@ from typing import Any
 from fourbar.errors import InputError
 from fourbar.quantities import ANGLES, UNKNOWNS
 from fourbar_validation.compare.compare import COMPARED
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import in_words, one_line, plain
+from fourbar_validation.compare.rows import FORMULAS, in_words, one_line, plain
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines import workers
 from fourbar_validation.engines.checked import Checked
@@ -58,11 +57,11 @@ def named(adapters: Sequence[str], known: Iterable[str]) -> tuple[Witness, ...]:
     """Read the witnesses of the command line; InputError where one is none."""
     if os.getcwd() not in sys.path:  # a console script does not look there
         sys.path.append(os.getcwd())
-    found = list(zip(adapters, _described(adapters, known), strict=True))
-    for adapter, each in found:
+    result = list(zip(adapters, _described(adapters, known), strict=True))
+    for adapter, each in result:
         if isinstance(each, _UnusableError):
             raise InputError("--witness", adapter, str(each))
-    return tuple(each for _, each in found if isinstance(each, Witness))
+    return tuple(each for _, each in result if isinstance(each, Witness))
 
 
 def installed(known: Iterable[str]) -> tuple[Witness, ...]:
@@ -80,14 +79,14 @@ def _described(adapters: Sequence[str], known: Iterable[str]) -> list[Witness | 
     """Ask each class what it says of itself, in another process: nothing of it runs where the verdict is given."""
     if not adapters:
         return []
-    names, found = {FORMULAS, *known}, list[Witness | _UnusableError]()
+    names, result = {FORMULAS, *known}, list[Witness | _UnusableError]()
     for each in workers.each(_describe, adapters, seconds=LONGEST_IMPORT, instead=_trouble):
         if isinstance(each, Witness) and each.name in names:
-            found.append(_UnusableError(f"must have a name of its own; {each.name!r} is another's"))
+            result.append(_UnusableError(f"must have a name of its own; {each.name!r} is another's"))
             continue
         names |= {each.name} if isinstance(each, Witness) else set()
-        found.append(each)
-    return found
+        result.append(each)
+    return result
 
 
 def _trouble(_: str, error: Exception, __: object) -> _UnusableError:

@@ -258,16 +258,16 @@ def response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]
     for moved in changed:
         if moved is None:
             continue
-        found = {}
+        result = {}
         for output, y in base.items():
             if output not in moved:  # singular there
-                found[output] = math.inf
+                result[output] = math.inf
                 continue
             change = abs(moved[output] - y)
             if output.startswith("theta") and change > 3:
                 change = 2 * arb.pi() - change
-            found[output] = abs(float((change * arb(2) ** STEP_BITS).mid()))
-        return found
+            result[output] = abs(float((change * arb(2) ** STEP_BITS).mid()))
+        return result
     return {}
 
 

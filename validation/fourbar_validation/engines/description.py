@@ -103,13 +103,13 @@ def parts(linkage: FourBar) -> list[Part]:
     """Describe bars 2, 3 on 2, and 4."""
     theta_1, d = linkage.ground_angle, linkage.ground
     first_pins = {2: (1, (0.0, 0.0)), 3: (2, (linkage.input.length, 0.0)), 4: (1, components(d, theta_1))}
-    found = []
+    result = []
     for number in MOVING_BARS:
         bar = linkage.bar(number)
         ends = {"first_pin": (0.0, 0.0), "G": components(*centre(bar)), "end": (bar.length, 0.0)}
         points = {f"{name}{number}": at for name, at in ends.items()}
-        found.append(Part(number, *first_pins[number], bar.mass, inertia(bar), bar.length, points))
-    return found
+        result.append(Part(number, *first_pins[number], bar.mass, inertia(bar), bar.length, points))
+    return result
 
 
 def place(point: Any, ground_angle: float) -> tuple[float, float]:

@@ -68,12 +68,12 @@ def sines(linkage: FourBar, command: Command) -> Array:
     ctx.prec = BITS
     x = {name: arb(length) for name, length in zip("dabc", linkage.lengths, strict=True)}
     x["theta_1"] = arb(linkage.ground_angle)
-    found = np.full(len(command.theta_2), np.nan)
+    result = np.full(len(command.theta_2), np.nan)
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         closed = closure(x | {"theta_2": arb(theta_2)}, branch)
         # with A on O4 bars 3 and 4 have no direction
-        found[i] = math.nan if closed is None else np.nan_to_num(_number(wedge(*closed[1:])))
-    return found
+        result[i] = math.nan if closed is None else np.nan_to_num(_number(wedge(*closed[1:])))
+    return result
 
 
 def _put(out: dict[str, Array], i: int, values: dict[str, Any]) -> None:

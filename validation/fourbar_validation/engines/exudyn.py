@@ -151,8 +151,8 @@ class ExudynBars(Loaded):
 
     def rotation(self, bar: int) -> Array:
         """Return that of the body."""
-        found = self.mbs.GetObjectOutputBody(self.body[bar], exu.OutputVariableType.RotationMatrix, [0.0, 0.0, 0.0])
-        return np.reshape(found, (3, 3))[:2, :2]
+        result = self.mbs.GetObjectOutputBody(self.body[bar], exu.OutputVariableType.RotationMatrix, [0.0, 0.0, 0.0])
+        return np.reshape(result, (3, 3))[:2, :2]
 
     def velocity(self, bar: int) -> float:
         """Read that of its coordinate; the ground has none."""

@@ -82,11 +82,11 @@ def _places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) ->
     unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
     O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
     first_pin = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
-    found = {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
-    found |= {"A": _plane(first_pin[3]), "B": _plane(O4 + linkage.output.length * unit[4])}
+    result = {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
+    result |= {"A": _plane(first_pin[3]), "B": _plane(O4 + linkage.output.length * unit[4])}
     for bar in MOVING_BARS:
-        found[f"G{bar}"] = _plane(first_pin[bar] + polar(centre(linkage.bar(bar))) * unit[bar])
-    return found
+        result[f"G{bar}"] = _plane(first_pin[bar] + polar(centre(linkage.bar(bar))) * unit[bar])
+    return result
 
 
 def _answered(
@@ -98,23 +98,23 @@ def _answered(
     one, other = (motion.unit[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
     if (gone := wound(scene, motion)) is not None:
         unknowns[gone] = np.nan
-    found = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
+    result = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
     for bar in MOVING_BARS:
-        found |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
+        result |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
     a_A = motion.swing(2, motion.first_pin[3])
-    found["drive_condition"] = np.abs(cross(one, other)) * from_jamming
-    found |= {"a_A": _plane(a_A), "a_B": _plane(motion.swing(4, scene.linkage.output.length * motion.unit[4]))}
+    result["drive_condition"] = np.abs(cross(one, other)) * from_jamming
+    result |= {"a_A": _plane(a_A), "a_B": _plane(motion.swing(4, scene.linkage.output.length * motion.unit[4]))}
     for bar in MOVING_BARS:
-        found[f"a_G{bar}"] = _plane(motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0))
+        result[f"a_G{bar}"] = _plane(motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0))
     if any(effect.dry for effect in scene.effects):
         ends = []
         for side in (1.0, -1.0):
             begins = move(scene.linkage, theta_2, np.full_like(theta_2, side), 0.0 * theta_2, theta_3, theta_4)
             ends.append(balance(scene, motion._replace(beginning=begins.omega))[0][:, TORQUE])
-        found |= {"torque_low": np.minimum(*ends), "torque_high": np.maximum(*ends)}
+        result |= {"torque_low": np.minimum(*ends), "torque_high": np.maximum(*ends)}
     if scene.loads or scene.effects:
-        found["torque_inertia"] = balance(replace(scene, loads=(), effects=()), motion)[0][:, TORQUE]
-    return found | {"torque": unknowns[:, TORQUE]}, residual
+        result["torque_inertia"] = balance(replace(scene, loads=(), effects=()), motion)[0][:, TORQUE]
+    return result | {"torque": unknowns[:, TORQUE]}, residual
 
 
 def move(
@@ -186,11 +186,11 @@ def _number(F: Complex, C: Complex, k: Array) -> int:
     x = size * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1)) * rng.uniform(0.0, 1.0, (n, len(k)))
     many = (np.broadcast_to(F, (n, *F.shape)), np.broadcast_to(C, (n, *C.shape)))
     x, settled, _ = _newton(*many, k, x)
-    found: list[Array] = []
+    result: list[Array] = []
     for each in x[settled & (x >= 0.0).all(axis=1)]:
-        if all(np.abs(each - other).max() > APART * max(each.max(), other.max()) for other in found):
-            found.append(each)
-    return len(found)
+        if all(np.abs(each - other).max() > APART * max(each.max(), other.max()) for other in result):
+            result.append(each)
+    return len(result)
 
 
 def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
@@ -242,8 +242,8 @@ def solved(matrix: Array, right: Array) -> tuple[Array, float]:
     x[known] = np.linalg.solve(matrix, right)
     x[known] += np.linalg.solve(matrix, right - matrix @ x[known])
     terms = np.abs(matrix) @ np.abs(x[known]) + np.abs(right)
-    left = np.abs(right - matrix @ x[known]) / np.where(terms == 0.0, 1.0, terms)
-    return x, float(np.max(left, initial=0.0, where=np.isfinite(left)))
+    remaining = np.abs(right - matrix @ x[known]) / np.where(terms == 0.0, 1.0, terms)
+    return x, float(np.max(remaining, initial=0.0, where=np.isfinite(remaining)))
 
 
 def slide(F: Complex, C: Complex, k: Array) -> Array:
@@ -256,14 +256,14 @@ def slide(F: Complex, C: Complex, k: Array) -> Array:
     k : mu r of each pin, m.
     """
     x = np.full(F.shape, np.nan)
-    left = np.flatnonzero(np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2)))
-    x[left] = 0.0
+    remaining = np.flatnonzero(np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2)))
+    x[remaining] = 0.0
     for stage in range(1, FRICTION_STAGES + 1):
-        x[left], settled, det = _newton(F[left], C[left], k * (stage / FRICTION_STAGES), x[left])
+        x[remaining], settled, det = _newton(F[remaining], C[remaining], k * (stage / FRICTION_STAGES), x[remaining])
         # without friction the determinant is 1: where it changes its sign the growth has turned back, into a jam
-        grown = settled & (det > 0.0) & (x[left] >= 0.0).all(axis=1)
-        x[left[~grown]] = np.nan
-        left = left[grown]
+        grown = settled & (det > 0.0) & (x[remaining] >= 0.0).all(axis=1)
+        x[remaining[~grown]] = np.nan
+        remaining = remaining[grown]
     return x
 
 

@@ -52,11 +52,11 @@ def close(linkage: FourBar, theta_2: Array, branch: NDArray[np.int8]) -> Closed:
     possible = np.maximum(e - (b + c), abs(b - c) - e) <= closed
     theta, gap = np.full((2, len(e)), np.nan), np.full(len(e), np.nan)
     for alpha, beta in [(_between(e, b, c), _between(e, c, b)), *np.radians(STARTS)]:
-        left = np.flatnonzero(possible & np.isnan(gap))
-        if not len(left):
+        remaining = np.flatnonzero(possible & np.isnan(gap))
+        if not len(remaining):
             break
-        start = np.array([phi + branch * alpha, phi + np.pi - branch * beta])[:, left]
-        theta[:, left], gap[left] = _newton(diagonal[left], b, c, branch[left], start, closed)
+        start = np.array([phi + branch * alpha, phi + np.pi - branch * beta])[:, remaining]
+        theta[:, remaining], gap[remaining] = _newton(diagonal[remaining], b, c, branch[remaining], start, closed)
     assembled = np.isfinite(gap)
     missed = possible & ~assembled & (np.maximum(e - (b + c), abs(b - c) - e) < -closed)
     if missed.any():

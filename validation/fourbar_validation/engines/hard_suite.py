@@ -54,9 +54,9 @@ class Hard:
 @cache
 def _scenes(families: tuple[str, ...]) -> list[tuple[str, Scene]]:
     """Make the scenes of some families, by name."""
-    found = []
+    result = []
     for family in FAMILIES:
         for label, scene in family.scenes() if family.name in families else ():
             titled = replace(scene, title=f"{family.name}: {label}", source=family.statement)
-            found.append((f"{family.name} {label}".replace(" ", "-"), titled))
-    return sorted(found, key=lambda pair: pair[0])
+            result.append((f"{family.name} {label}".replace(" ", "-"), titled))
+    return sorted(result, key=lambda pair: pair[0])

@@ -109,8 +109,8 @@ class Loaded(EngineBars, Protocol):
 
     def rotate(self, bar: int, x: float, y: float) -> Array:
         """Rotate (x, y) along and across a bar's line into world axes, (2,)."""
-        found = rotate(self.ground_angle, x, y) if bar == 1 else rotate_by(self.rotation(bar).tolist(), x, y)
-        return np.array(found)
+        result = rotate(self.ground_angle, x, y) if bar == 1 else rotate_by(self.rotation(bar).tolist(), x, y)
+        return np.array(result)
 
     def first_pin(self, bar: int) -> Array:
         """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
@@ -175,16 +175,16 @@ class Loaded(EngineBars, Protocol):
         for share in np.arange(1, STAGES + 1) / STAGES:
             before = math.inf
             for _ in range(STEPS):
-                forces, found = passed(share * loads)
-                most, change = float(found.max()), float(np.abs(found - loads).max())
+                forces, result = passed(share * loads)
+                most, change = float(result.max()), float(np.abs(result - loads).max())
                 if not most < DIVERGED or change <= REPEATED * most or before <= change <= ROUNDED * most:
                     break
                 nudge, before = NUDGE * most, change
-                moved = [(passed(share * (loads + nudge * one))[1] - found) / nudge for one in unit]
+                moved = [(passed(share * (loads + nudge * one))[1] - result) / nudge for one in unit]
                 matrix = unit - np.stack(moved, axis=1)
                 if np.linalg.det(matrix) <= 0.0:  # 1 without friction: beyond zero the growth has turned back
                     return {}
-                loads = loads + np.linalg.solve(matrix, found - loads)
+                loads = loads + np.linalg.solve(matrix, result - loads)
             if not change <= ROUNDED * most or (loads < 0.0).any():
                 return {}
         return forces

@@ -63,9 +63,9 @@ class Assembler:
         for alpha, beta in (triangle, *START_ANGLES):
             theta_3, theta_4 = phi + branch * alpha, phi + math.pi - branch * beta
             q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
-            found = newton(tree, q, branch, closed)
-            if found is not None:
-                return found
+            result = newton(tree, q, branch, closed)
+            if result is not None:
+                return result
         if max(e - (b + c), abs(b - c) - e) < -closed:
             raise ArithmeticError(f"the loop closes at theta_2 = {theta_2!r}, but Newton's method does not find it")
         return None

@@ -151,8 +151,8 @@ class OpenSimBars(Loaded):
 
     def rotation(self, bar: int) -> Array:
         """Return that of the body."""
-        found = self.body[bar].getTransformInGround(self.state).R()
-        return np.array([[found.get(i, j) for j in (0, 1)] for i in (0, 1)])
+        result = self.body[bar].getTransformInGround(self.state).R()
+        return np.array([[result.get(i, j) for j in (0, 1)] for i in (0, 1)])
 
     def positions(self) -> dict[str, Array]:
         """Locate the points of the bars."""
@@ -247,8 +247,8 @@ class OpenSimBars(Loaded):
         on_bodies, on_mobilities = osim.VectorOfSpatialVec(), osim.Vector()
         multipliers = self.state.getMultipliers()
         self.matter.calcConstraintForcesFromMultipliers(self.state, multipliers, on_bodies, on_mobilities)
-        found = on_bodies.get(int(self.body[2].getMobilizedBodyIndex())).get(1)
-        return np.array([-found.get(0), -found.get(1)])
+        result = on_bodies.get(int(self.body[2].getMobilizedBodyIndex())).get(1)
+        return np.array([-result.get(0), -result.get(1)])
 
 
 OpenSimConstraints = partial(Exact, "opensim-constraints", OpenSimBars)

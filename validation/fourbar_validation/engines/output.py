@@ -48,9 +48,9 @@ def printed() -> str:
     size = file.seek(0, os.SEEK_END)
     file.seek(0)
     text = file.read(min(size, KEPT // 2))
-    left = max(size - KEPT, 0)
-    file.seek(left, os.SEEK_CUR)
-    text += f"\n... {left} bytes left out ...\n".encode() * bool(left) + file.read()
+    remaining = max(size - KEPT, 0)
+    file.seek(remaining, os.SEEK_CUR)
+    text += f"\n... {remaining} bytes left out ...\n".encode() * bool(remaining) + file.read()
     file.truncate(0)
     file.seek(0)
     for name, descriptor in (("stdout", 1), ("stderr", 2)):  # an engine may have closed them, or sent them elsewhere

@@ -22,8 +22,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.compare import Mask
-from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, Array
+from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, Array, Mask
 from fourbar_validation.engines.description import centre, speeds
 
 FIRST_ORDER = 0.1

@@ -12,10 +12,10 @@ from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Engine
-from fourbar_validation.compare.compare import COMPARED, Mask, Nearby, Predicted
+from fourbar_validation.compare.compare import COMPARED, Nearby, Predicted
 from fourbar_validation.compare.nearby import shift_to
 from fourbar_validation.compare.rows import in_words
-from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, ErrorBound
+from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, ErrorBound, Mask
 from fourbar_validation.engines.description import speeds
 from fourbar_validation.engines.exact import unknown
 from fourbar_validation.engines.free_body import FreeBody

@@ -183,13 +183,13 @@ def each(
     instead: Instead = fail,
 ) -> Iterator[Any]:
     """Apply the function to each item; results in the order of the items, as soon as those before are there."""
-    found: dict[int, list[Any]] = {}
+    result: dict[int, list[Any]] = {}
     turn = 0
     chunks = enumerate([item] for item in items)
     for number, results in over_processes(function, chunks, workers, seconds=seconds, instead=instead):
-        found[number] = results
-        while turn in found:
-            yield from found.pop(turn)
+        result[number] = results
+        while turn in result:
+            yield from result.pop(turn)
             turn += 1
 
 
@@ -252,10 +252,10 @@ def as_done(chunks: Iterable[Chunk], workers: Workers, instead: Instead) -> Iter
             except (StalledError, DependencyError):
                 raise
             except Exception as error:
-                found = error
-            if getattr(found, "exitcode", None) not in FROM_OUTSIDE:
+                result = error
+            if getattr(result, "exitcode", None) not in FROM_OUTSIDE:
                 break  # otherwise somebody killed it: that is not the item's doing
-        return found
+        return result
 
     waiting = iter(chunks)
     running: dict[Any, Chunk] = {}

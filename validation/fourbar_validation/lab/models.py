@@ -20,12 +20,12 @@ ROUND_OFF = 1e-12
 
 def stale(files: Iterable[Path]) -> list[Path]:
     """Find the scene files whose MJCF is missing or differs from what they generate now, round-off apart."""
-    found = []
+    result = []
     for file in files:
         xml = file.with_suffix(".xml")
         if not xml.is_file() or not _same(xml.read_text(encoding="utf-8"), mjcf(load(file))):
-            found.append(file)
-    return found
+            result.append(file)
+    return result
 
 
 def _same(one: str, other: str) -> bool:

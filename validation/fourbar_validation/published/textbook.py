@@ -51,13 +51,13 @@ def value(solution: fourbar.Solution, quantity: str, position: int) -> float:
     if quantity.startswith("-"):
         return -value(solution, quantity[1:], position)
     name, axis = (quantity[:-2], AXES[quantity[-2:]]) if quantity[-2:] in AXES else (quantity, None)
-    found: Any
+    result: Any
     if name == "v_A":
         assert solution.omega_2 is not None
-        found = solution.omega_2[:, None] * np.stack([-solution.A[:, 1], solution.A[:, 0]], axis=1)
+        result = solution.omega_2[:, None] * np.stack([-solution.A[:, 1], solution.A[:, 0]], axis=1)
     else:
-        found = getattr(solution, name)
-    return float(found[position] if axis is None else found[position, axis])
+        result = getattr(solution, name)
+    return float(result[position] if axis is None else result[position, axis])
 
 
 @cache

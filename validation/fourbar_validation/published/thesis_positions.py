@@ -74,16 +74,16 @@ def limits() -> Iterator[PublishedFigure]:
         3: (a**2 + d**2 - (b + c) ** 2) / (2.0 * a * d),
         4: (a**2 + d**2 - (b - c) ** 2) / (2.0 * a * d),
     }
-    found = {2: deg(output[-1].theta_2), 4: deg(dead_centre[0].theta_2)}
+    result = {2: deg(output[-1].theta_2), 4: deg(dead_centre[0].theta_2)}
     for row in json.loads((DATA / "limits.json").read_text(encoding="utf-8"))["table_3_2"]:
         number = row["row"]
         yield PublishedFigure("3.2 limits", f"row {number} cosine", row["discriminant_printed"], cosines[number])
         if number == 2:
-            made = found[2] - deg(THETA_1)
-            yield PublishedFigure("3.2 limits", "row 2 theta_2", row["value_printed_deg"], found[2], ("14",), made)
+            made = result[2] - deg(THETA_1)
+            yield PublishedFigure("3.2 limits", "row 2 theta_2", row["value_printed_deg"], result[2], ("14",), made)
         if number == 4:
-            yield PublishedFigure("3.2 limits", "row 4 theta_2", row["value_printed_deg"], found[4])
-            arc = found[4] - math.degrees(to_ours(THETA_1))
+            yield PublishedFigure("3.2 limits", "row 4 theta_2", row["value_printed_deg"], result[4])
+            arc = result[4] - math.degrees(to_ours(THETA_1))
             yield PublishedFigure("3.2 limits", "row 4 arc cosine", row["acos_printed_deg"], arc)
 
 

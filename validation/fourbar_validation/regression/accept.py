@@ -61,14 +61,14 @@ def report_differences(
     engines = set(after.words("engine"))
     times = time_changes(merged(under_new_names(before.times(), names), after.times()))
     scenes = in_sight(after.scenes(keep))
-    found = compared((before.about, before.scenes(keep)), (after.about, scenes), engines, times)
+    result = compared((before.about, before.scenes(keep)), (after.about, scenes), engines, times)
     unproven = [str(run.table) for run in (before, after) if not run.verified]
-    found.notes += [f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing" for table in unproven]
+    result.notes += [f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing" for table in unproven]
     for form, path in forms.items():
         if path is not None:
-            write_text(path, FORMS[form](found))
-    click.echo(render.text(found), nl=False)
-    return found.status
+            write_text(path, FORMS[form](result))
+    click.echo(render.text(result), nl=False)
+    return result.status
 
 
 def in_sight(scenes: Iterable[T]) -> Iterator[T]:
@@ -198,10 +198,10 @@ def history(
         lambda column: (getattr(row, column) for run in runs for row in run.rows),
     )
     runs = [run.of(keep) for run in runs]
-    found = steps(runs)
+    result = steps(runs)
     target = file.with_name("history.html") if out is None else out
-    write_text(target, page(runs, found))
-    for step in found:
+    write_text(target, page(runs, result))
+    for step in result:
         click.echo(step.sentence())
-    changed = f"{len(found)} step{'s' if len(found) > 1 else ''} changed something" if found else "nothing changed"
+    changed = f"{len(result)} step{'s' if len(result) > 1 else ''} changed something" if result else "nothing changed"
     click.echo(f"{len(runs)} runs, {changed}: {target}")

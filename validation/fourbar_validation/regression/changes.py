@@ -10,8 +10,7 @@ from typing import TypeVar
 
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import FAILS, VERDICTS, Row, sorted_rows
+from fourbar_validation.compare.rows import FAILS, FORMULAS, VERDICTS, Row, sorted_rows
 from fourbar_validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, change
 from fourbar_validation.regression.fault import Fault
 from fourbar_validation.regression.record import About
@@ -195,15 +194,18 @@ def compared(
     names = renamed(old[0].scenes, new[0].scenes)
     surroundings, older = _surroundings(old[0], new[0])
     notes = [f"renamed: {before} -> {after}" for before, after in names.items()]
-    found = Differences(surroundings, list(scenes.values()), notes, times, kept)
+    result = Differences(surroundings, list(scenes.values()), notes, times, kept)
     known = engines | (new[0].engines or set())
     for scene, before, after in merged(under_new_names(old[1], names), new[1]):
         wanted = scene in new[0].scenes if new[0].scenes else bool(after) or not engines
         rows = _by_key(scene, before), _by_key(scene, after)
-        found.add(_of_scene(*rows, known if wanted else set(), wanted, scenes.get(scene)))
+        result.add(_of_scene(*rows, known if wanted else set(), wanted, scenes.get(scene)))
     if older:
-        found.notes += [f"{found.compared} of {found.rows} rows are compared: the others are of one run alone", *older]
-    return found
+        result.notes += [
+            f"{result.compared} of {result.rows} rows are compared: the others are of one run alone",
+            *older,
+        ]
+    return result
 
 
 def under_new_names(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
@@ -251,15 +253,15 @@ def _of_scene(
         if key in settings.values():
             continue  # it stands with its counterpart
         old, new = before.get(key), after.get(settings.get(key, key))
-        found = change(key, old, new)
+        result = change(key, old, new)
         if new is None and not (wanted and (key[1] in engines or key[1] == FORMULAS)):
-            found = Change(Kind.NOT_RUN, key, old, None, math.nan)
+            result = Change(Kind.NOT_RUN, key, old, None, math.nan)
         elif old is not None and new is not None and (other is not None or key in settings):
             kind = Kind.OTHER_SETTING if other is None else Kind.OTHER_SCENE
             kind = Kind.OTHER_POSITIONS if other is not None and other.positions_alone else kind
             fails = new.verdict == FAILS and old.verdict != FAILS
-            found = Change(Kind.NEW_FAILURE if fails else kind, key, old, new, found.round_off)
-        changes.append(found)
+            result = Change(Kind.NEW_FAILURE if fails else kind, key, old, new, result.round_off)
+        changes.append(result)
     return changes
 
 
@@ -267,10 +269,10 @@ def _other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict
     """Rows that both runs have with one setting each, but not the same: old key to new key."""
 
     def alone(keys: Iterable[Key]) -> dict[tuple[str, str, str], Key]:
-        found: dict[tuple[str, str, str], list[Key]] = {}
+        result: dict[tuple[str, str, str], list[Key]] = {}
         for key in keys:
-            found.setdefault((key[0], key[1], key[3]), []).append(key)
-        return {name: group[0] for name, group in found.items() if len(group) == 1}
+            result.setdefault((key[0], key[1], key[3]), []).append(key)
+        return {name: group[0] for name, group in result.items() if len(group) == 1}
 
     old, new = alone(before.keys() - after.keys()), alone(after.keys() - before.keys())
     return {old[name]: new[name] for name in old.keys() & new.keys() if "-" not in (old[name][2], new[name][2])}
@@ -278,17 +280,17 @@ def _other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict
 
 def _surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], list[str]]:
     """List what the runs were made with where it differs, and what a record cannot say."""
-    found = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
-    found += _both(old.versions, new.versions)
-    found.append(("machine", old.machine, new.machine))
-    found += [each for each in _both(old.settings, new.settings) if each[0] != "suite"]
+    result = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
+    result += _both(old.versions, new.versions)
+    result.append(("machine", old.machine, new.machine))
+    result += [each for each in _both(old.settings, new.settings) if each[0] != "suite"]
     suites = [each.settings.get("suite", "not recorded")[:12] for each in (old, new)]
     notes = []
     if suites[0] != suites[1] and not (old.scenes and new.scenes):
         silent = "neither run says" if not (old.scenes or new.scenes) else "the older record does not say"
         notes.append(f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and {silent} what they ask: "
                      "a scene that changed cannot be named, rows are compared by name alone")  # fmt: skip
-    return [(what, before, after) for what, before, after in found if before != after], notes
+    return [(what, before, after) for what, before, after in result if before != after], notes
 
 
 def _both(old: Mapping[str, str], new: Mapping[str, str]) -> list[tuple[str, str, str]]:

@@ -4,8 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.regression.change import Change, Kind
 from fourbar_validation.report.summary import NUMBER
 
@@ -70,11 +69,11 @@ class Fault:
     def groups(self, kinds: Iterable[Kind]) -> list[Group]:
         """Those of some kinds, the worst first; each with the number of its engine's scenes."""
         wanted = set(kinds)
-        found = [group for group in self._groups.values() if group.kind in wanted]
-        for group in found:
+        result = [group for group in self._groups.values() if group.kind in wanted]
+        for group in result:
             group.of_scenes = self._scenes[group.engine]
         order = list(Kind)
-        return sorted(found, key=lambda g: (order.index(g.kind), *(-x for x in _severity(g)), -g.rows, g.engine))
+        return sorted(result, key=lambda g: (order.index(g.kind), *(-x for x in _severity(g)), -g.rows, g.engine))
 
     @property
     def sentences(self) -> list[str]:

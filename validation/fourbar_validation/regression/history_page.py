@@ -7,9 +7,8 @@ from datetime import datetime
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING
 
-from fourbar_validation.compare.error import used
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, VERDICTS
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, FORMULAS, REFUSES, VERDICTS
+from fourbar_validation.compare.tolerance import used
 from fourbar_validation.regression.change import Key
 from fourbar_validation.regression.history import HistoryRun
 from fourbar_validation.regression.render import line

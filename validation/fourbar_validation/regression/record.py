@@ -181,10 +181,10 @@ def recorded(path: Path) -> Recorded:
     if (table.parent / UNFINISHED).is_file():
         raise InputError("RESULTS", str(table), "must be of a run that was finished: run it again, and it is resumed")
     record = table.parent / ABOUT
-    found = _described(record, table) if record.is_file() else Recorded(NOTHING_KNOWN, table)
-    if next(found.rows(), None) is None:
+    result = _described(record, table) if record.is_file() else Recorded(NOTHING_KNOWN, table)
+    if next(result.rows(), None) is None:
         raise InputError("RESULTS", str(table), "must hold at least one comparison: it has none")
-    return found
+    return result
 
 
 def _described(record: Path, table: Path) -> Recorded:

@@ -76,13 +76,13 @@ def renamed(old: Mapping[str, Description], new: Mapping[str, Description]) -> d
     names: dict[str, list[str]] = {}
     for name in sorted(new.keys() - old.keys(), reverse=True):
         names.setdefault(repr(sorted(new[name].items())), []).append(name)
-    found = ((name, names.get(repr(sorted(old[name].items())))) for name in sorted(old.keys() - new.keys()))
-    return {name: same.pop() for name, same in found if same}
+    result = ((name, names.get(repr(sorted(old[name].items())))) for name in sorted(old.keys() - new.keys()))
+    return {name: same.pop() for name, same in result if same}
 
 
 def scene_changes(old: Mapping[str, Description], new: Mapping[str, Description]) -> list[SceneChange]:
     """List the scenes of both runs that ask something else now."""
-    found = []
+    result = []
     for name in sorted(old.keys() & new.keys()):
         before, after = old[name], new[name]
         entries = tuple(
@@ -91,5 +91,5 @@ def scene_changes(old: Mapping[str, Description], new: Mapping[str, Description]
             if before.get(key) != after.get(key)
         )
         if entries:
-            found.append(SceneChange(name, entries))
-    return found
+            result.append(SceneChange(name, entries))
+    return result

@@ -4,8 +4,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.regression.change import Change, Key, Kind
 from fourbar_validation.regression.changes import Differences, differences
 from fourbar_validation.regression.history import HistoryRun
@@ -44,7 +43,7 @@ class Step:
 
 def steps(runs: Sequence[HistoryRun]) -> list[Step]:
     """Compare each run with the last state of every row before it; a run of a part leaves the rest as it was."""
-    found: list[Step] = []
+    result: list[Step] = []
     known: dict[Key, Row] = {}
     about: About | None = None
     times: dict[tuple[str, str], float] = {}
@@ -53,7 +52,7 @@ def steps(runs: Sequence[HistoryRun]) -> list[Step]:
             here = differences((about, known.values()), (run.about, run.rows), (times, run.times), kept=sys.maxsize)
             step = Step(number, run, here)
             if step.changes or here.scenes or here.other_times:
-                found.append(step)
+                result.append(step)
             for change in here.changes:
                 if change.kind not in NO_CHANGE:
                     known.pop(change.key, None)
@@ -63,4 +62,4 @@ def steps(runs: Sequence[HistoryRun]) -> list[Step]:
             known.setdefault((row.scene, row.engine, row.setting, row.quantity), row)
         times = {**run.times, **times}
         about = replace(run.about, scenes={**(about.scenes if about else {}), **run.about.scenes})
-    return found
+    return result

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from fourbar_validation.compare.identities import FORMULAS
+from fourbar_validation.compare.rows import FORMULAS
 
 SCATTERS = 3.0
 """A change of the mean ratio is one beyond this many of its standard errors over the scenes."""
@@ -58,12 +58,12 @@ def time_changes(scenes: Iterable[tuple[str, Sequence[Time], Sequence[Time]]]) -
                 log = math.log(time / before[engine])
                 kept = sums.setdefault(engine, [0.0, 0.0, 0.0])
                 kept[:] = kept[0] + 1.0, kept[1] + log, kept[2] + log * log
-    found = []
+    result = []
     for engine, (n, total, squares) in sorted(sums.items()):
         if n >= ENOUGH:
             spread = math.sqrt(max(squares - total * total / n, 0.0) / (n - 1.0))
-            found.append(TimeChange(engine, math.exp(total / n), math.exp(spread / math.sqrt(n)), int(n)))
-    if len(found) > 1 and all(each.beyond for each in found) and len({each.ratio > 1.0 for each in found}) == 1:
-        ratio = math.exp(-sum(math.log(each.ratio) for each in found) / len(found))
-        return [TimeChange(FORMULAS, ratio, max(each.scatter for each in found), found[0].scenes)]
-    return found
+            result.append(TimeChange(engine, math.exp(total / n), math.exp(spread / math.sqrt(n)), int(n)))
+    if len(result) > 1 and all(each.beyond for each in result) and len({each.ratio > 1.0 for each in result}) == 1:
+        ratio = math.exp(-sum(math.log(each.ratio) for each in result) / len(result))
+        return [TimeChange(FORMULAS, ratio, max(each.scatter for each in result), result[0].scenes)]
+    return result

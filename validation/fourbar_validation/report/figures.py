@@ -11,10 +11,9 @@ from fourbar.show.drawing import drawing
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.error import magnitude, relative_error
 from fourbar_validation.compare.reversals import Reversal, broken
-from fourbar_validation.compare.scales import yardstick
-from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, condition_of
+from fourbar_validation.compare.scales import scale_of
+from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, condition_of, magnitude, relative_error
 from fourbar_validation.report.colours import ALLOWED, BAND, INK, PAPER, by_variable, style_of
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.svg import FLOOR, frame, svg_text
@@ -106,7 +105,7 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
     for turn, answer in enumerate(answers):
         formulas = solution if answer.at is None else solve(scene, at=answer.at)
         mine = getattr(formulas, quantity)
-        size = yardstick(quantity, scene, formulas, mine)
+        size = scale_of(quantity, scene, formulas, mine)
         error = relative_error(quantity, mine, answer.quantities[quantity], size)
         places = worst_of_stretches(error, turn / len(answers))
         if not len(places):

@@ -11,8 +11,7 @@ from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.error import magnitude, relative, relative_error
-from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, condition_of
+from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, condition_of, magnitude, relative, relative_error
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES
 from fourbar_validation.engines.limits import LIMITS, Boundary
 from fourbar_validation.engines.prediction import in_world_axes

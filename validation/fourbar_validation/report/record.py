@@ -6,9 +6,8 @@ from typing import Any
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.identities import FORMULAS
 from fourbar_validation.compare.reversals import Reversal
-from fourbar_validation.compare.rows import MADE_OF, Row, sorted_rows
+from fourbar_validation.compare.rows import FORMULAS, MADE_OF, Row, sorted_rows
 
 
 @dataclass(slots=True)

@@ -13,9 +13,17 @@ import numpy as np
 
 from fourbar.errors import HOLDS
 from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.error import used
 from fourbar_validation.compare.rows import DEGRADED, REFUSES, Row
-from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, IDENTITY, NOTHING_TO_TELL, SIMULATED, ErrorBound, K
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    EQUIVALENCE,
+    IDENTITY,
+    NOTHING_TO_TELL,
+    SIMULATED,
+    ErrorBound,
+    K,
+    used,
+)
 from fourbar_validation.engines.witnesses import WORK
 from fourbar_validation.report.machine import machine, versions
 from fourbar_validation.report.record import Record

@@ -6,17 +6,16 @@ from dataclasses import replace
 from functools import partial
 
 from fourbar.errors import LimitError
+from fourbar.formulas import mobility
 from fourbar.mjcf.settings import LIGHT
 from fourbar.quantities import FORCES
-from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.compare import compare
-from fourbar_validation.compare.identities import closure
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Answer, Engine
+from fourbar_validation.compare.compare import Comparison, Predicted
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
-from fourbar_validation.compare.statements.finding import Stated
-from fourbar_validation.compare.statements.statements import statements
-from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.compare.statements import limits, transmission
+from fourbar_validation.compare.statements.finding import look, worst
 from fourbar_validation.engines.witnesses import Witness, answering_nearby, predicting_from
-from fourbar_validation.report.record import Timing
 from fourbar_validation.run.question import Question
 
 
@@ -28,8 +27,6 @@ def compare_answers(question: Question) -> Iterator[Row]:
 
 def _answer(question: Question, witness: Witness) -> Iterator[Row]:
     answer = question.answer(witness)
-    seconds = question.answered[witness.name][1]
-    question.timings.append(Timing(question.name, answer.engine, answer.setting, len(question.at.theta_2), seconds))
     if answer.refusal is not None:
         question.left_out.append(f"{answer.engine}: {answer.refusal}")
     yield from compare_answer(question, witness, answer)
@@ -44,14 +41,15 @@ def compare_answer(question: Question, witness: Witness, answer: Answer) -> list
     name, scene, formulas = question.name, question.scene, question.solution
     predicted = predicting_from(witness, scene, question.at, answer)
     nearby = answering_nearby(witness, scene, question.at, formulas)
-    allowed = witness.tolerance, witness.expected, predicted, question.reference, question.yardsticks, nearby
-    rows = compare(name, scene, answer, formulas, *allowed)
+    of_witness, of_scene = (witness.tolerance, witness.expected, predicted), (question.reference, question.scales)
+    comparison = Comparison(name, scene, answer, formulas, *of_witness, *of_scene, nearby)
+    rows = comparison.rows()
     if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
         rows = [replace(row, reason=row.reason + why) if row.failed else row for row in rows]
     answers = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
     if answers and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
-        rows.append(closure(name, scene, answer, witness.tolerance))
+        rows.append(comparison.closure())
     return rows
 
 
@@ -70,7 +68,7 @@ def _observed_order(question: Question, witness: Witness) -> dict[str, float]:
 
 def compare_statements(question: Question) -> Iterator[Row]:
     """Compare what the formulas state of the linkage, whatever its motion, with every exact engine."""
-    stated, part = Stated(question.scene.linkage), "statements of the linkage"
+    stated, part = limits.Stated.of(question.scene.linkage), "statements of the linkage"
 
     def rows(witness: Witness, answer: Answer) -> list[Row]:
         predicted = predicting_from(witness, question.scene, question.at, answer)
@@ -81,9 +79,38 @@ def compare_statements(question: Question) -> Iterator[Row]:
 
     for witness in question.witnesses:
         answer, _ = question.answered.get(witness.name, (None, 0.0))
-        exact = witness.stated and witness.tolerance == EQUIVALENCE and "theta_3" in witness.expected
+        exact = witness.stated and witness.tolerance.conditioned and "theta_3" in witness.expected
         if exact and answer is not None and answer.refusal is None:
             yield from question.attempt(partial(rows, witness, answer), witness.name, part)
+
+
+def statements(
+    name: str,
+    scene: Scene,
+    engine: Engine,
+    answer: Answer,
+    stated: limits.Stated | None = None,
+    predicted: Predicted | None = None,
+) -> list[Row]:
+    """Make a row for each of `range`, `limit_positions`, `transmission`, and where there are change points `through`.
+
+    Parameters
+    ----------
+    answer : what the engine found over the scene's own motion.
+    stated : what the formulas state of the linkage, where several engines are held to it.
+    predicted : the errors to be expected of the answer.
+    """
+    linkage = scene.linkage
+    stated = limits.Stated.of(linkage) if stated is None else stated
+    seen = look(engine, linkage, [*limits.places(stated), *transmission.places(linkage)])
+    findings = {
+        "range": limits.ranges(stated, engine),
+        "limit_positions": limits.limit_positions(stated, seen),
+        "transmission": transmission.transmitted(scene, seen, answer, predicted),
+    }
+    if mobility.change_points(linkage):
+        findings["through"] = limits.through(linkage, engine)
+    return [worst(name, answer, quantity, list(each)) for quantity, each in findings.items()]
 
 
 def compare_inertia(question: Question) -> Iterator[Row]:

@@ -14,8 +14,7 @@ import numpy as np
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED, turning
-from fourbar_validation.compare.error import magnitude, relative
-from fourbar_validation.compare.tolerance import simulated_within
+from fourbar_validation.compare.tolerance import magnitude, relative, simulated_within
 from fourbar_validation.engines.witnesses import Witness
 
 ROUNDS = 6

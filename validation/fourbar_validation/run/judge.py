@@ -10,11 +10,11 @@ from zlib import crc32
 import numpy as np
 
 from fourbar.scene import Command, Scene, command
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import Row, plain
+from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
-from fourbar_validation.report.record import Record, Timing
+from fourbar_validation.report.record import Record
 from fourbar_validation.run.answers import check_mjcf, compare_answers, compare_inertia, compare_statements
+from fourbar_validation.run.formulas import check_identities, check_status
 from fourbar_validation.run.printed import check_blocks, check_error_bars, check_law, check_points, check_residual
 from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.released import check_released
@@ -22,7 +22,6 @@ from fourbar_validation.run.shipped.bounds import extremes
 from fourbar_validation.run.shipped.calls import compiled, study
 from fourbar_validation.run.shipped.changes import sensitivity, tolerances
 from fourbar_validation.run.shipped.files import sdf, usd
-from fourbar_validation.run.values import check_identities, check_status, find_reversals
 
 
 class Check(NamedTuple):
@@ -43,7 +42,7 @@ CHECKS = (
     Check(check_blocks),
     Check(check_error_bars),
     Check(check_residual),
-    Check(find_reversals),
+    Check(Question.find_reversals),
     Check(compare_answers),
     Check(compare_statements),
     Check(check_mjcf),
@@ -96,8 +95,8 @@ def judge(
     question, free = ask(name, scene, witnesses), scene.motion.free is not None
     question.order = order
     begin = time.perf_counter()
-    n = len(question.solution)
-    question.timings.append(Timing(name, FORMULAS, "exact", n, time.perf_counter() - begin))
+    question.solution  # noqa: B018 - timed
+    seconds = time.perf_counter() - begin
     if (
         shipped
         and not free
@@ -112,19 +111,7 @@ def judge(
             called = check.rows.__name__
             engine, part = (called, "") if check.shipped else (FORMULAS, called)
             rows += question.attempt(partial(check.rows, question), engine, part)
-    return Record(
-        name,
-        scene,
-        plain(scene.title),
-        plain(scene.source),
-        rows,
-        question.timings,
-        question.left_out,
-        output=question.output,
-        solution=question.solution,
-        answers=[question.answered[w.name][0] for w in question.witnesses if w.name in question.answered],
-        jumps=question.jumps,
-    )
+    return question.record(rows, seconds)
 
 
 def ask(name: str, scene: Scene, witnesses: Sequence[Witness]) -> Question:

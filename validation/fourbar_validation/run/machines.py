@@ -70,7 +70,7 @@ class Cluster:
         except TimeoutError:
             raise self._no_workers() from None
         there = self.client.nthreads()  # type: ignore[no-untyped-call]
-        found: Counter[str] = Counter()
+        result: Counter[str] = Counter()
         try:
             tasks = {self.client.submit(here, workers=[worker], pure=False): worker for worker in there}
             for task, worker in tasks.items():
@@ -80,12 +80,12 @@ class Cluster:
                 known, where = self.result(task)
                 if difference := differing(code(), known):
                     raise ClusterError(f"{self.scheduler}: worker {worker} is not set up as this machine: {difference}")
-                found[where] += 1
+                result[where] += 1
         except DependencyError:
             raise
         except Exception as error:  # whatever a scheduler or a worker without this checkout comes up with
             raise self._unfit(error) from None
-        return "; ".join(f"{count} workers on {where}" for where, count in sorted(found.items()))
+        return "; ".join(f"{count} workers on {where}" for where, count in sorted(result.items()))
 
     def over(
         self,

@@ -55,11 +55,11 @@ def judge_by_engine(job: Job, _: Exception, attempt: processes.Attempt) -> Recor
     record: Record | None = None
     failed = []
     for who in ([], *([witness] for witness in job.witnesses)):
-        found = attempt(replace(job, witnesses=who))
-        if isinstance(found, Record):
-            record = found if record is None else record.joined(found)
+        result = attempt(replace(job, witnesses=who))
+        if isinstance(result, Record):
+            record = result if record is None else record.joined(result)
         else:
-            failed.append(breakdown(job.name, who[0].name if who else "formulas", found))
+            failed.append(breakdown(job.name, who[0].name if who else "formulas", result))
     record = record or Record(job.name)
     return replace(record, rows=[*record.rows, *failed])
 

@@ -13,13 +13,8 @@ from fourbar.quantities import FORCES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.compare.basis import basis_of, smallest_yardstick, strictest_condition
-from fourbar_validation.compare.compare import turned
-from fourbar_validation.compare.error import magnitude, relative, relative_error, worst
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.reversals import reversing
-from fourbar_validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
-from fourbar_validation.compare.scales import of_length, term_sizes, yardstick
+from fourbar_validation.compare.rows import FAILS, FORMULAS, UNDECIDED, Row
+from fourbar_validation.compare.scales import reference_of, scale_of, smallest_scale, strictest_condition, term_sizes
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
@@ -28,6 +23,12 @@ from fourbar_validation.compare.tolerance import (
     Array,
     K,
     condition_of,
+    half_turns,
+    magnitude,
+    of_length,
+    relative,
+    relative_error,
+    worst,
 )
 from fourbar_validation.engines.description import speeds
 from fourbar_validation.engines.exact import BallArithmetic, unknown
@@ -48,53 +49,52 @@ ROUNDED_SOMEWHERE = 20
 def check_points(question: Question) -> Iterator[Row]:
     """Check the scene's own points."""
     if question.scene.points and question.reference is not None and question.at.omega_2 is not None:
-        yield points(question.name, question.scene, question.solution, question.reference)
+        yield points(question, question.solution, question.reference)
 
 
-def points(name: str, scene: Scene, solution: Solution, basis: Solution, least: float = 0.0) -> Row:
+def points(question: Question, solution: Solution, reference: Solution, least: float = 0.0) -> Row:
     """Compare places, velocities and accelerations of the scene's own points, from the angles of another derivation.
 
     `least`: the condition from which on they are judged.
     """
-    link, n = scene.linkage, len(basis)
+    scene, link, n = question.scene, question.scene.linkage, len(reference)
     zero = np.zeros(n)
-    theta = {1: zero + link.ground_angle, 2: basis.theta_2, 3: basis.theta_3, 4: basis.theta_4}
-    speed = {bar: zero if bar == 1 else _known(basis, f"omega_{bar}", n) for bar in theta}
-    growth = {bar: zero if bar == 1 else _known(basis, f"alpha_{bar}", n) for bar in theta}
+    theta = {1: zero + link.ground_angle, 2: reference.theta_2, 3: reference.theta_3, 4: reference.theta_4}
+    speed = {bar: zero if bar == 1 else _known(reference, f"omega_{bar}", n) for bar in theta}
+    growth = {bar: zero if bar == 1 else _known(reference, f"alpha_{bar}", n) for bar in theta}
 
     def swing(bar: int, distance: float, angle: float) -> list[NDArray[np.complex128]]:
         arm = distance * np.exp(1j * (theta[bar] + angle))
         return [arm, 1j * speed[bar] * arm, (1j * growth[bar] - speed[bar] ** 2) * arm]
 
-    feet = {3: swing(2, link.input.length, 0.0), 4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero]}
+    first_pins = {3: swing(2, link.input.length, 0.0), 4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero]}
     error = np.zeros(n)
-    usable = (solution.status_code == OK) & (basis.condition >= least)
-    usable &= condition_of("F12", link, basis) * NOTHING_TO_TELL > EPS
+    usable = (solution.status_code == OK) & (reference.condition >= least)
+    usable &= condition_of("F12", link, reference) * NOTHING_TO_TELL > EPS
     for point in scene.points:
-        own, foot = swing(point.bar, *point.from_pin), feet.get(point.bar, [zero, zero, zero])
+        own, first_pin = swing(point.bar, *point.from_pin), first_pins.get(point.bar, [zero, zero, zero])
         tables, like = (solution.points, solution.velocity, solution.acceleration), ("B", "v_B", "a_B")
-        for ours, kind, arm, at_foot in zip(tables, like, own, foot, strict=True):
+        for ours, kind, arm, at_foot in zip(tables, like, own, first_pin, strict=True):
             if point.name in ours:
                 theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
-                size = np.abs(arm) + np.abs(at_foot) + of_length(scene)
+                size = np.abs(arm) + np.abs(at_foot) + of_length(scene.linkage)
                 if kind != "B":
-                    size = np.abs(arm) + np.abs(at_foot) + term_sizes(kind, scene, basis)
-                apart = relative_error(kind, ours[point.name], theirs, size) * condition_of(kind, link, basis)
+                    size = np.abs(arm) + np.abs(at_foot) + term_sizes(kind, scene, reference)
+                apart = relative_error(kind, ours[point.name], theirs, size) * condition_of(kind, link, reference)
                 error = np.where(usable, np.maximum(error, np.where(np.isnan(apart), np.inf, apart)), error)
-    index, allowed = worst(error), EQUIVALENCE.factor * turned(link.ground_angle, solution.theta_2)
-    verdict = UNDECIDED if not usable.any() else AGREES if error[index] <= allowed else FAILS
-    what, place = f"the {len(scene.points)} points of the scene", float(solution.theta_2[index])
-    return Row(name, FORMULAS, "exact", "points", float(error[index]), allowed, verdict, what, place, 1.0)
+    allowed = EQUIVALENCE.factor * half_turns(link.ground_angle, solution.theta_2)
+    what = f"the {len(scene.points)} points of the scene"
+    return question.row("points", error, allowed, what, usable, theta_2=solution.theta_2)
 
 
-def _known(basis: Solution, quantity: str, n: int) -> Array:
-    values: Array | None = getattr(basis, quantity)
+def _known(reference: Solution, quantity: str, n: int) -> Array:
+    values: Array | None = getattr(reference, quantity)
     return np.zeros(n) if values is None else values
 
 
 def check_blocks(question: Question) -> Iterator[Row]:
     """Check a sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
-    name, scene, at, solution = question.name, question.scene, question.at, question.solution
+    scene, at, solution = question.scene, question.at, question.solution
     if at.omega_2 is None or at.remainder is not None:
         return
     n = len(at.theta_2)
@@ -112,45 +112,42 @@ def check_blocks(question: Question) -> Iterator[Row]:
         known = np.isfinite(magnitude(other))
         error[known != np.isfinite(magnitude(one))] = np.inf
         with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
-            size = yardstick(quantity, scene, solution, ours)[long[ends]]
+            size = scale_of(quantity, scene, solution, ours)[long[ends]]
         condition = condition_of(quantity, scene.linkage, solution)[long[ends]]
         # evaluated by the same code, but not in the same company of a processor's registers
         apart = relative_error(quantity, one, other, size) * condition
         error[known] = np.maximum(error[known], apart[known])
     alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
     solve(scene, at=at, out=alone)  # they are found without vectors then
-    for angle, found in alone.items():
-        apart = relative_error(angle, found, getattr(solution, angle), np.ones(n))
-        apart *= condition_of(angle, scene.linkage, solution) / turned(scene.linkage.ground_angle, at.theta_2)
+    for angle, result in alone.items():
+        apart = relative_error(angle, result, getattr(solution, angle), np.ones(n))
+        apart *= condition_of(angle, scene.linkage, solution) / half_turns(scene.linkage.ground_angle, at.theta_2)
         error[-1] = max(error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0))
-    index = worst(error)
-    verdict = AGREES if error[index] <= EQUIVALENCE.factor else FAILS
     reason = f"{len(long)} positions at once against {n}"
-    theta_2, allowed = float(whole.theta_2[ends[index]]), EQUIVALENCE.factor
-    yield Row(name, FORMULAS, "exact", "blocks", float(error[index]), allowed, verdict, reason, theta_2, 1.0)
+    yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=whole.theta_2[ends])
 
 
 def check_error_bars(question: Question) -> Iterator[Row]:
     """Check the error bars by the true error, in 320 bits; no bar may be larger than what a comparison is allowed."""
-    name, scene, at, solution = question.name, question.scene, question.at, question.solution
+    scene, at, solution = question.scene, question.at, question.solution
     if at.omega_2 is None or at.remainder is not None or unknown(scene) or not_installed("flint"):
         return
     # the sense of dry friction at a pin at rest is no question of rounding
-    usable = np.flatnonzero((solution.status_code == OK) & ~reversing(scene, solution, EQUIVALENCE.factor))
+    usable = np.flatnonzero((solution.status_code == OK) & ~question.reversing(EQUIVALENCE.factor))
     if not len(usable):
         return
     spread = np.linspace(0, len(usable) - 1, SAMPLE).astype(int).tolist()
     where = usable[np.unique([*spread, *(int(np.argmin(pull[usable])) for pull in _pulls(scene, at, solution))])]
     sampled = select_positions(at, where)
     exact, ours = BallArithmetic().answer(scene, sampled), solve(scene, "error", at=sampled)
-    other = basis_of(scene, exact)
+    other = reference_of(scene, exact)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
         true = np.max([magnitude(getattr(ours, q) - exact.quantities[q]) for q in quantities], axis=0)
-        size = np.max([smallest_yardstick(q, scene, ours, other) for q in quantities], axis=0)
+        size = np.max([smallest_scale(q, scene, ours, other) for q in quantities], axis=0)
         condition = strictest_condition(quantities[0], scene.linkage, ours, other)
         tells = condition * NOTHING_TO_TELL > EPS
-        turns = np.array([turned(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
+        turns = np.array([half_turns(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
         wide = relative(width, size) * condition / (K * EPS * turns)
         if (beyond := tells & (wide > 1.0)).any():  # by what rounding the data does, no more
             expected = np.max([from_data(scene, sampled, quantity, beyond) for quantity in quantities], axis=0)
@@ -158,12 +155,8 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         share = np.where(tells, np.maximum(relative(true, BARS * width), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
         index = worst(share)
-        verdict = UNDECIDED if not tells.any() else AGREES if share[index] <= 1.0 else FAILS
         reason = f"the error is {true[index]:.1e}, the bar {width[index]:.1e}, of {size[index]:.1e}"
-        place = float(sampled.theta_2[index])
-        yield Row(
-            name, FORMULAS, "exact", bar, float(share[index]), 1.0, verdict, reason, place, float(condition[index])
-        )
+        yield question.row(bar, share, 1.0, reason, tells, float(condition[index]), sampled.theta_2)
 
 
 def _pulls(scene: Scene, at: Command, solution: Solution) -> Iterator[Array]:
@@ -182,7 +175,7 @@ def _pulls(scene: Scene, at: Command, solution: Solution) -> Iterator[Array]:
 
 def check_residual(question: Question) -> Iterator[Row]:
     """Check that what remains of friction couples is rounding: not more, and somewhere not less."""
-    name, scene, solution = question.name, question.scene, question.solution
+    scene, solution = question.scene, question.solution
     residual, terms = solution.friction_residual, np.zeros(len(solution))
     if question.at.omega_2 is None or residual is None:
         return
@@ -192,15 +185,16 @@ def check_residual(question: Question) -> Iterator[Row]:
             terms = np.fmax(terms, mu * r * magnitude(getattr(solution, PIN_FORCE[pin])))
     known = np.isfinite(terms) & (terms > 0.0) & (solution.status_code == OK)
     if np.any(solution.omega_2 == 0.0) or not known.any():
-        yield Row.unmeasured(name, FORMULAS, "exact", "friction_residual", UNDECIDED, "no pin slides under load")
+        yield Row.unmeasured(
+            question.name, FORMULAS, "exact", "friction_residual", UNDECIDED, "no pin slides under load"
+        )
         return
     error = np.where(known, residual / np.where(known, terms, 1.0) * solution.drive_condition, 0.0)
-    index = worst(error)
-    nowhere = np.count_nonzero(known) >= ROUNDED_SOMEWHERE and not residual[known].any()
-    verdict = FAILS if nowhere or not error[index] <= K * EPS else AGREES
-    reason = "not even rounding is left at any position" if nowhere else "couples of mu r |F|, relative to the largest"
-    place = float(solution.theta_2[index])
-    yield Row(name, FORMULAS, "exact", "friction_residual", float(error[index]), K * EPS, verdict, reason, place, 1.0)
+    reason = "couples of mu r |F|, relative to the largest"
+    row = question.row("friction_residual", error, K * EPS, reason, theta_2=solution.theta_2)
+    if np.count_nonzero(known) >= ROUNDED_SOMEWHERE and not residual[known].any():
+        row = replace(row, verdict=FAILS, reason="not even rounding is left at any position")
+    yield row
 
 
 def check_law(question: Question) -> Iterator[Row]:
@@ -239,12 +233,11 @@ def check_law(question: Question) -> Iterator[Row]:
         np.abs(omega_2 - at.omega_2) / size,
         np.abs(alpha_2 - at.alpha_2) / bent,
     ]
-    pieces, position = max(float(each.max(initial=0.0)) for each in errors), worst(np.max(along, axis=0))
-    error = float(np.max([pieces, *(each[position] for each in along)]))
-    verdict = AGREES if error <= IDENTITY.factor else FAILS
-    reason = "the piecewise cubic through the table, its acceleration continuous"
-    place = float(at.theta_2[position])
-    yield Row(question.name, FORMULAS, "exact", "law", error, IDENTITY.factor, verdict, reason, place, 1.0)
+    error = np.max(along, axis=0)
+    error[worst(error)] = np.max([error[worst(error)], *(each.max(initial=0.0) for each in errors)])
+    yield question.row(
+        "law", error, IDENTITY.factor, "the piecewise cubic through the table, its acceleration continuous"
+    )
 
 
 def _hermite(s: Array, angle: Array, speed: Array, first: Array, last: Array, h: Array) -> tuple[Array, Array, Array]:

@@ -12,15 +12,15 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer, Engine
-from fourbar_validation.compare.basis import basis_of
-from fourbar_validation.compare.compare import Yardsticks
-from fourbar_validation.compare.reversals import Reversal
-from fourbar_validation.compare.rows import Row, breakdown
-from fourbar_validation.compare.tolerance import Array
+from fourbar_validation.compare.compare import Scales
+from fourbar_validation.compare.reversals import Reversal, reversals, reversing
+from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, UNDECIDED, Row, breakdown, plain
+from fourbar_validation.compare.scales import reference_of
+from fourbar_validation.compare.tolerance import Array, Mask, worst
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.output import kept
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
-from fourbar_validation.report.record import Timing
+from fourbar_validation.report.record import Record, Timing
 
 FREE_BODY = next(witness for witness in WITNESSES if witness.name == FreeBody.name)
 """By its answer every other one is checked: nothing is allowed on the word of the formulas alone."""
@@ -47,9 +47,10 @@ class Question:
     """What is not compared, and why."""
     timings: list[Timing] = field(default_factory=list)
     jumps: list[Reversal] = field(default_factory=list)
+    """Where dry friction reverses and the pin forces jump."""
     answered: dict[str, tuple[Answer, float]] = field(default_factory=dict)
     """By witness: its answer and the seconds that it took."""
-    yardsticks: Yardsticks = field(default_factory=dict)
+    scales: Scales = field(default_factory=dict)
     """Size and condition of each quantity that was compared."""
     started: dict[str, Engine] = field(default_factory=dict)
 
@@ -73,17 +74,12 @@ class Question:
         except Exception:  # as of any engine
             return None
 
-    @property
-    def forces_known(self) -> bool:
-        """Whether the free bodies answer forces."""
-        return self.at.omega_2 is not None and self.free_body is not None and self.free_body.refusal is None
-
     @cached_property
     def reference(self) -> Solution | None:
         """Conditions and sizes by free bodies, the reference of every comparison; None: an answer has its own."""
         try:
             with np.errstate(all="ignore"):
-                return None if self.free_body is None else basis_of(self.scene, self.free_body)
+                return None if self.free_body is None else reference_of(self.scene, self.free_body)
         except ArithmeticError:
             return None
 
@@ -100,6 +96,68 @@ class Question:
                 engine, begin = self.engine(witness), time.perf_counter()
                 self.answered[witness.name] = engine.answer(self.scene, self.at), time.perf_counter() - begin
         return self.answered[witness.name][0]
+
+    def find_reversals(self) -> tuple[()]:
+        """Find where dry friction reverses; what is drawn there is no comparison."""
+        self.jumps = reversals(self.scene, self.at, self.solution)
+        return ()
+
+    def reversing(self, slip: float) -> Mask:
+        """Mark where dry friction reverses: a pin slips by no more than this part of its speeds."""
+        return reversing(self.scene, self.solution, slip)
+
+    def row(
+        self,
+        quantity: str,
+        error: Array,
+        allowed: float,
+        reason: str,
+        where: Mask | None = None,
+        condition: float = 1.0,
+        theta_2: Array | None = None,
+    ) -> Row:
+        """Make a row of the formulas where the error is worst; NaN is beyond all.
+
+        Parameters
+        ----------
+        where : positions that are held to it; none of them: undecided.
+        theta_2 : of the errors; left out: of the command.
+        """
+        if where is not None:
+            error = np.where(where, error, 0.0)
+        index = worst(error)
+        verdict = AGREES if error[index] <= allowed else FAILS
+        if where is not None and not where.any():
+            verdict = UNDECIDED
+        place = float((self.at.theta_2 if theta_2 is None else theta_2)[index])
+        return Row(
+            self.name, FORMULAS, "exact", quantity, float(error[index]), allowed, verdict, reason, place, condition
+        )
+
+    def record(self, rows: list[Row], seconds: float) -> Record:
+        """Make the record of the scene.
+
+        Parameters
+        ----------
+        seconds : that the formulas took.
+        """
+        answered = [self.answered[witness.name] for witness in self.witnesses if witness.name in self.answered]
+        timings = [Timing(self.name, FORMULAS, "exact", len(self.solution), seconds), *self.timings]
+        n = len(self.at.theta_2)
+        timings += [Timing(self.name, answer.engine, answer.setting, n, took) for answer, took in answered]
+        return Record(
+            self.name,
+            self.scene,
+            plain(self.scene.title),
+            plain(self.scene.source),
+            rows,
+            timings,
+            self.left_out,
+            output=self.output,
+            solution=self.solution,
+            answers=[answer for answer, _ in answered],
+            jumps=self.jumps,
+        )
 
     def attempt(self, check: Callable[[], Iterable[Row]], engine: str, part: str = "") -> Iterator[Row]:
         """Yield the rows of a check; what it raises is a failure of its own, in a row of its own."""

@@ -20,13 +20,11 @@ from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Array, Released
-from fourbar_validation.compare.basis import basis_of
-from fourbar_validation.compare.compare import compare
-from fourbar_validation.compare.error import in_own_unit, relative, worst
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row
+from fourbar_validation.compare.compare import Comparison
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, FORMULAS, REFUSES, UNDECIDED, Row
+from fourbar_validation.compare.scales import reference_of
 from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
-from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.compare.tolerance import EQUIVALENCE, in_own_unit, relative, worst
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import Witness, not_installed, predicting_from
 from fourbar_validation.report.record import Timing
@@ -173,15 +171,15 @@ def _forces_by(witness: Witness, driven: Question, solution: Solution) -> list[R
     answer, scene = driven.answer(witness), driven.scene
     if answer.refusal is not None:
         return [Row.unmeasured(driven.name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
-    basis = basis_of(scene, answer)
-    assert basis is not None
+    reference = reference_of(scene, answer)
+    assert reference is not None
     # the formulas are conditioned by the angle that is independent there, an engine by theta_2
-    conditioned = replace(solution, condition=basis.condition, drive_condition=basis.drive_condition)
+    conditioned = replace(solution, condition=reference.condition, drive_condition=reference.drive_condition)
     conditioned.drive_bar = 2
     names = [q for q in UNKNOWNS if q in witness.expected]
     # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
     predicted = predicting_from(witness, scene, driven.at, answer)
-    rows = compare(driven.name, scene, answer, conditioned, witness.tolerance, names, predicted, basis)
+    rows = Comparison(driven.name, scene, answer, conditioned, witness.tolerance, names, predicted, reference).rows()
     return [row for row in rows if row.quantity != "undecided"]
 
 
@@ -237,12 +235,12 @@ def _rows(question: Question, fine: Released, coarse: Released | None, truth: _T
         return [Row.unmeasured(*who, "all", FAILS, f"it stopped after {len(fine.theta_2)} of {n} instants")]
 
     def numbers(of: Released) -> dict[str, Array]:
-        found = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
+        result = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
         if coarse is not None:  # the formulas integrate the energy equation itself; their drift is part of their test
-            found["energy"] = of.energy[:n] - of.energy[0]
+            result["energy"] = of.energy[:n] - of.energy[0]
             if through == "sign":
-                found["stopped_at"] = _end(of.stopped_at, free.duration)
-        return found
+                result["stopped_at"] = _end(of.stopped_at, free.duration)
+        return result
 
     right_and_size = {
         "theta_2": (truth.theta_2, 1.0),

@@ -10,8 +10,7 @@ from typing import TextIO
 
 from fourbar.writing import naming, write_text
 from fourbar_validation.compare.columns import Columns, read_columns
-from fourbar_validation.compare.identities import FORMULAS
-from fourbar_validation.compare.rows import FAILS, Row, csv_text, plain
+from fourbar_validation.compare.rows import FAILS, FORMULAS, Row, csv_text, plain
 from fourbar_validation.compare.tolerance import IDENTITY
 from fourbar_validation.engines.hard_suite import Hard
 from fourbar_validation.engines.witnesses import Witness

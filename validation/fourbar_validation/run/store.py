@@ -78,15 +78,15 @@ class Store:
 
     def done(self) -> set[int]:
         """List the chunks whose parts are complete and of this run; others are removed, and noted."""
-        found = set()
+        result = set()
         for path in sorted(self.parts.iterdir()):
             try:
                 self._packed(path)
-                found.add(int(path.name))
+                result.add(int(path.name))
             except ValueError as error:
                 self.notes.append(f"made again: {path.parent.name}/{path.name}: {error}")
                 _remove(path)
-        return found
+        return result
 
     def put(self, chunk: int, results: Sequence[Any]) -> None:
         """Write a finished chunk, its results as JSON has them."""

@@ -58,8 +58,8 @@ def poles(*, bar: int, distances: tuple[float, ...] = POLE, seeds: range = range
     offsets = np.array([*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]])
     for seed in seeds:
         lengths = linkage_of(CRANK, seed)
-        found = parallel_2_4(lengths) if bar == 3 else collinear_2_3(lengths)
-        for number, (psi, branch) in enumerate(found[:3]):
+        result = parallel_2_4(lengths) if bar == 3 else collinear_2_3(lengths)
+        for number, (psi, branch) in enumerate(result[:3]):
             yield f"{seed} {number}", at(dressed(lengths, seed), psi + offsets, branch, drive_bar=bar)
 
 

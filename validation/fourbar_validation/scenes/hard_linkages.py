@@ -74,23 +74,23 @@ def collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
 def collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
     """(psi, branch) where bars 2, 3 are collinear, so omega_4 = 0: O2, B, O4 form a triangle with O2 B = |a +- b|."""
     d, a, b, c = lengths
-    found = []
+    result = []
     for along in (a + b, a - b):
         for psi in _corners(d, along, c):
             u = complex(math.cos(psi), math.sin(psi))
-            found.append((psi, _side(d - a * u, (along - a) * u)))
-    return found
+            result.append((psi, _side(d - a * u, (along - a) * u)))
+    return result
 
 
 def parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
     """(psi, branch) where bars 2, 4 are parallel, so omega_3 = 0: (a - c) e^{i psi} + b e^{i psi_3} = d, or a + c."""
     d, a, b, c = lengths
-    found = []
+    result = []
     for joined, side in ((a - c, 1.0), (a + c, -1.0)):
         for psi in _corners(d, joined, b):
             u = complex(math.cos(psi), math.sin(psi))
-            found.append((psi, _side(d - joined * u, side * c * u)))
-    return found
+            result.append((psi, _side(d - joined * u, side * c * u)))
+    return result
 
 
 def _side(one: complex, other: complex) -> int:

@@ -157,7 +157,7 @@ def _load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ran
 
 def _sprung(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> list[Any]:
     """Springs, torsion springs and flywheels that carry the weights about as they are loaded."""
-    found: list[Any] = []
+    result: list[Any] = []
     size = weight * abs(ranges.load(rng))
     if rng.random() < ranges.sprung:
         one, other = (int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False))
@@ -165,19 +165,19 @@ def _sprung(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: R
             SpringEnd(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, other)
         )
         length = max(linkage.lengths)
-        found.append(
+        result.append(
             Springs((Spring(start, end, (size or 1.0) / length, length * ANY_PART(rng), size * EITHER_SIGN(rng)),))
         )
     if rng.random() < ranges.sprung:
         couple = size * max(linkage.lengths[1:])
-        found.append(
+        result.append(
             Torsion.at(**{str(rng.choice(list(PINS))): (couple or 1.0, ANY_ANGLE(rng), couple * EITHER_SIGN(rng))})
         )
     if rng.random() < ranges.sprung:
         bar = int(rng.choice([2, 4]))
         inertia = (linkage.bar(bar).mass or 1.0) * linkage.bar(bar).length ** 2
-        found.append(Flywheel(inertia * ranges.inertia(rng), bar))
-    return found
+        result.append(Flywheel(inertia * ranges.inertia(rng), bar))
+    return result
 
 
 def uneven_lengths(rng: np.random.Generator, crank: Draw, coupler: Draw) -> tuple[Sequence[float], float]:

@@ -163,12 +163,12 @@ def suite_file(path: Path) -> Files:
     for entry in entries:
         if Path(entry).is_absolute() or ".." in Path(entry).parts or "\0" in entry:
             raise refuse(entry, "must lie in the folder of the list, or below it")
-        found = [path.parent / entry]
+        result = [path.parent / entry]
         if "*" in entry:
-            found = sorted(file for file in path.parent.glob(entry) if not file.samefile(path))
-        if not found:
+            result = sorted(file for file in path.parent.glob(entry) if not file.samefile(path))
+        if not result:
             raise refuse(entry, "names no file")
-        files += found
+        files += result
     return scene_files(files)
 
 

@@ -14,12 +14,12 @@ from fourbar.linkage import uniform
 from fourbar.scene import Command, Scene, command
 from fourbar_validation import Answer
 from fourbar_validation.compare.rows import REFUSES, Row
-from fourbar_validation.compare.statements.statements import statements
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse
 from fourbar_validation.engines.pinocchio import PinocchioInverse
 from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.run.answers import statements
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType, random_scene
 from tests.support.scenes import crank_rocker

@@ -36,10 +36,10 @@ def turning(omega: float = 10.0, positions: int = 36) -> fourbar.Scene:
 
 
 def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Settings], WorstErrors]:
-    rig = TrialSetup(scene, command(scene))
+    setup = TrialSetup(scene, command(scene))
 
     def error(settings: Settings) -> WorstErrors:
-        trial = rig.try_out(settings, build)
+        trial = setup.try_out(settings, build)
         return NO_ANSWER if trial.broken else errors(scene, trial.at, trial.quantities)
 
     return error

@@ -14,8 +14,7 @@ import pytest
 import fourbar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command
-from fourbar_validation.compare.error import magnitude
-from fourbar_validation.compare.tolerance import EPS, K
+from fourbar_validation.compare.tolerance import EPS, K, magnitude
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.lab.subjects.problems import PROBLEMS, SCHEMA, problem
 from tests.whole.test_imports import ROOT

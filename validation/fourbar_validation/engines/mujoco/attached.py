@@ -51,24 +51,24 @@ def on_the_drive(topology: Topology, pin: str) -> Described:
 
 def actuators(topology: Topology) -> Described:
     """Describe every actuator but the drive, which is taken off: what it acts on, where, and with which wrench."""
-    model, found = topology.model, Described()
+    model, result = topology.model, Described()
     for i in sorted({*range(len(model.actuator_trntype))} - {*topology.drives()}):
         key = f"actuators.{i}"
-        found[f"{key}.name"] = model.actuator(i).name
+        result[f"{key}.name"] = model.actuator(i).name
         out = int(model.actuator_outadr[i]) if hasattr(model, "actuator_outadr") else i
         gear = model.actuator_gear[out] * model.actuator_biasprm[i, 0]  # a control is 0: the bias is all there is
         site, frame = (int(number) for number in model.actuator_trnid[i])
         if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE:
-            found |= _at_site(topology, key, gear, site, frame)
+            result |= _at_site(topology, key, gear, site, frame)
         else:
-            found[key] = _target(topology, i)
-            found[f"{key}.gear"] = _numbers(gear)
-        found[f"{key}.biasprm"] = _numbers(model.actuator_biasprm[i, 1:])
+            result[key] = _target(topology, i)
+            result[f"{key}.gear"] = _numbers(gear)
+        result[f"{key}.biasprm"] = _numbers(model.actuator_biasprm[i, 1:])
         for field, name in ACTUATOR.items():
-            found |= direct(model, field, i, f"{key}.{name}")
+            result |= direct(model, field, i, f"{key}.{name}")
         for field in ACTUATOR_RANGES:
-            found |= limits(model, field, i, key)
-    return found
+            result |= limits(model, field, i, key)
+    return result
 
 
 def _at_site(topology: Topology, key: str, gear: Array, site: int, frame: int) -> Described:
@@ -98,22 +98,22 @@ def _target(topology: Topology, actuator: int) -> str:
 
 def tendons(topology: Topology) -> Described:
     """Describe every tendon: over which pins or between which points, and what it does."""
-    model, found = topology.model, Described()
+    model, result = topology.model, Described()
     for i in range(model.ntendon):
         key = f"tendons.{i}"
-        found[f"{key}.name"] = model.tendon(i).name
+        result[f"{key}.name"] = model.tendon(i).name
         run = range(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i])
         spring = [float(x) for x in model.tendon_lengthspring[i]]
         if model.wrap_type[run[0]] == mujoco.mjtWrap.mjWRAP_JOINT:
-            found |= _over_pins(topology, key, run, spring, float(model.tendon_length0[i]))
+            result |= _over_pins(topology, key, run, spring, float(model.tendon_length0[i]))
         else:
-            found |= _between_points(topology, key, run)
-            found[f"{key}.springlength"] = tuple(spring)
+            result |= _between_points(topology, key, run)
+            result[f"{key}.springlength"] = tuple(spring)
         for field, name in TENDON.items():
-            found |= direct(model, field, i, f"{key}.{name}")
+            result |= direct(model, field, i, f"{key}.{name}")
         for field in ("tendon_range", "tendon_actfrcrange"):
-            found |= limits(model, field, i, key)
-    return found
+            result |= limits(model, field, i, key)
+    return result
 
 
 def _over_pins(topology: Topology, key: str, run: range, spring: Sequence[float], rest: float) -> Described:

@@ -22,32 +22,32 @@ OPTIONS = (
 def described(topology: Topology) -> Described:
     """Lengths, masses, pins, closure, drive and options as compiled; numbers in SI and rad."""
     model = topology.model
-    found: Described = {"plane": topology.plane}
+    result: Described = {"plane": topology.plane}
     for bar, name in BAR_NAMES.items():
-        found[f"lengths.{name}"] = topology.length(bar)
-    found["lengths.ground_angle"] = topology.ground_angle
+        result[f"lengths.{name}"] = topology.length(bar)
+    result["lengths.ground_angle"] = topology.ground_angle
     for bar in MOVING_BARS:
-        found |= _bar(topology, bar)
+        result |= _bar(topology, bar)
     gravity = model.opt.gravity * _on(model, "GRAVITY")
-    found["gravity.x"], found["gravity.y"] = (float(g) for g in topology.in_plane(gravity))
-    found["gravity.across"] = float(gravity @ topology.normal)
+    result["gravity.x"], result["gravity.y"] = (float(g) for g in topology.in_plane(gravity))
+    result["gravity.across"] = float(gravity @ topology.normal)
     for pin, joint in sorted(topology.hinge.items()):
-        found |= _pin(topology, pin, joint)
-    found |= _closure(topology)
-    found |= _options(model)
-    found |= actuators(topology) | tendons(topology)
+        result |= _pin(topology, pin, joint)
+    result |= _closure(topology)
+    result |= _options(model)
+    result |= actuators(topology) | tendons(topology)
     others = [
         model.equality(i).name or f"(unnamed {i})"
         for i in range(model.neq)
         if i != topology.closure and model.eq_active0[i]
     ]
-    found["other equalities"] = ", ".join(others) or "none"
-    found |= {f"others.{name}": float(getattr(model, field, 0)) for field, name in COUNTED.items()}
+    result["other equalities"] = ", ".join(others) or "none"
+    result |= {f"others.{name}": float(getattr(model, field, 0)) for field, name in COUNTED.items()}
     for thing in (model, model.opt, model.stat):
         for field in members(thing):
             if field not in NOT_HERE and list_of(field) is None:
-                found[f"unknown.{field}"] = np.array2string(np.asarray(getattr(thing, field)), threshold=2**10)
-    return found
+                result[f"unknown.{field}"] = np.array2string(np.asarray(getattr(thing, field)), threshold=2**10)
+    return result
 
 
 def called(topology: Topology) -> dict[str, str]:
@@ -57,15 +57,15 @@ def called(topology: Topology) -> dict[str, str]:
     def element(word: str, name: str, number: int) -> str:
         return f'{word} "{name}"' if name else f"{word} {number} (unnamed)"
 
-    found = {f"bars.{BAR_NAMES[bar]}": f'body "{model.body(topology.root[bar]).name}"' for bar in MOVING_BARS}
+    result = {f"bars.{BAR_NAMES[bar]}": f'body "{model.body(topology.root[bar]).name}"' for bar in MOVING_BARS}
     for pin, joint in topology.hinge.items():
-        found[f"pins.{pin}"] = element("joint", model.joint(joint).name, joint)
+        result[f"pins.{pin}"] = element("joint", model.joint(joint).name, joint)
     if topology.closure is not None:
         number = topology.closure
-        found["closure"] = element(topology.closed_by.partition(" ")[0], model.equality(number).name, number)
+        result["closure"] = element(topology.closed_by.partition(" ")[0], model.equality(number).name, number)
     for i in range(len(model.actuator_trntype)):
-        found[f"actuators.{i}"] = element("actuator", model.actuator(i).name, i)
-    return found | {f"tendons.{i}": element("tendon", model.tendon(i).name, i) for i in range(model.ntendon)}
+        result[f"actuators.{i}"] = element("actuator", model.actuator(i).name, i)
+    return result | {f"tendons.{i}": element("tendon", model.tendon(i).name, i) for i in range(model.ntendon)}
 
 
 def _on(model: mujoco.MjModel, *features: str) -> bool:
@@ -100,7 +100,7 @@ def _pin(topology: Topology, pin: str, joint: int) -> Described:
     dof = model.jnt_dofadr[joint]
     spring, damper = (float(_on(model, name, "PASSIVE")) for name in ("SPRING", "DAMPER"))
     key = f"pins.{pin}"
-    found: Described = {
+    result: Described = {
         f"{key}.damping": damper * float(model.dof_damping[dof]),
         f"{key}.friction": float(model.dof_frictionloss[dof]) * _on(model, "FRICTIONLOSS"),
         f"{key}.stiffness": spring * float(model.jnt_stiffness[joint]),
@@ -109,22 +109,22 @@ def _pin(topology: Topology, pin: str, joint: int) -> Described:
     }
     address = model.jnt_qposadr[joint]
     turned = topology.sense[pin] * float(model.qpos_spring[address] - model.qpos0[address])
-    found[f"{key}.spring angle"] = topology.rest_angle(pin) + turned
+    result[f"{key}.spring angle"] = topology.rest_angle(pin) + turned
     for field, name in PIN.items():
-        found |= direct(model, field, dof if field.startswith("dof") else joint, f"{key}.{name}")
+        result |= direct(model, field, dof if field.startswith("dof") else joint, f"{key}.{name}")
     for field in ("jnt_range", "jnt_actfrcrange"):
-        found |= limits(model, field, joint, key, switched_on=field != "jnt_range" or _on(model, "LIMIT"))
-    return found | on_the_drive(topology, pin)
+        result |= limits(model, field, joint, key, switched_on=field != "jnt_range" or _on(model, "LIMIT"))
+    return result | on_the_drive(topology, pin)
 
 
 def _closure(topology: Topology) -> Described:
     model, number = topology.model, topology.closure
-    found: Described = {"closure.pin": topology.cut, "closure.by": topology.closed_by}
+    result: Described = {"closure.pin": topology.cut, "closure.by": topology.closed_by}
     first, second = (bar for bar, ends in ENDS.items() if topology.cut in ends)
     gap = topology.world(topology.data, first, topology.cut) - topology.world(topology.data, second, topology.cut)
-    found["closure.out of plane"] = abs(float(gap @ topology.normal))
+    result["closure.out of plane"] = abs(float(gap @ topology.normal))
     if number is None:
-        return found
+        return result
     bodies = (model.eq_obj1id[number], model.eq_obj2id[number])
     if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
         bodies = tuple(model.site_bodyid[list(bodies)])
@@ -132,23 +132,23 @@ def _closure(topology: Topology) -> Described:
     impedance = float(np.clip(first_d, 1e-4, 0.9999))
     softness = (1.0 - impedance) / impedance * float(model.body_invweight0[list(bodies), 0].sum())
     names = ("time constant", "damping ratio")
-    found |= {f"closure.{name}": float(x) for name, x in zip(names, model.eq_solref[number], strict=True)}
-    found["closure.impedance"], found["closure.softness"] = impedance, softness
-    found["closure.impedance when open"] = "the same" if first_d == last_d else (last_d, *opening)
-    return found
+    result |= {f"closure.{name}": float(x) for name, x in zip(names, model.eq_solref[number], strict=True)}
+    result["closure.impedance"], result["closure.softness"] = impedance, softness
+    result["closure.impedance when open"] = "the same" if first_d == last_d else (last_d, *opening)
+    return result
 
 
 def _options(model: mujoco.MjModel) -> Described:
     option = model.opt
-    found: Described = {}
+    result: Described = {}
     for name in OPTIONS:
         kept: Any = getattr(option, name, None)
         if name in ENUMERATIONS:
             kind, prefix = ENUMERATIONS[name]
-            found[f"option.{name}"] = getattr(mujoco, kind)(kept).name.removeprefix(prefix)
+            result[f"option.{name}"] = getattr(mujoco, kind)(kept).name.removeprefix(prefix)
         elif kept is not None:
-            found[f"option.{name}"] = float(kept) if np.ndim(kept) == 0 else tuple(map(float, kept))
-    found["option.meaninertia"] = float(model.stat.meaninertia)
+            result[f"option.{name}"] = float(kept) if np.ndim(kept) == 0 else tuple(map(float, kept))
+    result["option.meaninertia"] = float(model.stat.meaninertia)
     for state, flags, prefix in (
         ("off", mujoco.mjtDisableBit, "mjDSBL_"),
         ("on", mujoco.mjtEnableBit, "mjENBL_"),
@@ -157,8 +157,8 @@ def _options(model: mujoco.MjModel) -> Described:
         names = [name for name in flags.__members__ if name.startswith(prefix)]
         named = [name.removeprefix(prefix) for name in names if bits & int(flags.__members__[name])]
         names = [name.lower() for name in named if name not in FLAGS]
-        found[f"option.switched {state}"] = ", ".join(names) or "nothing that matters here"
+        result[f"option.switched {state}"] = ", ".join(names) or "nothing that matters here"
     groups = [str(group) for group in range(31) if option.disableactuator >> group & 1]
-    found["option.actuatorgroupdisable"] = " ".join(groups) or "none"
+    result["option.actuatorgroupdisable"] = " ".join(groups) or "none"
     possible = _on(model, "CONTACT") and (model.npair or (model.geom_contype.any() and model.geom_conaffinity.any()))
-    return found | {"contacts": "possible" if possible else "off"}
+    return result | {"contacts": "possible" if possible else "off"}

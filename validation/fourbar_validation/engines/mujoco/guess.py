@@ -36,7 +36,7 @@ def find_topology(
     candidates = sorted({int(model.body_weldid[model.jnt_bodyid[joint]]) for joint in range(model.njnt)})
     free = [body for body in candidates if body not in bodies]
     missing = [role for role, body in zip(ROLES, bodies, strict=True) if body is None]
-    found: list[tuple[float, bool, Topology, dict[str, str]]] = []
+    result: list[tuple[float, bool, Topology, dict[str, str]]] = []
     refused: list[str] = []
     for chosen in permutations(free[:MOST_BODIES], len(missing)):
         guess = {role: model.body(body).name for role, body in zip(missing, chosen, strict=True)}
@@ -46,10 +46,10 @@ def find_topology(
         for sites in _sites(model, {**known, **guess}, names):
             try:
                 topology = Topology(model, {**names, **guess, **sites})
-                found.append((_misfit(topology, lengths), not topology.drives(), topology, {**guess, **sites}))
+                result.append((_misfit(topology, lengths), not topology.drives(), topology, {**guess, **sites}))
             except InputError as error:
                 refused.append(error.allowed)
-    if not found:
+    if not result:
         few = (
             "it has fewer bodies on hinges"
             if len(free) < len(missing)
@@ -58,8 +58,8 @@ def find_topology(
         why = refused[0] if refused else few
         nowhere = f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a four-bar ({why})"
         raise InputError("MJCF", bodies_of(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
-    best = min(each[0] for each in found)
-    _, _, topology, guessed = min((each for each in found if each[0] <= best + ALIKE), key=lambda each: each[1])
+    best = min(each[0] for each in result)
+    _, _, topology, guessed = min((each for each in result if each[0] <= best + ALIKE), key=lambda each: each[1])
     pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())
     return topology, [f"guessed from what hangs together and from the lengths: {pairs} (--name states it otherwise)"]
 

@@ -123,9 +123,9 @@ class ResidualMonitor:
             return dict.fromkeys(seen.answer, math.inf)
         expected = {name: float(np.linalg.norm(value - closed.answer[name])) for name, value in seen.answer.items()}
         # what the solver left over: the pin forces differ by as much as F43
-        left = {"torque": abs(torque - float(seen.answer["torque"]))}
-        left |= dict.fromkeys(PIN_FORCES, float(np.linalg.norm(loop_force - seen.answer["F43"])))
-        for name, error in left.items():
+        remaining = {"torque": abs(torque - float(seen.answer["torque"]))}
+        remaining |= dict.fromkeys(PIN_FORCES, float(np.linalg.norm(loop_force - seen.answer["F43"])))
+        for name, error in remaining.items():
             size = seen.needed if name == "torque" else seen.answer[name]
             expected[name] += min(error, EXCUSED * float(np.linalg.norm(size)))
         return expected
@@ -151,11 +151,11 @@ class ResidualMonitor:
         for name, x in (("theta", q), ("omega", v), ("alpha", a)):
             answer[f"{name}_3"], answer[f"{name}_4"] = x[O2] + x[A], x[O4]
         try:
-            found = multipliers(jacobian, self.e_drive, needed)
+            result = multipliers(jacobian, self.e_drive, needed)
         except np.linalg.LinAlgError:
-            found = np.full(3, np.inf)
-        answer |= {"F43": found[:2], "torque": found[2]}
-        answer |= self._pins(a, found[:2])
+            result = np.full(3, np.inf)
+        answer |= {"F43": result[:2], "torque": result[2]}
+        answer |= self._pins(a, result[:2])
         jerk = jacobian @ a + (rate_3 - rate_4) @ v
         a_B = bars.jacobian_at("B4") @ a + rate_4 @ v
         return _Motion(gap, jacobian @ v, jerk, a_B, jacobian, needed, answer)

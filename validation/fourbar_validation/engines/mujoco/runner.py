@@ -91,10 +91,10 @@ class SimulatedRun:
 
 def assembled(position: Assembler, command: Command, order: Iterable[int]) -> list[Found]:
     """Own joint angles of every commanded position, found one after the other in an order."""
-    found: list[Found] = [None] * len(command.theta_2)
+    result: list[Found] = [None] * len(command.theta_2)
     for index in order:
-        found[index] = position.find(float(command.theta_2[index]), int(command.branch[index]))
-    return found
+        result[index] = position.find(float(command.theta_2[index]), int(command.branch[index]))
+    return result
 
 
 def split_segments(

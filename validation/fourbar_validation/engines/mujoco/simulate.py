@@ -129,18 +129,18 @@ class _Simulation:
     def answer(self) -> Answer:
         """Answer over all positions."""
         position = Assembler(ClosedLoop(self._text(1e-3)))  # kinematics alone: the timestep plays no part
-        found = assembled(position, self.command, self.order)
-        least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in found]))
+        result = assembled(position, self.command, self.order)
+        least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in result]))
         if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
-        for segment in split_segments(found, self.order, partial(self._closes_between, position)):
-            start = found[segment[0]]
+        for segment in split_segments(result, self.order, partial(self._closes_between, position)):
+            start = result[segment[0]]
             assert start is not None
             self._run(segment, start)
         self.out["theta_2"] = within(self.scene, self.out["theta_2"])
         at, values = as_made(self.out, self.branch)
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
-        closes = np.array([angles is not None for angles in found])
+        closes = np.array([angles is not None for angles in result])
         return Answer(
             "mujoco-simulated",
             setting,

@@ -82,12 +82,12 @@ def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examine
     model = compile_text(mjcf(scene) if text is None else text)
     topology, guessed = find_topology(model, names, scene.linkage.lengths)
     loop = UserLoop(topology, scene)
-    found = described(topology)
-    for key, value in found.items():
+    result = described(topology)
+    for key, value in result.items():
         if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
             raise InputError("MJCF", None, f"{key} is beyond the range of doubles: {value}")
     answers = _answers(loop, scene)
-    return Examined(found, called(topology), answers, [*guessed, *loop.notes], topology.names)
+    return Examined(result, called(topology), answers, [*guessed, *loop.notes], topology.names)
 
 
 def examine_corrected(
@@ -98,7 +98,7 @@ def examine_corrected(
     After CORRECTING seconds the rest are not evaluated either.
     """
     topology = Topology(compile_text(text), names)
-    start, found = time.perf_counter(), list[list[Answer] | None]()
+    start, result = time.perf_counter(), list[list[Answer] | None]()
     for key, value in entries:
         answers = None
         if time.perf_counter() - start < CORRECTING and (model := correct(topology, key, value)) is not None:
@@ -106,8 +106,8 @@ def examine_corrected(
                 answers = _answers(UserLoop(Topology(model, names), scene), scene)
             except FourBarError:  # what the other differences make of it is no four-bar
                 answers = None
-        found.append(answers)
-    return found
+        result.append(answers)
+    return result
 
 
 def _answers(loop: "UserLoop", scene: Scene) -> list[Answer]:

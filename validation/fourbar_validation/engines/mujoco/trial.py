@@ -88,9 +88,9 @@ class TrialSetup:
         self.scene, self.command = replace(scene, motion=motion), command
         order = order_in_time(command, self.omega, None)
         position = Assembler(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
-        found = assembled(position, command, order)
-        self.segments = [segment for segment in split_segments(found, order) if len(segment) > 1]
-        self.start = {index: angles for index, angles in enumerate(found) if angles is not None}
+        result = assembled(position, command, order)
+        self.segments = [segment for segment in split_segments(result, order) if len(segment) > 1]
+        self.start = {index: angles for index, angles in enumerate(result) if angles is not None}
         if not self.segments:
             raise LimitError("the loop closes at no two neighbouring positions: nothing to run through in time")
 

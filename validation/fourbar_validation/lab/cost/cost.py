@@ -48,7 +48,7 @@ def cost(scenes: tuple[Path, ...], out: Path) -> int:
     rows: list[tuple[str, ...]] = []
     for index in range(len(files)):
         name, scene = files.name(index), files.scene(index)
-        rig = TrialSetup(scene, command_of(scene))
+        setup = TrialSetup(scene, command_of(scene))
         study = CostStudy(name, scene, out / name)
         columns = (
             TextColumn(name),
@@ -63,15 +63,15 @@ def cost(scenes: tuple[Path, ...], out: Path) -> int:
             for curve, points in study.points():
                 curves[curve] = points
                 progress.update(task, advance=1, description=curve)
-        found = laws(curves)
-        dials = influences(scene, rig, BEST)
-        fitted += [law for law in found if law.decided]
-        written = write(study, curves, found, scene.title or name)
-        click.echo(summary(name, curves, found, study.left_out))
+        result = laws(curves)
+        dials = influences(scene, setup, BEST)
+        fitted += [law for law in result if law.decided]
+        written = write(study, curves, result, scene.title or name)
+        click.echo(summary(name, curves, result, study.left_out))
         click.echo(sentence(dials))
-        held = sum(law.holds for law in found if law.decided)
+        held = sum(law.holds for law in result if law.decided)
         most = dials[0].setting if dials[0].times >= MATTERS else "none by itself"
-        rows.append((name, *cheapest(curves), f"{held} of {sum(law.decided for law in found)}", most))
+        rows.append((name, *cheapest(curves), f"{held} of {sum(law.decided for law in result)}", most))
         click.echo(f"written to {out / name}: {', '.join(sorted(path.name for path in written))}")
     if len(rows) > 1:
         head = ("scene", *(f"RK4 steps for {error:g}" for error in WANTED), "laws hold", "matters most")

@@ -89,16 +89,16 @@ def over_steps(
 
 def curves(scene: Scene) -> list[Curve]:
     """Design the curves of one scene."""
-    found = [_with_default_closure(name, abs(scene.motion.omega_2 or 1.0)) for name in INTEGRATORS]
+    result = [_with_default_closure(name, abs(scene.motion.omega_2 or 1.0)) for name in INTEGRATORS]
     for suffix, tc, held in (("pads, tc = 10 h", 10.0, None), ("tc held", 20.0, PART_OF_TURN)):
         for name in INTEGRATORS:
             settings = replace(BEST, integrator=name, time_constant_steps=tc)
-            found.append(over_steps(f"{name}, {suffix}", settings, None, _ladder(name), held))
+            result.append(over_steps(f"{name}, {suffix}", settings, None, _ladder(name), held))
     for tc in (3.0, 30.0, 100.0):
-        found.append(over_steps(f"RK4, pads, tc = {tc:g} h", replace(BEST, time_constant_steps=tc)))
-    found.append(over_steps("RK4, no pads, tc = 10 h", PLAIN))
-    found += [*_softness(), *_tolerance()]
-    return found + (_drives() if scene.motion.alpha_2 == 0.0 else [])
+        result.append(over_steps(f"RK4, pads, tc = {tc:g} h", replace(BEST, time_constant_steps=tc)))
+    result.append(over_steps("RK4, no pads, tc = 10 h", PLAIN))
+    result += [*_softness(), *_tolerance()]
+    return result + (_drives() if scene.motion.alpha_2 == 0.0 else [])
 
 
 PLAIN = replace(BEST, pad=None, time_constant_steps=10.0)
@@ -149,19 +149,19 @@ def _softness() -> list[Curve]:
 
 
 def _tolerance() -> list[Curve]:
-    found = []
+    result = []
     for solver, iterations in (("Newton", 10), ("CG", 100), ("PGS", 100)):
         settings = replace(BEST, solver=solver, iterations=iterations)
         label = solver + ", tolerance {:g}"
-        found.append(over(f"tolerance, {solver}", label, TOLERANCES, lambda x, s=settings: replace(s, tolerance=x)))  # type: ignore[misc]
-    return found
+        result.append(over(f"tolerance, {solver}", label, TOLERANCES, lambda x, s=settings: replace(s, tolerance=x)))  # type: ignore[misc]
+    return result
 
 
 def _drives() -> list[Curve]:
     """Each drive with the integrator that carries it."""
     at = replace(BEST, flywheel=1.0)
     fast = replace(at, integrator="implicitfast", time_constant_steps=3.0)
-    found = [over_steps(f"flywheel {f:g}, RK4", replace(BEST, flywheel=f)) for f in (1e2, 1e4, 1e6, 1e8)]
+    result = [over_steps(f"flywheel {f:g}, RK4", replace(BEST, flywheel=f)) for f in (1e2, 1e4, 1e6, 1e8)]
     tried: list[tuple[str, Build]] = [
         ("joint equality, RK4", drives.WheelEquality),
         ("joint equality, softness edited, RK4", drives.StiffWheelEquality),
@@ -172,5 +172,5 @@ def _drives() -> list[Curve]:
     ]
     for name, drive in tried:
         carried = (at, drive) if name.endswith("RK4") else (fast, drive, MORE_STEPS)
-        found.append(over_steps(name, *carried))
-    return found
+        result.append(over_steps(name, *carried))
+    return result

@@ -33,10 +33,10 @@ class Cheapest(NamedTuple):
     """Recommended RK4 steps per run."""
 
 
-def relative_costs(rig: TrialSetup) -> dict[tuple[str, bool], float]:
+def relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
     """Time a step by integrator and pads, relative to RK4 with pads: medians of interleaved rounds."""
     kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
-    clocks = {kind: rig.seconds_per_step(of_kind(kind, dialled(628.0, 20.0))) for kind in kinds}
+    clocks = {kind: setup.seconds_per_step(of_kind(kind, dialled(628.0, 20.0))) for kind in kinds}
     times = in_turns({kind: partial(clock, STEPS) for kind, clock in clocks.items()}, ROUNDS)
     reference = median(times["RK4", True])
     return {kind: median(values) / reference for kind, values in times.items()}
@@ -48,29 +48,29 @@ def of_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
     return replace(settings, integrator=integrator, pad=settings.pad if pads else None)
 
 
-def cheapest(rig: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]) -> Cheapest | None:
+def cheapest(setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]) -> Cheapest | None:
     """Try every integrator, with and without pads, over time constants and steps; None where nothing serves."""
     best: Cheapest | None = None
     for kind, ratio in costs.items():
         fourth_order = kind[0] == "RK4"
         for tc in TIME_CONSTANTS if fourth_order else FIRST_ORDER_TIME_CONSTANTS:
             most = MOST_STEPS if best is None else best.cost / ratio
-            if not fourth_order and best is not None and not _serves(rig, kind, tc, most / FINE, error):
+            if not fourth_order and best is not None and not _serves(setup, kind, tc, most / FINE, error):
                 continue  # not even with as many steps as the best costs
-            steps = _least(rig, kind, tc, most, error)
+            steps = _least(setup, kind, tc, most, error)
             if steps is not None:
                 cost = steps * ratio
                 if best is None or cost < best.cost:
-                    best = Cheapest(_settings(rig, kind, tc, steps), steps, cost)
+                    best = Cheapest(_settings(setup, kind, tc, steps), steps, cost)
     return best
 
 
-def _least(rig: TrialSetup, kind: tuple[str, bool], tc: float, most: float, error: float) -> int | None:
+def _least(setup: TrialSetup, kind: tuple[str, bool], tc: float, most: float, error: float) -> int | None:
     """Find the least steps of the ladder, fewer than `most`, that serve."""
     for n in _ladder(FEWEST_STEPS, COARSE, most):
-        if _serves(rig, kind, tc, n, error):
+        if _serves(setup, kind, tc, n, error):
             for finer in (n / FINE**2, n / FINE):
-                if _serves(rig, kind, tc, finer, error):
+                if _serves(setup, kind, tc, finer, error):
                     return int(finer + 0.5)
             return int(n + 0.5)
     return None
@@ -83,12 +83,12 @@ def _ladder(start: float, ratio: float, most: float) -> Iterator[float]:
         n *= ratio
 
 
-def _settings(rig: TrialSetup, kind: tuple[str, bool], tc: float, steps: float) -> Settings:
+def _settings(setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float) -> Settings:
     """Set the number of steps of the run."""
-    per_run = rig.steps(dialled(1000.0, tc)) / 1000.0
+    per_run = setup.steps(dialled(1000.0, tc)) / 1000.0
     return of_kind(kind, dialled(steps / per_run, tc))
 
 
-def _serves(rig: TrialSetup, kind: tuple[str, bool], tc: float, steps: float, error: float) -> bool:
-    trial = rig.try_out(_settings(rig, kind, tc, steps))
-    return judged(rig.scene, trial).worst <= error
+def _serves(setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float, error: float) -> bool:
+    trial = setup.try_out(_settings(setup, kind, tc, steps))
+    return judged(setup.scene, trial).worst <= error

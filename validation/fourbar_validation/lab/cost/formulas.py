@@ -18,8 +18,8 @@ from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from fourbar_validation.advise.errors import WorstErrors, greatest
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.compare.error import relative
-from fourbar_validation.compare.scales import yardstick
+from fourbar_validation.compare.scales import scale_of
+from fourbar_validation.compare.tolerance import relative
 from fourbar_validation.published import thirteen
 
 FIFTY_DIGITS = 167 + 30
@@ -52,9 +52,9 @@ def single(scene: Scene, at: Command) -> Quantities:
         # vectors are made of complex doubles whatever their parts are, and so is what stays parallel
         state = case.state(path, theta_2, changed(position, _single), at.branch, speed, growth)
         state = changed(state, _single)
-        found = case.dynamics(state, growth, rounded=_single)
-    assert found.torque.dtype == np.float32
-    return {"torque": found.torque, **{name: _stack(getattr(found.pins, name), len(theta_2)) for name in PIN_FORCES}}
+        result = case.dynamics(state, growth, rounded=_single)
+    assert result.torque.dtype == np.float32
+    return {"torque": result.torque, **{name: _stack(getattr(result.pins, name), len(theta_2)) for name in PIN_FORCES}}
 
 
 def _single(value: Any, *, turned: bool = False) -> Any:
@@ -105,14 +105,14 @@ def fifty_digits(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quantit
 
     before, ctx.prec = ctx.prec, bits
     try:
-        found = []
+        result = []
         for theta_2, branch in zip(at.theta_2.tolist(), at.branch.tolist(), strict=True):
             x = {name: arb(value) for name, value in inputs(scene, theta_2).items()}
-            found.append(outputs(scene, branch, x, scene.drive_bar) or {})
+            result.append(outputs(scene, branch, x, scene.drive_bar) or {})
     finally:
         ctx.prec = before
-    out: Quantities = {"torque": [y.get("torque") for y in found]}
-    return out | {name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in found] for name in PIN_FORCES}
+    out: Quantities = {"torque": [y.get("torque") for y in result]}
+    return out | {name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in result] for name in PIN_FORCES}
 
 
 def against_reference(scene: Scene, at: Command, quantities: Quantities, reference: Quantities) -> WorstErrors:
@@ -120,13 +120,13 @@ def against_reference(scene: Scene, at: Command, quantities: Quantities, referen
     formulas = solve(scene, "force", at=at)
     worst = {}
     for name in ("torque", *PIN_FORCES):
-        sizes = yardstick(name, scene, formulas, getattr(formulas, name))
-        found = []
+        sizes = scale_of(name, scene, formulas, getattr(formulas, name))
+        result = []
         for ours, exact, size in zip(quantities[name], reference[name], sizes.tolist(), strict=True):
             pairs = ((ours, exact),) if name == "torque" else tuple(zip(ours, exact, strict=True))
             if all(y is not None for _, y in pairs):
-                found.append(float(relative(math.hypot(*(_difference(x, y) for x, y in pairs)), size)))
-        worst[name] = greatest(found)
+                result.append(float(relative(math.hypot(*(_difference(x, y) for x, y in pairs)), size)))
+        worst[name] = greatest(result)
     return WorstErrors(**worst)
 
 

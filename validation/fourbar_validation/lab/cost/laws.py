@@ -82,16 +82,16 @@ def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     """Slope of log y over log x by least squares, and its standard error."""
     from scipy.stats import linregress
 
-    found = linregress(np.log(x), np.log(y))
-    return float(found.slope), float(found.stderr) if len(x) > 2 else math.inf
+    result = linregress(np.log(x), np.log(y))
+    return float(result.slope), float(result.stderr) if len(x) > 2 else math.inf
 
 
 def floor(points: Sequence[CostPoint], quantity: str) -> float | None:
     """Find the error that more steps no longer lessen; None where it still falls at the end of the ladder."""
-    found = [getattr(point, quantity) for point in _by_steps(points)]
-    if len(found) < 2 or not math.isfinite(found[-1]) or found[-1] < FLOORED * found[-2]:
+    result = [getattr(point, quantity) for point in _by_steps(points)]
+    if len(result) < 2 or not math.isfinite(result[-1]) or result[-1] < FLOORED * result[-2]:
         return None
-    return float(found[-1])  # before it two sources may cancel: a dip is not a floor
+    return float(result[-1])  # before it two sources may cancel: a dip is not a floor
 
 
 def steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint | None:
@@ -109,18 +109,18 @@ def _by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
 
 def jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """Where an error leaps up on a ladder from coarse to fine, once the motion is the scene's."""
-    found = []
+    result = []
     for i, point in enumerate(points[1:], 1):
         value, before = getattr(point, quantity), [getattr(each, quantity) for each in points[max(i - 2, 0) : i]]
         # two sources that cancel make a dip, and its far side is no jump; a motion that is lost again is one
         if before[-1] < TOO_LARGE and not value <= JUMP * (max(before) if value < TOO_LARGE else before[-1]):
-            found.append(point)
-    return found
+            result.append(point)
+    return result
 
 
 def laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
     """Every law that the study was laid out for, of each quantity, as far as its curves are there."""
-    found = []
+    result = []
     one_state = [point for point in curves.get("one state", ()) if point.dial > 0.0]
     ladders = [
         ("softness in (1-d)", curves.get("softness d", ()), 1.0),
@@ -130,9 +130,9 @@ def laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
     ]
     for integrator, order in EXPECTED_ORDER.items():
         points, name = curves.get(f"{integrator}, tc held", ()), f"order of {integrator} in the timestep"
-        found += [_law(name, quantity, points, order, by_steps=True) for quantity in QUANTITIES if points]
-    found += [_law(name, quantity, points, n) for name, points, n in ladders for quantity in QUANTITIES if points]
-    return found + [law for quantity in QUANTITIES if (law := _stiff(curves, quantity)).points > 0]
+        result += [_law(name, quantity, points, order, by_steps=True) for quantity in QUANTITIES if points]
+    result += [_law(name, quantity, points, n) for name, points, n in ladders for quantity in QUANTITIES if points]
+    return result + [law for quantity in QUANTITIES if (law := _stiff(curves, quantity)).points > 0]
 
 
 def _law(name: str, quantity: str, points: Sequence[CostPoint], expected: float, *, by_steps: bool = False) -> ErrorLaw:
@@ -169,7 +169,7 @@ def _stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw
 
 def warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     """Where a quantity jumps towards finer steps, and where it has passed its floor."""
-    found = []
+    result = []
     for name, points in curves.items():
         ladder = _by_steps([p for p in points if p.kind == STEPPED and p.dial == p.dial and p.dial >= 2.0])
         if name == "recommended" or len(ladder) < 4 or ladder[0].dial == ladder[-1].dial:
@@ -177,15 +177,15 @@ def warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
         if len({round(p.steps_per_revolution) for p in ladder}) < 4:
             continue
         leaps = [(q, _leap(p, ladder, q)) for q in QUANTITIES for p in jumps(ladder, q)]
-        found += [f"{name}: {line}" for line in _grouped(leaps)]
+        result += [f"{name}: {line}" for line in _grouped(leaps)]
         floored = [(q, p) for q in QUANTITIES if (p := steps_at_floor(ladder, q)) is not None]
         if floored:
             beyond = (f"{q} beyond {p.steps_per_revolution:.0f} ({floor(ladder, q):.1e})" for q, p in floored)
-            found.append(f"{name}: more steps per revolution buy nothing: {', '.join(beyond)}")
+            result.append(f"{name}: more steps per revolution buy nothing: {', '.join(beyond)}")
         never = [q for q in QUANTITIES if not any(getattr(p, q) < TOO_LARGE for p in ladder)]
         if never:
-            found.append(f"{name}: no timestep of the ladder brings {', '.join(never)} below {TOO_LARGE:g}")
-    return found
+            result.append(f"{name}: no timestep of the ladder brings {', '.join(never)} below {TOO_LARGE:g}")
+    return result
 
 
 def pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:

@@ -1,11 +1,9 @@
 """How good the advice is, on linkages that it has never seen: met, and how near the cheapest."""
 
-import csv
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
@@ -18,6 +16,8 @@ from fourbar_validation.advise.advise import advise
 from fourbar_validation.advise.matters import judged
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.lab.cost.exhaustive import cheapest, relative_costs
+from fourbar_validation.report.machine import code
+from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import DrawnType, random_scene
 
 TYPES = (
@@ -47,7 +47,7 @@ class AdviceCase:
     gravity: bool
     drive_bar: int
     asked: float
-    """The required error: a column of its file."""
+    """The required error."""
     reached: bool
     """The advice says that it serves."""
     error: float
@@ -100,7 +100,7 @@ def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceC
     advice = advise(scene, required)
     dense, searched = denser(scene, DENSER), denser(scene, SEARCHED)
     error = judged(dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)).worst
-    found = cheapest(TrialSetup(searched, command(searched)), required, costs)
+    result = cheapest(TrialSetup(searched, command(searched)), required, costs)
     return AdviceCase(
         index,
         scene.title.rpartition(" ")[0],
@@ -111,7 +111,7 @@ def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceC
         advice.reached,
         error,
         float(advice.best.steps),
-        math.nan if found is None else found.cost,
+        math.nan if result is None else result.cost,
         len(advice.attempts),
     )
 
@@ -132,51 +132,24 @@ def enough(missed: int) -> int:
 
 
 def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
-    """Yield the cases, each written as it comes; what an interrupted run left is kept."""
-    done = {each.index: each for each in kept(out, seed)}
-    out.parent.mkdir(parents=True, exist_ok=True)
-    yield from (done[i] for i in sorted(done) if i < count)
-    if len(done) >= count:
-        return
-    scene, _ = scene_of(seed, 0)
-    costs = relative_costs(TrialSetup(scene, command(scene)))
-    if not out.exists() or not done:
-        out.write_text(
-            f"# seed {seed}\n" + ",".join(field.name for field in fields(AdviceCase)) + "\n", encoding="utf-8"
-        )
-    for index in range(count):
-        if index in done:
-            continue
-        try:
-            each = case(seed, index, costs)
-        except LimitError as error:
-            raise LimitError(f"linkage {index} of seed {seed}: {error}") from None
-        with out.open("a", encoding="utf-8", newline="") as file:
-            csv.writer(file, lineterminator="\n").writerow([getattr(each, field.name) for field in fields(AdviceCase)])
-        yield each
-
-
-def kept(out: Path, seed: int) -> list[AdviceCase]:
-    """Read the cases of the same seed that are already in the file."""
-    if not out.exists():
-        return []
-    first, *lines = out.read_text(encoding="utf-8").splitlines()
-    if first != f"# seed {seed}":
-        return []
-    return [_read(row) for row in csv.DictReader(lines)]
-
-
-def _read(row: dict[str, Any]) -> AdviceCase:
-    numbers = {key: float(row[key]) for key in ("omega_2", "asked", "error", "cost", "cheapest")}
-    flags = {key: row[key] == "True" for key in ("gravity", "reached")}
-    counts = {key: int(row[key]) for key in ("index", "drive_bar", "trials")}
-    return AdviceCase(kind=row["kind"], **numbers, **flags, **counts)  # type: ignore[arg-type]
+    """Yield the cases, each kept as it comes; those that an interrupted run left are read."""
+    with Store(out, {"seed": seed, **code()}).held() as store:
+        done, first = store.done(), scene_of(seed, 0)[0]
+        costs: dict[tuple[str, bool], float] = {}
+        for index in range(count):
+            if index not in done:
+                costs = costs or relative_costs(TrialSetup(first, command(first)))
+                try:
+                    store.put(index, [asdict(case(seed, index, costs))])
+                except LimitError as error:
+                    raise LimitError(f"linkage {index} of seed {seed}: {error}") from None
+            yield AdviceCase(**store.read(index)[0])
 
 
 @click.command()
 @click.option("--count", type=click.IntRange(min=1), default=400, show_default=True, help="Random linkages.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
-@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("results/advise-study.csv"))
+@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/advise-study"))
 def study(count: int, seed: int, out: Path) -> int:
     """Measure the advice on random linkages; exit 1 where it is not met or not cheap often enough.
 

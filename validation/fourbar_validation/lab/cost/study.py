@@ -111,14 +111,14 @@ class CostStudy:
                     continue
                 reasons = []
                 try:
-                    found = unit()
+                    result = unit()
                 except (FourBarError, NotImplementedError) as error:
-                    found, reasons = [], [f"{name}: {error}"]
+                    result, reasons = [], [f"{name}: {error}"]
                 self.left_out += reasons
-                store.put(number, [[asdict(point) for point in found], reasons])
-                yield name, found
+                store.put(number, [[asdict(point) for point in result], reasons])
+                yield name, result
 
-    def rig(self, slow: bool = False, bare: bool = False, settled: bool = False) -> TrialSetup:
+    def setup(self, slow: bool = False, bare: bool = False, settled: bool = False) -> TrialSetup:
         """Assemble the scene for trials: at its own speed or slow, as it is or bare, after a turn or not."""
         if (slow, bare, settled) not in self._rigs:
             scene = self.scene
@@ -137,28 +137,28 @@ class CostStudy:
 
     def _curve(self, curve: Curve) -> list[CostPoint]:
         settled = curve.settled and turns_fully(self.scene.linkage) and self.scene.motion.alpha_2 == 0.0
-        rig = self.rig(curve.slow, curve.bare, settled)
-        return self._stepped(curve.name, curve.spots, rig, settled)
+        setup = self.setup(curve.slow, curve.bare, settled)
+        return self._stepped(curve.name, curve.spots, setup, settled)
 
-    def _stepped(self, name: str, spots: tuple[Spot, ...], rig: TrialSetup, settled: bool = False) -> list[CostPoint]:
+    def _stepped(self, name: str, spots: tuple[Spot, ...], setup: TrialSetup, settled: bool = False) -> list[CostPoint]:
         """Try each spot: errors, and the CPU time of its steps next to that of the recommended model, interleaved."""
-        trials = [rig.try_out(spot.settings, spot.build) for spot in spots]
+        trials = [setup.try_out(spot.settings, spot.build) for spot in spots]
         if settled:
             for trial in trials:
                 _leave_out_first(trial)
-        clocks = [rig.seconds_per_step(spot.settings, spot.build) for spot in spots]
+        clocks = [setup.seconds_per_step(spot.settings, spot.build) for spot in spots]
         per_step, reference = _interleaved(
-            clocks, rig.seconds_per_step(BEST), [min(t.steps, TIMED_STEPS) or 1 for t in trials]
+            clocks, setup.seconds_per_step(BEST), [min(t.steps, TIMED_STEPS) or 1 for t in trials]
         )
         points = []
         for spot, trial, (cost, scatter) in zip(spots, trials, per_step, strict=True):
             # the laws are those of the steps themselves: between them the advice judges
-            found = NO_ANSWER if trial.broken else errors(rig.scene, trial.at, trial.quantities)
+            result = NO_ANSWER if trial.broken else errors(setup.scene, trial.at, trial.quantities)
             n = trial.steps_per_revolution or spot.settings.steps_per_revolution
             samples = max(len(trial.at.theta_2), 1)
             points.append(
                 CostPoint(
-                    *(name, STEPPED, spot.label, spot.x, trial.steps, n, *found),
+                    *(name, STEPPED, spot.label, spot.x, trial.steps, n, *result),
                     *(cost * n, trial.reading / samples, cost * n / reference, scatter, trial.broken),
                 )
             )
@@ -166,9 +166,9 @@ class CostStudy:
 
     def _recommended(self) -> list[CostPoint]:
         """Try what the advice gives for each required error, where it is reached."""
-        rig, spots = self.rig(), []
+        setup, spots = self.setup(), []
         for required in REQUIRED:
-            advice = advise(self.scene, required, rig)
+            advice = advise(self.scene, required, setup)
             if advice.reached:
                 spots.append(
                     Spot(
@@ -180,7 +180,7 @@ class CostStudy:
                 )
             else:
                 self.left_out.append(f"recommended: {advice.reason}")
-        return self._stepped("recommended", tuple(spots), rig)
+        return self._stepped("recommended", tuple(spots), setup)
 
     def _at_positions(
         self,
@@ -206,7 +206,7 @@ class CostStudy:
 
     def _rk4_step(self) -> float:
         try:
-            clock = self.rig().seconds_per_step(BEST)
+            clock = self.setup().seconds_per_step(BEST)
         except LimitError:
             return math.nan
         return median(clock(TIMED_STEPS) / TIMED_STEPS for _ in range(ROUNDS))
@@ -217,13 +217,13 @@ class CostStudy:
         points = []
         for label, method in formulas.METHODS.items():
             try:
-                found = formulas.against_reference(self.scene, few, method(self.scene, few), exact)
+                result = formulas.against_reference(self.scene, few, method(self.scene, few), exact)
             except (NotImplementedError, AssertionError) as error:
                 self.left_out.append(f"{label}: {error}")
                 continue
             at = few if label == "50 digits" else self.command
             times = [seconds(partial(method, self.scene, at)) for _ in range(ROUNDS)]
-            points.append(self._at_positions("formulas", FORMULAS, label, found, times, len(at.theta_2)))
+            points.append(self._at_positions("formulas", FORMULAS, label, result, times, len(at.theta_2)))
         return points
 
     def _inverse(self) -> list[CostPoint]:
@@ -246,8 +246,8 @@ class CostStudy:
         assert answer.assembled is not None
         rows = np.flatnonzero(answer.assembled)
         at = self.command._replace(theta_2=self.command.theta_2[rows], branch=self.command.branch[rows])
-        found = errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
-        return self._at_positions(curve, EXACT, label or engine.name, found, times, len(self.command.theta_2), dial)
+        result = errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
+        return self._at_positions(curve, EXACT, label or engine.name, result, times, len(self.command.theta_2), dial)
 
     def _one_state(self) -> list[CostPoint]:
         from fourbar_validation.engines.mujoco.one_state import MujocoOneState
@@ -265,12 +265,12 @@ class CostStudy:
         reference = self._rk4_step()
         for n in FORWARD_STEPS:
             ran = PinocchioForward(self.scene, self.command, n, FORWARD_TIME_CONSTANT * n).forward()
-            found = errors(self.scene, ran.at, ran.quantities)
+            result = errors(self.scene, ran.at, ran.quantities)
             cost = ran.stepping / ran.steps * ran.steps_per_revolution
             points.append(
                 CostPoint(
                     *("Pinocchio forward", STEPPED, f"Pinocchio RK4, {n}/rev", n, ran.steps, ran.steps_per_revolution),
-                    *(*found, cost, math.nan, cost / reference, math.nan),
+                    *(*result, cost, math.nan, cost / reference, math.nan),
                 )
             )
         return points

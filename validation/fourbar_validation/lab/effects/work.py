@@ -76,8 +76,8 @@ def flags() -> dict[str, str]:
     """List the flags that the MJCF of a bare scene switches off, by the name of the workload that leaves one on."""
     from fourbar.mjcf import mjcf
 
-    found = re.findall(r'(\w+)="disable"', mjcf(scene("none", 91)))
-    return {LEFT_ON.format(flag): flag for flag in found}
+    result = re.findall(r'(\w+)="disable"', mjcf(scene("none", 91)))
+    return {LEFT_ON.format(flag): flag for flag in result}
 
 
 def inverse(adapter: str) -> Callable[[str], Callable[[int], Any]]:

@@ -81,8 +81,8 @@ def timings(tree: Path, name: str, positions: int) -> dict[str, float]:
     done = ended(line, variables=dict.fromkeys(ONE_THREAD, "1") | {"PYTHONPATH": path})
     if done.why:
         raise FourBarError(f"{name} cannot be timed: {done.why}")
-    found = json.loads(done.out)
-    if not Path(found["from"]).resolve().is_relative_to(tree.resolve()):
-        raise FourBarError(f"{name} cannot be timed: {found['from']} was imported instead")
-    times: dict[str, float] = found["times"]
+    result = json.loads(done.out)
+    if not Path(result["from"]).resolve().is_relative_to(tree.resolve()):
+        raise FourBarError(f"{name} cannot be timed: {result['from']} was imported instead")
+    times: dict[str, float] = result["times"]
     return times

@@ -146,10 +146,10 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
         line = [sys.executable, "-m", "fourbar_validation", "bench", *map(str, arguments)]
         status = subprocess.run(line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False).returncode
         return status if status >= 0 else BROKEN  # below 0: a signal ended it
-    found = measure(positions, rounds, largest)
+    result = measure(positions, rounds, largest)
     rows: list[tuple[str, ...]] = []
     broken: list[str] = []
-    for what, measured in found.rows.items():
+    for what, measured in result.rows.items():
         limit = LIMITS.get(what)
         if limit is None:
             rows.append((what, f"{measured:.1f} {'ms' if what == JUDGED else 'ns/position'}"))
@@ -160,12 +160,12 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
     console = Console()
     title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {machine()}"
     console.print(lined_up(("what", "measured", "needed", ""), rows, title=title, box=HEAVY_HEAD))
-    for title, times in ((OVER_POSITIONS, found.over_positions), (OVER_LINKAGES, found.over_linkages)):
+    for title, times in ((OVER_POSITIONS, result.over_positions), (OVER_LINKAGES, result.over_linkages)):
         console.print(_by_count(title, times))
-    for who, reason in found.not_run.items():
+    for who, reason in result.not_run.items():
         click.echo(f"not run: {who}: {reason}")
     if picture is not None:
-        draw_bench(found.over_positions, found.over_linkages, picture)
+        draw_bench(result.over_positions, result.over_linkages, picture)
     for what in broken:
         click.echo(f"fails: {what}")
     return FAILED if broken else HOLDS

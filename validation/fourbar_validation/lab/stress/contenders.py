@@ -44,15 +44,15 @@ def interleaved(actions: Mapping[str, Callable[[], object]], rounds: int) -> dic
 def loops() -> Peers:
     """Collect the closed formulas by several hands: each writes into arrays that are there."""
     scene = example()
-    found: dict[str, Loop | str] = {"NumPy": _by_solve(False)}
+    result: dict[str, Loop | str] = {"NumPy": _by_solve(False)}
     try:
         solve(scene, at=command(2), compiled=True)
-        found["compiled"] = _by_solve(True)
+        result["compiled"] = _by_solve(True)
     except DependencyError as error:
-        found["compiled"] = str(error)
-    found["C"] = c_loop()
-    reasons = {name: each for name, each in found.items() if isinstance(each, str)}
-    return Peers({name: each for name, each in found.items() if not isinstance(each, str)}, reasons)
+        result["compiled"] = str(error)
+    result["C"] = c_loop()
+    reasons = {name: each for name, each in result.items() if isinstance(each, str)}
+    return Peers({name: each for name, each in result.items() if not isinstance(each, str)}, reasons)
 
 
 def _by_solve(compiled: bool) -> Loop:

@@ -13,8 +13,8 @@ from fourbar.errors import FourBarError
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.compare.error import magnitude, relative_error
 from fourbar_validation.compare.rows import in_words
+from fourbar_validation.compare.tolerance import magnitude, relative_error
 from fourbar_validation.run.elsewhere import ended, of_the_harness
 
 SIMULATORS = {

@@ -44,13 +44,13 @@ def extremes(question: Question) -> list[Row]:
             scene, tolerances=tuple(fourbar.Tolerance(f"lengths.{k}", GIVEN * x) for k, x in lengths.items())
         )
     try:
-        found = fourbar.extremes(scene, [TORQUE])
+        result = fourbar.extremes(scene, [TORQUE])
     except (InputError, LimitError) as limit:
         return [Row.unmeasured(question.name, "extremes", "exact", TORQUE, REFUSES, str(limit))]
-    assert found.nominal is not None
-    ends = [each[TORQUE] for of in (found, found.nominal) for each in (of.least, of.greatest)]
+    assert result.nominal is not None
+    ends = [each[TORQUE] for of in (result, result.nominal) for each in (of.least, of.greatest)]
     theta_2 = np.concatenate(
-        [*(np.linspace(low, high, POSITIONS) for low, high in found.parts), [each.theta_2 for each in ends]]
+        [*(np.linspace(low, high, POSITIONS) for low, high in result.parts), [each.theta_2 for each in ends]]
     )
     reach = {each.key: each.reach for each in scene.tolerances[:MOST]}
     bare = replace(scene, tolerances=(), motion=replace(scene.motion, theta_2=theta_2, through="sign"))
@@ -63,7 +63,10 @@ def extremes(question: Question) -> list[Row]:
     )
     size = max(abs(end) for each in ends for end in each[:2])
     error = np.zeros_like(theta_2)
-    for of, values, within in ((found, torque, len(reach) == len(scene.tolerances)), (found.nominal, torque[:1], True)):
+    for of, values, within in (
+        (result, torque, len(reach) == len(scene.tolerances)),
+        (result.nominal, torque[:1], True),
+    ):
         for sign, each in ((-1.0, of.least[TORQUE]), (1.0, of.greatest[TORQUE])):
             proven, reached = (each.high, each.low) if sign > 0 else (-each.low, -each.high)
             beyond = (sign * values).max(axis=0) - proven  # NaN where a linkage has no torque: nothing holds there

@@ -11,8 +11,8 @@ from fourbar.effects.load import Table
 from fourbar.errors import installing
 from fourbar.scene import Scene
 from fourbar.scene.point import Point
-from fourbar_validation.compare.error import magnitude
 from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import at_free_bodies, held_to, member, moved, sampled, stated, worst_rows
@@ -31,9 +31,9 @@ def compiled(question: Question) -> list[Row]:
         raise NotAskedError(f"numba is not installed: {installing('fast')}")
     scene = furnished(question.scene, question)
     with np.errstate(all="ignore"):
-        found = fourbar.solve(scene, at=question.at, compiled=True)
+        result = fourbar.solve(scene, at=question.at, compiled=True)
         answer = FreeBody().answer(scene, question.at)
-    return held_to(question, "compiled", scene, found, answer)
+    return held_to(question, "compiled", scene, result, answer)
 
 
 def furnished(scene: Scene, question: Question) -> Scene:
@@ -68,7 +68,7 @@ def study(question: Question) -> list[Row]:
     rows = []
     with np.errstate(all="ignore"):
         for how in (False, True) if find_spec("numba") else (False,):
-            found = fourbar.solve(fourbar.vary(scene, values | {"motion.theta_2": angles}), compiled=how)
+            result = fourbar.solve(fourbar.vary(scene, values | {"motion.theta_2": angles}), compiled=how)
             for number, one in enumerate(members):
-                rows += held_to(question, "study", one, member(found, number), at_free_bodies(one))
+                rows += held_to(question, "study", one, member(result, number), at_free_bodies(one))
     return worst_rows(rows)

@@ -12,9 +12,8 @@ from fourbar.quantities import FORCES, UNKNOWNS
 from fourbar.scene import Scene
 from fourbar.studies.spread import Spread
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.compare.error import magnitude, relative
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.compare.tolerance import ErrorBound
+from fourbar_validation.compare.tolerance import ErrorBound, magnitude, relative
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.shipped.variants import at_free_bodies, moved, parts, row_of, sampled, stated
 
@@ -53,8 +52,8 @@ NODES = {False: (0.6**0.5, 5.0 / 18.0), True: (3.0**0.5, 1.0 / 6.0)}
 def sensitivity(question: Question) -> list[Row]:
     """Judge the derivatives of the unknowns and of the scene's points along one direction."""
     scene = sampled(question)
-    found = fourbar.sensitivity(scene)
-    directions = {key: step for key, (_, step) in stated(scene, found.keys).items()}
+    result = fourbar.sensitivity(scene)
+    directions = {key: step for key, (_, step) in stated(scene, result.keys).items()}
     directions["motion.theta_2"] = 1.0
 
     def along(part: float) -> dict[str, Array]:
@@ -62,16 +61,16 @@ def sensitivity(question: Question) -> list[Row]:
 
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
     rows = []
-    for name in (name for name in UNKNOWNS if name in found.by):
+    for name in (name for name in UNKNOWNS if name in result.by):
         first, second = (_less(name, up[name], down[name]) for up, down in (near, far))
         slope = (8.0 * first - second) / (12.0 * STEP)
-        terms = np.array([step * found.of(name, key) for key, step in directions.items()])
-        size = magnitude(found.value(name)) + sum(magnitude(term) for term in terms)
-        known = np.array([status == "ok" for status in found.status]) | (name not in FORCES)
+        terms = np.array([step * result.of(name, key) for key, step in directions.items()])
+        size = magnitude(result.value(name)) + sum(magnitude(term) for term in terms)
+        known = np.array([status == "ok" for status in result.status]) | (name not in FORCES)
         error = np.where(known, relative(magnitude(terms.sum(axis=0) - slope), size), 0.0)
         if known.any():
             reason = f"along one direction in {len(directions)} numbers"
-            rows.append(row_of(question, "sensitivity", name, error, DIFFERENCES, found.solution.theta_2, reason))
+            rows.append(row_of(question, "sensitivity", name, error, DIFFERENCES, result.solution.theta_2, reason))
     return rows
 
 
@@ -81,14 +80,14 @@ def tolerances(question: Question) -> list[Row]:
     lengths = {name: getattr(scene.linkage, name).length for name in ("input", "coupler", "output")}
     given = (fourbar.Tolerance(f"lengths.{name}", GIVEN * x, name == "output") for name, x in lengths.items())
     scene = replace(scene, tolerances=(scene.tolerances or tuple(given))[:MOST])
-    found, expected = fourbar.tolerances(scene, SAMPLES), _expected(scene)
+    result, expected = fourbar.tolerances(scene, SAMPLES), _expected(scene)
     errors: dict[str, Array] = {}
     for name in UNKNOWNS:
         own = [part for part in expected if part in (name, f"{name}_x", f"{name}_y", f"|{name}|")]
         slight = SLIGHT * max(float(np.max(expected[part].worst)) for part in own)
-        errors[name] = np.max([_off(found.spreads[part], expected[part], slight) for part in own], axis=0)
+        errors[name] = np.max([_off(result.spreads[part], expected[part], slight) for part in own], axis=0)
     reason = ", ".join(each.key for each in scene.tolerances)
-    return [row_of(question, "tolerances", name, each, SPREAD, found.theta_2, reason) for name, each in errors.items()]
+    return [row_of(question, "tolerances", name, each, SPREAD, result.theta_2, reason) for name, each in errors.items()]
 
 
 class Expected(NamedTuple):
@@ -110,8 +109,8 @@ def _expected(scene: Scene) -> dict[str, Expected]:
     numbers = stated(bare, [each.key for each in scene.tolerances])
 
     def changed(changes: dict[str, float]) -> dict[str, Array]:
-        found = parts(at_free_bodies(moved(bare, changes)))
-        return {part: _less(part, values, nominal[part]) for part, values in found.items()}
+        result = parts(at_free_bodies(moved(bare, changes)))
+        return {part: _less(part, values, nominal[part]) for part, values in result.items()}
 
     weights, off = [], []
     nodes = [[(0.0, 1.0 - 2.0 * w), (x, w), (-x, w)] for x, w in (NODES[each.sigma] for each in scene.tolerances)]
@@ -125,7 +124,7 @@ def _expected(scene: Scene) -> dict[str, Expected]:
         slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
     rng, w = np.random.default_rng(0), np.array(weights)[:, None]
     drawn = [rng.normal(size=DRAWN) if each.sigma else rng.uniform(-1.0, 1.0, DRAWN) for each in scene.tolerances]
-    found = {}
+    result = {}
     for part in nominal:
         values, slope = np.array([each[part] for each in off]), np.array([each[part] for each in slopes])
         mean = (w * values).sum(axis=0)
@@ -133,14 +132,14 @@ def _expected(scene: Scene) -> dict[str, Expected]:
         variances = np.array([[1.0 if each.sigma else 1.0 / 3.0] for each in scene.tolerances])
         reaches = widths * np.array([[3.0 if each.sigma else 1.0] for each in scene.tolerances])
         low, high = np.percentile(np.array(drawn).T @ (slope * widths), (1.0, 99.0), axis=0)
-        found[part] = Expected(
+        result[part] = Expected(
             np.sqrt((w * (values - mean) ** 2).sum(axis=0)),
             np.sqrt((variances * (slope * widths) ** 2).sum(axis=0)),
             np.abs(slope * reaches).sum(axis=0),
             low,
             high,
         )
-    return found
+    return result
 
 
 def _off(spread: Spread, expected: Expected, slight: float) -> Array:

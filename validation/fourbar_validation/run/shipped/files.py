@@ -123,8 +123,8 @@ def _of_sdf(text: str) -> Contents:
 
 def _of_usd(text: str) -> Contents:
     def numbers(of: str, key: str) -> list[float]:
-        found = re.search(rf"{re.escape(key)} = (.*)", of)
-        return [float(number) for number in re.findall(NUMBER, found[1])] if found else [math.nan] * 4
+        result = re.search(rf"{re.escape(key)} = (.*)", of)
+        return [float(number) for number in re.findall(NUMBER, result[1])] if result else [math.nan] * 4
 
     def turn(of: str, key: str) -> float:
         w, _, _, z = numbers(of, key)
@@ -166,7 +166,7 @@ def _turns(bodies: dict[str, FileBody]) -> dict[str, float]:
 def _noted(text: str) -> dict[str, float]:
     """Read the angles that the file states in words."""
     return {
-        bar: float(found[1])
+        bar: float(result[1])
         for bar, number in BARS.items()
-        if (found := re.search(f"theta_{number} = ({NUMBER})", text))
+        if (result := re.search(f"theta_{number} = ({NUMBER})", text))
     }

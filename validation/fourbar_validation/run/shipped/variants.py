@@ -16,12 +16,11 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.basis import basis_of
-from fourbar_validation.compare.compare import COMPARED, compare
-from fourbar_validation.compare.error import magnitude, used
+from fourbar_validation.compare.compare import COMPARED, Comparison
 from fourbar_validation.compare.reversals import reversing
 from fourbar_validation.compare.rows import AGREES, FAILS, VERDICTS, Row
-from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, ErrorBound
+from fourbar_validation.compare.scales import reference_of
+from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, ErrorBound, magnitude, used
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import predicting_from
 from fourbar_validation.run.printed import points
@@ -44,10 +43,10 @@ def sampled(question: Question) -> Scene:
     scene, at, solution = question.scene, question.at, question.solution
     if scene.motion.law is not None:
         raise NotAskedError("a motion law has no positions of its own choice")
-    basis = question.reference
-    assert basis is not None and basis.drive_condition is not None and basis.torque is not None
-    fit = (solution.status_code == OK) & (basis.condition >= WELL_CONDITIONED) & np.isfinite(basis.torque)
-    fit &= (basis.drive_condition >= WELL_CONDITIONED) & (at.branch == scene.motion.branch)
+    reference = question.reference
+    assert reference is not None and reference.drive_condition is not None and reference.torque is not None
+    fit = (solution.status_code == OK) & (reference.condition >= WELL_CONDITIONED) & np.isfinite(reference.torque)
+    fit &= (reference.drive_condition >= WELL_CONDITIONED) & (at.branch == scene.motion.branch)
     fit &= ~reversing(scene, solution, NOT_AT_REST) & (solution.omega_2 != 0.0)
     for load in scene.loads:
         for corner in () if load.table is None else load.table.theta_2:
@@ -73,15 +72,15 @@ def stated(scene: Scene, keys: Iterable[str]) -> dict[str, FileNumber]:
 
     What it leaves out (the inertia of a uniform bar, its centre) follows the lengths.
     """
-    document, found = tomllib.loads(dump(scene)), {}
+    document, result = tomllib.loads(dump(scene)), {}
     for index, key in enumerate(keys):
         with suppress(KeyError):
             table, last = _place(document, key)
             number, _, unit = str(table[last][0] if isinstance(table[last], list) else table[last]).partition(" ")
             # no two alike, between 1/2 and 1
             part = 0.5 + 0.5 * ((index + 1) * GOLDEN % 1.0)
-            found[key] = FileNumber(float(number), part * (1.0 if unit == "rad" else float(number)))
-    return found
+            result[key] = FileNumber(float(number), part * (1.0 if unit == "rad" else float(number)))
+    return result
 
 
 def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
@@ -129,25 +128,25 @@ def held_to(question: Question, engine: str, scene: Scene, solution: Solution, a
     answer = replace(answer, engine=engine)
     assert answer.at is not None
     predicted = predicting_from(FREE_BODY, scene, answer.at, answer)
-    basis = basis_of(scene, answer)
-    rows = compare(question.name, scene, answer, solution, EQUIVALENCE, COMPARED, predicted, basis)
-    if scene.points and basis is not None:
-        rows.append(replace(points(question.name, scene, solution, basis, WELL_CONDITIONED), engine=engine))
+    reference = reference_of(scene, answer)
+    rows = Comparison(question.name, scene, answer, solution, EQUIVALENCE, COMPARED, predicted, reference).rows()
+    if scene.points and reference is not None:
+        rows.append(replace(points(question, solution, reference, WELL_CONDITIONED), engine=engine))
     return rows
 
 
 def worst_rows(rows: Iterable[Row]) -> list[Row]:
     """Keep the worst of several rows of a quantity."""
-    found: dict[tuple[str, str], Row] = {}
+    result: dict[tuple[str, str], Row] = {}
 
     def badness(row: Row) -> tuple[int, float]:
         return VERDICTS.index(row.verdict), float(used(row.error, row.allowed))
 
     for row in rows:
         key = row.setting, row.quantity
-        if key not in found or badness(row) > badness(found[key]):
-            found[key] = row
-    return list(found.values())
+        if key not in result or badness(row) > badness(result[key]):
+            result[key] = row
+    return list(result.values())
 
 
 def row_of(
@@ -175,11 +174,11 @@ def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
 
 def parts(answer: Answer) -> dict[str, Array]:
     """Split the unknowns of a position: vectors as components, pin forces also as their magnitudes."""
-    found = {}
+    result = {}
     for name in UNKNOWNS:
         values = answer.quantities[name]
         if is_scalar(name):
-            found[name] = values
+            result[name] = values
         else:
-            found |= {f"{name}_x": values[:, 0], f"{name}_y": values[:, 1], f"|{name}|": magnitude(values)}
-    return found
+            result |= {f"{name}_x": values[:, 0], f"{name}_y": values[:, 1], f"|{name}|": magnitude(values)}
+    return result

@@ -95,7 +95,9 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(
     answer = witness.engine().answer(scene, examine.command(scene))
     wrong = np.array([[times, 0.0]])
     answer.quantities["F12"] = wrong
-    rows = examine.compare("", scene, answer, solution, witness.tolerance, ("F12",), lambda quantity, where: np.ones(1))
+    rows = examine.Comparison(
+        "", scene, answer, solution, witness.tolerance, ("F12",), lambda quantity, where: np.ones(1)
+    ).rows()
     assert [row.verdict == "fails" for row in rows if row.quantity == "F12"] == [found]
 
 
@@ -110,7 +112,7 @@ def test_a_traceback_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_position_that_does_not_close_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(crank_rocker(), linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
     scene = replace(scene, motion=fourbar.Motion(np.array([3.0]), 1.0), loads=())
-    true = examine.solve
+    true = fourbar.solve
 
     def pretend(*arguments: object, **keywords: object) -> object:
         solution = true(*arguments, **keywords)  # type: ignore[arg-type]
@@ -118,7 +120,7 @@ def test_a_position_that_does_not_close_is_a_finding(monkeypatch: pytest.MonkeyP
         return solution
 
     assert examine.findings(scene) == []
-    monkeypatch.setattr(examine, "solve", pretend)
+    monkeypatch.setattr("fourbar_validation.run.question.solve", pretend)
     assert any(line.startswith("assembled") for line in examine.findings(scene))
 
 

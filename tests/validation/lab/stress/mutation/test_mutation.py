@@ -48,7 +48,7 @@ def test_the_harness_alone_catches_a_wrong_sign(monkeypatch: pytest.MonkeyPatch)
         solution.F14 *= -1.0
         return solution
 
-    monkeypatch.setattr(harness, "solve", wrong)
+    monkeypatch.setattr("fourbar_validation.run.question.solve", wrong)
     assert caught(SCENE, at, answers)
 
 

@@ -146,9 +146,9 @@ def torsion(rng: np.random.Generator) -> Scene:
     an error that is zero by chance says nothing of the bar.
     """
     scene = massless(rng)
-    found, pin = solve(scene, "position"), str(rng.choice(["A", "B", "O4"]))
-    assert found.theta_3 is not None and found.theta_4 is not None
-    theta = (scene.linkage.ground_angle, found.theta_2[0], found.theta_3[0], found.theta_4[0])
+    result, pin = solve(scene, "position"), str(rng.choice(["A", "B", "O4"]))
+    assert result.theta_3 is not None and result.theta_4 is not None
+    theta = (scene.linkage.ground_angle, result.theta_2[0], result.theta_3[0], result.theta_4[0])
     first, second = PINS[pin]
     stiffness, preload = float(rng.uniform(0.1, 10.0)), 0.0
     if rng.random() < 0.5:

@@ -18,7 +18,7 @@ from fourbar.errors import FAILED, HOLDS
 from fourbar.quantities import OK, PIN_FORCES, UNITS, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
-from fourbar_validation.compare.error import used
+from fourbar_validation.compare.tolerance import used
 from fourbar_validation.engines.balls import reference
 from fourbar_validation.engines.workers import each
 from fourbar_validation.lab.stress.forward_error.families import FAMILIES

@@ -12,11 +12,9 @@ import numpy as np
 from fourbar.files import dump, loads
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
-from fourbar.solve import solve
-from fourbar_validation.compare.compare import TOUCHING_MARGIN, closing_margin, compare
-from fourbar_validation.compare.identities import identities
+from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, in_words
-from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, closing_margin
 from fourbar_validation.engines import workers as processes
 from fourbar_validation.engines.hard_suite import predicting
 from fourbar_validation.engines.witnesses import WITNESSES, predicting_from
@@ -24,6 +22,9 @@ from fourbar_validation.lab.stress.fuzz import outside
 from fourbar_validation.lab.stress.fuzz.scenes import scene_of
 from fourbar_validation.lab.stress.fuzz.shrink import keep, shrunk
 from fourbar_validation.report.machine import code
+from fourbar_validation.run.answers import statements
+from fourbar_validation.run.formulas import check_identities
+from fourbar_validation.run.question import Question
 from fourbar_validation.run.store import Store
 
 EXACT = tuple(predicting(w) for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body"))
@@ -41,8 +42,8 @@ def findings(scene: Scene) -> list[str]:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             at = command(scene)
-            solution = solve(scene, "force", at=at)
-            return [*_file(scene), *_assembly(scene, at, solution), *_engines(scene, at, solution)]
+            question = Question("", scene, at)
+            return [*_file(scene), *_assembly(scene, at, question.solution), *_engines(question)]
     except Exception as error:  # a traceback is what fuzzing looks for
         return [f"{type(error).__name__}: {error}".splitlines()[0]]
 
@@ -57,24 +58,24 @@ def _assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
     """Compare by ball arithmetic: no position where the loop does not close, none missing where it does."""
     from fourbar_validation.engines.balls import closure, stored
 
-    found = []
-    margin = np.abs(closing_margin(scene, at.theta_2))
+    result = []
+    margin = np.abs(closing_margin(scene.linkage, at.theta_2))
     for i, theta_2 in enumerate(at.theta_2):
         closes = closure(stored(scene, float(theta_2)), int(at.branch[i])) is not None
         if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
-            found.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
+            result.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
         angles = (solution.theta_3[i], solution.theta_4[i])
         if np.isfinite(angles).any() and not solution.assembled[i]:
-            found.append(f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}")
-    return found
+            result.append(f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}")
+    return result
 
 
-def _engines(scene: Scene, at: Command, solution: Solution) -> list[str]:
-    rows = identities("", scene, at, solution)
+def _engines(question: Question) -> list[str]:
+    scene, at, solution, rows = question.scene, question.at, question.solution, list(check_identities(question))
     for witness in EXACT:
         answer = witness.engine().answer(scene, at)
         predicted = predicting_from(witness, scene, at, answer)
-        rows += compare("", scene, answer, solution, witness.tolerance, witness.expected, predicted)
+        rows += Comparison("", scene, answer, solution, witness.tolerance, witness.expected, predicted).rows()
         if witness.name == "pinocchio-inverse" and answer.refusal is None:  # of two exact engines the quicker one
             rows += statements("", scene, witness.engine(), answer, predicted=predicted)
     # half of the scenes are drawn where doubles have few digits: that they are undecided is no fault
@@ -100,8 +101,8 @@ def run(count: int, seed: int, out: Path, workers: int, bounds: bool = False) ->
         yield from (store.read(stop)[0] for stop in sorted(done))
         todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
         of, longest = partial(examine, seed, bounds), None if bounds else processes.SECONDS
-        for stop, found in processes.over_processes(of, todo, workers, seconds=longest, instead=_lost):
-            wrong = {str(number): each for number, each in zip(chunks[stop], found, strict=True) if each}
+        for stop, result in processes.over_processes(of, todo, workers, seconds=longest, instead=_lost):
+            wrong = {str(number): each for number, each in zip(chunks[stop], result, strict=True) if each}
             store.put(stop, [wrong])
             yield wrong
 
@@ -122,8 +123,8 @@ def fuzz(scenes: int, bounds: bool, seed: int, workers: int, out: Path) -> int:
     console = Console(stderr=True)
     wrong: dict[str, list[str]] = {}
     chunks = -(-scenes // (CHUNK_OF_PROOFS if bounds else CHUNK))
-    for found in track(run(scenes, seed, out, workers, bounds), "fuzzing", total=chunks, console=console):
-        wrong |= found
+    for result in track(run(scenes, seed, out, workers, bounds), "fuzzing", total=chunks, console=console):
+        wrong |= result
     for number in sorted(wrong, key=int)[:SHOWN]:
         source, name = wrong[number][0], "bounds_seed" if bounds else "seed"
         scene = (outside.scene_of if bounds else scene_of)(seed, int(number))

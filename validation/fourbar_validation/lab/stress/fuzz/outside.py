@@ -74,10 +74,10 @@ def _nearly_meeting(rng: np.random.Generator, scene: Scene, at: Solution) -> Spr
     assert at.theta_3 is not None and at.theta_4 is not None
     link, bars = scene.linkage, rng.choice(4, 2, replace=False) + 1
     angles = np.array([link.ground_angle, scene.motion.theta_2, at.theta_3[0], at.theta_4[0]])
-    feet = np.array([0.0, 0.0, *(np.array([link.input.length, link.ground]) * np.exp(1j * angles[[1, 0]]))])
-    meet = feet[bars[0] - 1] + rng.uniform(0.05, 0.3) * np.exp(1j * rng.uniform(-3.0, 3.0))
+    first_pins = np.array([0.0, 0.0, *(np.array([link.input.length, link.ground]) * np.exp(1j * angles[[1, 0]]))])
+    meet = first_pins[bars[0] - 1] + rng.uniform(0.05, 0.3) * np.exp(1j * rng.uniform(-3.0, 3.0))
     apart = np.array([0.0, 10.0 ** rng.uniform(-6, -1) * np.exp(1j * rng.uniform(-3.0, 3.0))])
-    in_bars = (meet + apart - feet[bars - 1]) * np.exp(-1j * angles[bars - 1])
+    in_bars = (meet + apart - first_pins[bars - 1]) * np.exp(-1j * angles[bars - 1])
     start, end = (SpringEnd(int(bar), float(abs(z)), float(np.angle(z))) for bar, z in zip(bars, in_bars, strict=True))
     return Spring(start, end, 10.0 ** rng.uniform(0, 4), rng.uniform(0.0, 0.5), rng.uniform(-5.0, 5.0))
 
@@ -98,14 +98,14 @@ def _outside(scene: Scene, proven: Extremes, name: str, sign: int) -> list[str]:
     extreme = (proven.greatest if sign > 0 else proven.least)[name]
     outer, inner = (extreme.high, extreme.low) if sign > 0 else (extreme.low, extreme.high)
     parts, theta_2 = _climbed(scene, proven.parts, name, sign)
-    value, found = _value(scene, name, parts, theta_2), []
+    value, result = _value(scene, name, parts, theta_2), []
     if not sign * (value - outer) <= 0:
-        found.append(f"extremes {name}: {value} at theta_2 = {theta_2!r}, {parts.tolist()} lies beyond {outer!r}")
+        result.append(f"extremes {name}: {value} at theta_2 = {theta_2!r}, {parts.tolist()} lies beyond {outer!r}")
     if not scene.tolerances:
         value = _value(scene, name, parts, extreme.theta_2)
         if not sign * (value - inner) >= 0:
-            found.append(f"extremes {name}: {value} at theta_2 = {extreme.theta_2!r} does not reach {inner!r}")
-    return found
+            result.append(f"extremes {name}: {value} at theta_2 = {extreme.theta_2!r} does not reach {inner!r}")
+    return result
 
 
 def _numbers(scene: Scene, parts: Array) -> dict[str, Any]:

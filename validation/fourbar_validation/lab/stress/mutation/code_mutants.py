@@ -82,7 +82,7 @@ def _code(within: CodeType, qualified: str) -> CodeType | None:
 def _function(module: ModuleType, qualified: str) -> FunctionType:
     """Find the function itself, below its decorators."""
     owner, _, name = qualified.rpartition(".")
-    found = inspect.getattr_static(getattr(module, owner) if owner else module, name)
-    found = inspect.unwrap(getattr(found, "fget", None) or getattr(found, "__func__", found))
-    assert isinstance(found, FunctionType)
-    return found
+    result = inspect.getattr_static(getattr(module, owner) if owner else module, name)
+    result = inspect.unwrap(getattr(result, "fget", None) or getattr(result, "__func__", result))
+    assert isinstance(result, FunctionType)
+    return result

@@ -22,15 +22,15 @@ from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.basis import basis_of
-from fourbar_validation.compare.compare import compare
-from fourbar_validation.compare.identities import identities
+from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS
-from fourbar_validation.compare.statements.statements import statements
+from fourbar_validation.compare.scales import reference_of
 from fourbar_validation.engines.free_body import NAME as FREE_BODY
 from fourbar_validation.engines.witnesses import WITNESSES, Witness, predicting_from
 from fourbar_validation.lab.stress.mutation.code_mutants import Mutant, mutants
-from fourbar_validation.run.values import compare_status
+from fourbar_validation.run.answers import statements
+from fourbar_validation.run.formulas import check_identities, compare_status
+from fourbar_validation.run.question import Question
 
 CHANGES = 1e-9
 SECONDS = 20
@@ -61,27 +61,27 @@ def scenes() -> list[Scene]:
 def numbers(scene: Scene, at: Command) -> dict[str, Any]:
     """Compute every number that the formulas state of a scene and of its linkage."""
     solution = solve(scene, "force", at=at)
-    found = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
-    found["status"] = solution.status_code.astype(float)
-    return found | stated(scene.linkage) | stated_of_motion(scene, at)
+    result = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
+    result["status"] = solution.status_code.astype(float)
+    return result | stated(scene.linkage) | stated_of_motion(scene, at)
 
 
 def stated(linkage: FourBar) -> dict[str, Any]:
     """Collect what the formulas state of a linkage whatever its motion."""
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "default_range": mobility.default_range(linkage),
         "change_points": mobility.change_points(linkage),
         "time_ratio": mobility.time_ratio(linkage) or math.nan,
         "extremes": [*transmission.transmission_extremes(linkage), transmission.transmission_extremes(linkage).worst],
     }
     for bar in MOVING_BARS:
-        found[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
-        found[f"intervals_{bar}"] = mobility.intervals(linkage, bar)
-        found[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
-        found[f"swing_{bar}"] = mobility.swing(linkage, bar)
+        result[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
+        result[f"intervals_{bar}"] = mobility.intervals(linkage, bar)
+        result[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
+        result[f"swing_{bar}"] = mobility.swing(linkage, bar)
     sweep = linkage.ground_angle + np.array([-0.5, 0.5, 4.0, 2.0])  # through both change points, and back
-    found["through"] = mobility.on_smooth_path(linkage, sweep, 1)
-    return {name: np.array(value, dtype=float) for name, value in found.items()}
+    result["through"] = mobility.on_smooth_path(linkage, sweep, 1)
+    return {name: np.array(value, dtype=float) for name, value in result.items()}
 
 
 def stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
@@ -110,13 +110,13 @@ def changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
 
 def caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> bool:
     """Check a scene: whether any comparison or identity fails."""
-    solution = solve(scene, at=at)
-    rows = identities("", scene, at, solution)
+    question = Question("", scene, at)
+    solution, rows = question.solution, list(check_identities(question))
     for witness, answer in answers:
         predicted = predicting_from(witness, scene, at, answer)
-        rows += compare("", scene, answer, solution, witness.tolerance, witness.expected, predicted)
-        if witness.name == FREE_BODY and (basis := basis_of(scene, answer)) is not None:
-            rows.append(compare_status("", scene, solution, basis))
+        rows += Comparison("", scene, answer, solution, witness.tolerance, witness.expected, predicted).rows()
+        if witness.name == FREE_BODY and (reference := reference_of(scene, answer)) is not None:
+            rows.append(compare_status(question, reference))
     if not any(row.verdict == FAILS for row in rows):
         rows += [row for witness, answer in answers for row in statements("", scene, witness.engine(), answer)]
     return any(row.verdict == FAILS for row in rows)

@@ -53,7 +53,7 @@ def planted(workers: int) -> Iterator[tuple[str, str | None]]:
     entries = faults()
     tried = each(outcomes, [(), *((n,) for n in range(len(entries)))], workers, seconds=None)
     rows = next(tried)
-    failing = rows if isinstance(rows, str) else [row for found in rows[0].values() for row in found]
+    failing = rows if isinstance(rows, str) else [row for result in rows[0].values() for row in result]
     yield "no fault", f"the harness fails without one: {failing}" if failing else None
     for entry, rows in zip(entries, tried, strict=True):
         why = survives(entry, rows if isinstance(rows, str) else rows[0])

@@ -79,14 +79,14 @@ def failing(names: list[str]) -> dict[str, list[str]]:
     from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
     from fourbar_validation.run.judge import judge
 
-    found = {}
+    result = {}
     for name in names or SPECIMENS:
         simulated = name.startswith("simulated")
         own = HARD_WITNESSES if name.startswith("to full accuracy") else WITNESSES
         witnesses = [witness for witness in own if simulated or not witness.through_time]
         rows = judge(name, SPECIMENS[name], witnesses, shipped=name.startswith("shipped")).rows
-        found[name] = [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
-    return found
+        result[name] = [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
+    return result
 
 
 def main() -> None:
@@ -99,11 +99,11 @@ def main() -> None:
         entry = faults()[number]
         finder = FaultFinder(entry)
         sys.meta_path.insert(0, finder)
-        found = failing(entry["specimens"])
+        result = failing(entry["specimens"])
         sys.meta_path.remove(finder)
         if finder.left:
             raise RuntimeError(f"the specimens use no {', '.join(finder.left)}")
-        print(json.dumps(found))
+        print(json.dumps(result))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fourbar_validation.compare.error import difference, in_own_unit, relative, relative_error, used, worst
+from fourbar_validation.compare.tolerance import difference, in_own_unit, relative, relative_error, used, worst
 
 NAN, INF = float("nan"), float("inf")
 
