@@ -13,8 +13,8 @@ from fourbar.mjcf.notes import NOTES
 from fourbar.scene import Scene
 
 STEPS = 2.0
-"""Time constant in timesteps, the least that MuJoCo holds: its joint equality leaves out P'' omega^2, and the joint lags
-by that times the square of the time constant (measured: 4e-4 rad at 628 steps a turn)."""
+"""Time constant in timesteps, the least that MuJoCo holds: its joint equality leaves out P'' omega^2, and lags by that
+times the square of the time constant (measured: 4e-4 rad at 628 steps a turn)."""
 
 
 def with_mimic(model: str, scene: Scene, about: float, joint_A: Sequence[float], theta_4: Sequence[float]) -> str:
@@ -28,9 +28,10 @@ def with_mimic(model: str, scene: Scene, about: float, joint_A: Sequence[float],
     """
     root, start = ET.fromstring(model), at_start(scene)
     root.insert(0, ET.Comment(f" {NOTES['mjcf']['mimic']} "))
-    for body in list(root.iter("body")):  # they only carried the closure
+    for body in list(root.iter("body")):  # they only carried the closure; its sites stay, and show what it is open by
         for pad in [each for each in body.findall("body") if each.get("name", "").endswith("_pad")]:
             body.remove(pad)
+            body.extend(pad.findall("site"))
     option, equality, key = root.find("option"), root.find("equality"), root.find("keyframe/key")
     assert option is not None and equality is not None and key is not None
     (closure,) = equality.findall("connect")

@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.tables import MOST_ROWS, plain_table, under_heading
-from fourbar.studies.equilibrium import Equilibria, Equilibrium, Place
+from fourbar.studies.equilibrium import Equilibria, Equilibrium, RestPosition
 
 SCHEMA = "fourbar-equilibrium/1"
 MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
@@ -74,7 +74,7 @@ def _row(each: Equilibrium, *, friction: bool) -> list[str]:
     return row + ([_range(each.held) if each.held else "-"] if friction else [])
 
 
-def _range(ends: tuple[Place, Place]) -> str:
+def _range(ends: tuple[RestPosition, RestPosition]) -> str:
     one, other = ends
     text = f"{_degrees(one.theta_2)} to {_degrees(other.theta_2)}"
     return text if one.branch == other.branch else f"{text} through a limit"
@@ -91,7 +91,7 @@ def _number(value: float) -> str:
 def json_text(title: str, found: Equilibria) -> str:
     """One object, SI and rad."""
 
-    def ends(of: tuple[Place, Place] | None) -> Any:
+    def ends(of: tuple[RestPosition, RestPosition] | None) -> Any:
         return None if of is None else [place._asdict() for place in of]
 
     def column(values: Any) -> Any:

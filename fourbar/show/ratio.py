@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from fourbar.show.tables import plain_table, under_heading
-from fourbar.studies.ratio import Fit, Ratio
+from fourbar.studies.ratio import Fit, GearRatio
 
 SCHEMA = "fourbar-ratio/1"
 ROWS = 36
 """Intervals of the range that the table shows."""
 
 
-def printed(title: str, found: Ratio) -> str:
+def printed(title: str, found: GearRatio) -> str:
     """Write both tables, and the numbers to copy."""
     columns = (np.degrees(found.theta_2), found.omega_ratio, found.torque_ratio, found.reflected_inertia)
     rows = [[_number(of[i]) for of in columns] for i in range(0, len(columns[0]), max(1, len(columns[0]) // ROWS))]
@@ -53,7 +53,7 @@ def _to_copy(fits: tuple[Fit, ...]) -> list[str]:
         f'SDF    <mimic joint="O2"><multiplier>{multiplier!r}</multiplier><offset>{one.theta_4[0]!r}</offset>'
         f"<reference>{reference!r}</reference></mimic>",
         f'MJCF   <joint joint1="O4" joint2="O2" polycoef="{poly}"/>',
-        f"       where O2 reads theta_2 - {best.about!r}; `fourbar mjcf SCENE --mimic` writes the whole model",
+        f"       where O2 reads theta_2 - {best.about!r}; `fourbar mjcf SCENE --mimic -o FILE` writes the whole model",
     ]
 
 
@@ -61,7 +61,7 @@ def _number(value: float) -> str:
     return f"{value:.6g}" if math.isfinite(value) else "-"
 
 
-def json_text(title: str, found: Ratio) -> str:
+def json_text(title: str, found: GearRatio) -> str:
     """One object, SI and rad."""
 
     def fit(each: Fit) -> dict[str, Any]:

@@ -54,7 +54,7 @@ AT_END = 1e-12
 """rad; an equilibrium so near to an end of the sweep is in it."""
 
 
-class Place(NamedTuple):
+class RestPosition(NamedTuple):
     """A position of the linkage, angles in rad."""
 
     theta_2: float
@@ -67,7 +67,7 @@ class Place(NamedTuple):
 class Equilibrium(NamedTuple):
     """A position in which the linkage stays by itself."""
 
-    place: Place
+    place: RestPosition
     stability: str
     """"stable", "unstable", or "undecided" where dQ/dq is zero as far as can be said."""
     angle: str
@@ -78,7 +78,7 @@ class Equilibrium(NamedTuple):
     """Equivalent inertia J, kg m^2."""
     frequency: float | None
     """Of small undamped oscillations, Hz; None: not stable, or without inertia."""
-    held: tuple[Place, Place] | None
+    held: tuple[RestPosition, RestPosition] | None
     """The ends of the positions around it that dry friction holds; None: there is none."""
 
 
@@ -87,13 +87,13 @@ class Equilibria(NamedTuple):
 
     found: tuple[Equilibrium, ...]
     """Along theta_2, the open branch first; none where the linkage is indifferent."""
-    indifferent: tuple[tuple[Place, Place], ...]
+    indifferent: tuple[tuple[RestPosition, RestPosition], ...]
     """Ends of ranges in which Q is zero throughout, to the rounding of the description: it stays wherever it is put."""
     proven: bool
     """Whether no other equilibrium can be; otherwise there may be others between the samples."""
-    not_decided: tuple[Place, ...]
+    not_decided: tuple[RestPosition, ...]
     """Change points, nearer than 1e-4 rad to which nothing is decided."""
-    held: tuple[tuple[Place, Place], ...]
+    held: tuple[tuple[RestPosition, RestPosition], ...]
     """Ends of all ranges that dry friction holds, those without an equilibrium too."""
     positions: Solution
     """The scene's positions at rest: `torque` holds them, anything from `torque_low` to `torque_high` with friction."""
@@ -184,7 +184,7 @@ class _Sizes(Actions):
 class _Range(NamedTuple):
     """A part of a row of the circuit."""
 
-    ends: tuple[Place, Place]
+    ends: tuple[RestPosition, RestPosition]
     row: int
     low: float
     """Where it begins, and how far it goes, rad of the row's own angle."""
@@ -379,7 +379,7 @@ class _Curve:
         tau, row = self.tau(point[None])
         return bool(row[0] == of.row and np.remainder(tau[0] - of.low, TURN) <= of.width)
 
-    def place(self, point: Array) -> Place:
+    def place(self, point: Array) -> RestPosition:
         """Describe a point, theta_2 within the sweep, else counted from the circuit's range."""
         at, from_ = (
             self.state(point[None]).at,
@@ -388,9 +388,13 @@ class _Curve:
         theta_2 = self.theta_1 + from_ + math.remainder(point[0] - from_ - math.pi, TURN) + math.pi
         theta_3, theta_4 = (float(np.angle(u)[0]) for u in (at.u3, at.u4))
         sine = math.sin(point[1])
-        return Place(float(theta_2), theta_3, theta_4, 0 if abs(sine) < AT_END else int(math.copysign(1.0, sine)))
+        return RestPosition(
+            float(theta_2), theta_3, theta_4, 0 if abs(sine) < AT_END else int(math.copysign(1.0, sine))
+        )
 
-    def described(self, point: Array, held: tuple[Place, Place] | None, *, undecided: bool) -> Equilibrium:
+    def described(
+        self, point: Array, held: tuple[RestPosition, RestPosition] | None, *, undecided: bool
+    ) -> Equilibrium:
         """Describe an equilibrium by theta_2, at a limit by theta_4."""
         state = self.state(point[None])
         bar = 4 if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]) else 2

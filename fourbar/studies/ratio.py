@@ -58,7 +58,7 @@ class Fit(NamedTuple):
     """Of the torque on the input, N m, at the scene's speed and acceleration; at rest where it states none."""
 
 
-class Ratio(NamedTuple):
+class GearRatio(NamedTuple):
     """What `ratio` returns: arrays over positions of the range, (n,)."""
 
     theta_2: Array
@@ -75,7 +75,7 @@ class Ratio(NamedTuple):
     """Of degree 1, 2, ... up to the one asked for."""
 
 
-def ratio(scene: Scene, degree: int = MOST) -> Ratio:
+def ratio(scene: Scene, degree: int = MOST) -> GearRatio:
     """Compute the transmission of a linkage over the range of its scene, and the polynomials in its place.
 
     The range is the sweep or law of the scene; where it states a single angle, or none, all that the input can reach
@@ -118,7 +118,7 @@ def ratio(scene: Scene, degree: int = MOST) -> Ratio:
         )
         J = sum(inertia(case.lengths.a, case.bodies, state.at, state.k))
         through = np.where(h4 == 0.0, np.nan, 1.0 / h4)
-        return Ratio(at.theta_2, h4, through, np.broadcast_to(J, h4.shape), torque, fits)
+        return GearRatio(at.theta_2, h4, through, np.broadcast_to(J, h4.shape), torque, fits)
 
 
 def _over_range(scene: Scene) -> Command:
@@ -147,7 +147,7 @@ def _torque(case: Case, state: State, alpha_2: Any) -> Array:
 
 
 def _fitted(case: Case, state: State, at: Command, angles: tuple[Array, Array], torque: Array, degree: int) -> Fit:
-    """Fit polynomials of a degree, near the ones of least greatest error, and compare what they do with the loop."""
+    """Fit polynomials whose greatest error is less than twice the least one, and compare them with the loop."""
     low, high = float(at.theta_2.min()), float(at.theta_2.max())
     about, half = 0.5 * (low + high), 0.5 * (high - low)
     x = at.theta_2 - about
