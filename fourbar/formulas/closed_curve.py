@@ -40,7 +40,7 @@ def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:
     u3 = diagonal / _less_turned(b, c, mu)
     u4, h2 = u3 * polar(1.0, mu), np.sin(mu)
     h3, h4 = (a / b) * sine(u4, u2), (a / c) * sine(u3, u2)
-    k = Coefficients(h2, h3, h4, h2 - h3, (a * d / (b * c)) * np.sin(psi), 0.0, 0.0, 0.0)
+    k = Coefficients(h2, h3, h4, h2 - h3, (a / b) * (d / c) * np.sin(psi), 0.0, 0.0, 0.0)
     at = Position(u1, u2, u3, u4, h2, diagonal, None, None, None)  # type: ignore[arg-type]  # what nothing here asks for
     return State(lengths, theta_1, theta_1 + psi, at, k, 0.0, rates(k, 0.0, 0.0))
 

@@ -84,6 +84,10 @@ def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.4f}"
 
 
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def _number(value: float) -> str:
     return f"{value:.6g}" if math.isfinite(value) else "-"
 
@@ -95,7 +99,7 @@ def json_text(title: str, found: Equilibria) -> str:
         return None if of is None else [place._asdict() for place in of]
 
     def column(values: Any) -> Any:
-        return None if values is None else [x if math.isfinite(x) else None for x in values.tolist()]
+        return None if values is None else [*map(_finite, values.tolist())]
 
     at = found.positions
     document = {
@@ -103,7 +107,11 @@ def json_text(title: str, found: Equilibria) -> str:
         "title": title,
         "proven": found.proven,
         "equilibria": [
-            {**each._asdict(), "place": each.place._asdict(), "held": ends(each.held)} for each in found.found
+            {
+                **{name: _finite(value) for name, value in each._asdict().items()},
+                **{"place": each.place._asdict(), "held": ends(each.held)},
+            }
+            for each in found.found
         ],
         "indifferent": [ends(each) for each in found.indifferent],
         "held": [ends(each) for each in found.held],

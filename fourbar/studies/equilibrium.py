@@ -133,7 +133,7 @@ def equilibrium(scene: Scene) -> Equilibria:
         singular = tuple(curve.place(np.array(point)) for point in curve.singular)
         positions = _at_rest(scene, curve.circuit)
         psi = positions.theta_2 - curve.theta_1
-        moves = curve.moves(np.stack([psi, positions.branch * transmission(curve.lengths, psi)], axis=1))
+        moves = curve.moves(np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1))
         moves[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
         flat, ends = (tuple(each.ends for each in of) for of in (level, ranges))
         return Equilibria(tuple(found), flat, result.complete, singular, ends, positions, moves)
@@ -205,6 +205,8 @@ class _Curve:
         self.case = self.case.with_start(command(scene)) if scene.counts_turns else self.case
         linkage = scene.linkage
         self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
+        self.ratios = self.case.path.lengths
+        """The lengths by a unit near them, of which no product leaves the range of doubles."""
         at = command(scene)
         number = circuit_of(linkage, at.theta_2, at.branch)
         if (number < 0).all():
@@ -235,7 +237,7 @@ class _Curve:
         else:
             psi = 0.5 * (self.low + self.high) - 0.5 * (self.high - self.low) * np.cos(tau)
             sign = np.where(tau <= math.pi, 1.0, -1.0)
-        return np.stack([psi, sign * transmission(self.lengths, psi)], axis=1)
+        return np.stack([psi, sign * transmission(self.ratios, psi)], axis=1)
 
     def tau(self, points: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return the place and the row (index into `rows`) of points."""
@@ -369,9 +371,12 @@ class _Curve:
             begin = _edge(there, tau[starts], np.remainder(tau[starts] - tau[starts - 1], TURN), -1.0)
             end = _edge(there, tau[stops], np.remainder(following - tau[stops], TURN), 1.0)
             for low, high, count in zip(begin, end, (stops - starts) % len(tau) + 1, strict=True):
-                one, other = self.point(np.array([low, high]), branch)
+                one, other = (self.place(point) for point in self.point(np.array([low, high]), branch))
+                if self.full and other.theta_2 < one.theta_2:
+                    other = other._replace(theta_2=other.theta_2 + TURN)
+                ends = (other, one) if not self.full and one.branch == other.branch == -1 else (one, other)
                 width = float(np.remainder(high - low, TURN))
-                result.append(_Range((self.place(one), self.place(other)), row, low, width, int(count)))
+                result.append(_Range(ends, row, low, width, int(count)))
         return result
 
     def lies_in(self, point: Array, of: "_Range") -> bool:
@@ -471,6 +476,6 @@ def _proven(curve: _Curve, idle: Array) -> Zeros | None:
 
     before, ctx.prec = ctx.prec, 128
     try:
-        return zeros(curve.lengths, force, (psi, mu), wanted, curve.singular)
+        return zeros(curve.ratios, force, (psi, mu), wanted, curve.singular)
     finally:
         ctx.prec = before

@@ -60,6 +60,7 @@ def zeros(
 
     Parameters
     ----------
+    lengths : in any unit.
     function : of balls psi and mu, (n,), with its slopes by both.
     domain : ends of psi and of mu, rad.
     inside : whether a box of psi and mu, (n, 2) centres and radii, may hold one of those wanted, (n,).
@@ -114,7 +115,7 @@ def _closes(lengths: Loop, centres: Array, radii: Array) -> NDArray[np.bool_]:
     slope = np.minimum(np.abs(np.sin(centres)) + radii, 1.0) * [a * d, b * c]
     size = a * d + b * c + 0.5 * (a * a + b * b + c * c + d * d)
     allowed = (slope * radii).sum(axis=1) + MARGIN * size
-    return np.asarray(np.abs(closure(lengths, centres[:, 0], centres[:, 1])) <= allowed)
+    return ~np.asarray(np.abs(closure(lengths, centres[:, 0], centres[:, 1])) > allowed)
 
 
 class _Newton:
