@@ -18,6 +18,7 @@ from fourbar.mjcf import mjcf
 from fourbar.scene.motion import Free
 from fourbar.studies import equilibrium as module
 from fourbar.studies.equilibrium import Equilibria, Equilibrium, equilibrium
+from fourbar_validation.engines.free_body import FreeBody
 
 MODELS = Path(__file__).parents[3] / "models"
 M, R, INERTIA = 1.5, 0.04, 0.002
@@ -218,6 +219,21 @@ def test_a_sweep_bounds_the_search() -> None:
     found = equilibrium(sweep)
     assert [each.stability for each in found.found] == ["stable"] and len(found.positions) == 31
     assert found.found[0].place.theta_2 == pytest.approx(-math.pi / 2 - 0.3, abs=CLOSE)
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "thesis", "gallery/hoecken", "gallery/pump_jack"])
+def test_the_free_bodies_need_no_torque_there_and_its_slope_beside(name: str) -> None:
+    """Newton-Euler on three free bodies with their own closure: no virtual work, no coefficient of motion."""
+    scene = replace(fourbar.load(MODELS / f"{name}.toml"), drive_bar=2)
+    found = equilibrium(scene)
+    most = np.nanmax(np.abs(found.positions.torque))
+    assert found.proven and found.found
+    for each in found.found:
+        step = 1e-5 * np.array([-1.0, 0.0, 1.0])
+        at = fourbar.scene.Command(each.place.theta_2 + step, np.full(3, each.place.branch, dtype=np.int8), 0.0, 0.0)
+        torque = FreeBody().answer(scene, at).quantities["torque"]
+        assert abs(torque[1]) <= 1e-12 * max(most, abs(each.slope))
+        assert (torque[0] - torque[2]) / 2e-5 == pytest.approx(each.slope, rel=1e-4)
 
 
 def crossings(time: np.ndarray, angle: np.ndarray, middle: float) -> float:
