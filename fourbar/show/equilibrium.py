@@ -9,7 +9,8 @@ import numpy as np
 from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.tables import MOST_ROWS, plain_table, under_heading
-from fourbar.studies.equilibrium import Equilibria, Equilibrium, RestPosition
+from fourbar.studies.circuit_curve import RestPosition
+from fourbar.studies.equilibrium import Equilibria, Equilibrium
 
 SCHEMA = "fourbar-equilibrium/1"
 MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}

@@ -9,59 +9,38 @@ Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); L. Meirovitch,
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, bodies
-from fourbar.errors import NotAssembledError, expect
-from fourbar.evaluation.case import Case
-from fourbar.formulas.circuits import Circuit, circuit_of, circuits
+from fourbar.errors import expect
+from fourbar.formulas.circuits import Circuit, circuits
 from fourbar.formulas.closed_curve import on_curve, transmission
-from fourbar.formulas.mobility import MARGIN, TURN, change_points, default_range, turns_fully
-from fourbar.formulas.motion import State
-from fourbar.formulas.path import path
-from fourbar.formulas.position import Loop, loop
+from fourbar.formulas.mobility import MARGIN, TURN, default_range, turns_fully
+from fourbar.formulas.position import Loop
 from fourbar.formulas.torque import inertia
-from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR
+from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.motion import DEFAULT_STEPS, Sweep
+from fourbar.scene.motion import DEFAULT_STEPS
 from fourbar.solution import Solution
 from fourbar.solve import solve
+from fourbar.studies.circuit_curve import SAMPLES, Array, CircuitCurve, RestPosition, generalised_force
 from fourbar.studies.derivatives import differentiable
+from fourbar.studies.holding import HALVINGS, CircuitRange, holds, lies_in, moves, ranges
 from fourbar.studies.interval import KNOWN
 from fourbar.studies.keys import at_place, entries, left_out, with_numbers
 from fourbar.studies.sloped import Sloped
 from fourbar.studies.zeros import AT_CHANGE_POINT, Zeros, zeros
 
-Array = NDArray[np.float64]
-SAMPLES = 3600
-"""Positions of a whole branch that are looked at for friction, and for zeros where they cannot be proven."""
-NOTHING = 1e-11
-"""Of the sum of the absolute terms of Q: no more than this everywhere is what rounding leaves of zero."""
-HALVINGS = 60
-"""Of the distance between two samples: to its last digits."""
 A_JUMP = 1e-6
 """Of the sum of the absolute terms: a torsion spring wound by half a turn makes Q jump, which is no zero."""
 STILL = 1e-3
 """Where bar 2 turns by less than this of bar 4 it stands at a limit, and theta_4 takes its place."""
 A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
-AT_END = 1e-12
-"""rad; an equilibrium so near to an end of the sweep is in it."""
-
-
-class RestPosition(NamedTuple):
-    """A position of the linkage, angles in rad."""
-
-    theta_2: float
-    theta_3: float
-    theta_4: float
-    branch: int
-    """+1 or -1; 0 at a limit of theta_2, where the two meet."""
 
 
 class Equilibrium(NamedTuple):
@@ -115,28 +94,30 @@ def equilibrium(scene: Scene) -> Equilibria:
     """
     expect("scene", scene, Scene)
     with np.errstate(all="ignore"):
-        curve = _Curve(scene)
-        level = [each for each in curve.ranges(curve.level, np.empty((0, 2))) if each.samples > A_RANGE]
+        curve = CircuitCurve(scene)
+        level = [each for each in ranges(curve, curve.level, np.empty((0, 2))) if each.samples > A_RANGE]
         samples = curve.samples()
         idle = curve.level(samples)
         result = Zeros(np.empty((0, 2)), np.empty((0, 2)), True)
         if not idle.all():
             proof = _proven(curve, samples[idle])
-            result = proof if proof is not None and proof.complete else curve.sign_changes(samples)
+            result = proof if proof is not None and proof.complete else _sign_changes(curve, samples)
         points = curve.sorted(np.concatenate([result.found, result.undecided]))
-        ranges = curve.ranges(curve.holds, points) if any(term.dry_pins for term in curve.case.terms) else []
+        held: list[CircuitRange] = []
+        if any(term.dry_pins for term in curve.case.terms):
+            held = ranges(curve, partial(holds, curve), points)
         found = []
         for point in points:
             undecided = any(np.array_equal(point, each) for each in result.undecided)
-            held = next((each.ends for each in ranges if curve.lies_in(point, each)), None)
-            found.append(curve.described(point, held, undecided=undecided))
+            around = next((each.ends for each in held if lies_in(curve, point, each)), None)
+            found.append(_described(curve, point, around, undecided=undecided))
         singular = tuple(curve.place(np.array(point)) for point in curve.singular)
         positions = _at_rest(scene, curve.circuit)
         psi = positions.theta_2 - curve.theta_1
-        moves = curve.moves(np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1))
-        moves[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
-        flat, ends = (tuple(each.ends for each in of) for of in (level, ranges))
-        return Equilibria(tuple(found), flat, result.complete, singular, ends, positions, moves)
+        sense = moves(curve, np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1))
+        sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
+        flat, ends = (tuple(each.ends for each in of) for of in (level, held))
+        return Equilibria(tuple(found), flat, result.complete, singular, ends, positions, sense)
 
 
 def _at_rest(scene: Scene, circuit: Circuit) -> Solution:
@@ -150,278 +131,45 @@ def _at_rest(scene: Scene, circuit: Circuit) -> Solution:
     return solve(scene, "force", at=Command(at.theta_2, at.branch, 0.0, 0.0, at.remainder))
 
 
-def generalised_force(scene: Scene, terms: tuple[Any, ...], state: State) -> Any:
-    """Compute Q of loads and effects, by the parameter that the state's coefficients belong to."""
-    actions = Actions(state, bodies(scene.linkage, terms))
-    for term in terms:
-        term.act(actions, state)
-    return actions.work()[0]
+def _described(
+    curve: CircuitCurve, point: Array, held: tuple[RestPosition, RestPosition] | None, *, undecided: bool
+) -> Equilibrium:
+    """Describe an equilibrium by theta_2, at a limit by theta_4."""
+    state = curve.state(point[None])
+    bar = 4 if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]) else 2
+    square = float(state.k[bar - 2][0]) ** 2
+    slope = float(curve.slope(point[None])[0]) / square
+    J = float(np.sum(inertia(curve.lengths.a, curve.case.bodies, state.at, state.k))) / square
+    stable = "undecided" if undecided else "stable" if slope < 0.0 else "unstable"
+    frequency = math.sqrt(-slope / J) / TURN if stable == "stable" and J > 0.0 else None
+    return Equilibrium(curve.place(point), stable, f"theta_{bar}", slope, J, frequency, held)
 
 
-class _Sizes(Actions):
-    """Sums of the absolute terms of Q, each with the speed of the fastest bar: one that rests has rounding alone."""
-
-    def __init__(self, state: State, of: Any) -> None:
-        super().__init__(state, of)
-        self.size: Any = 0.0
-        self.fastest = np.max(np.abs([state.k.h2, state.k.h3, state.k.h4]), axis=0)
-
-    def force(self, bar: int, force: Any, arm: Any = 0.0j) -> None:
-        super().force(bar, force, arm)
-        if bar == 3:
-            self.size = self.size + np.abs(force) * self.state.lengths.a * self.fastest
-
-    def moment(self, bar: int, moment: Any) -> None:
-        super().moment(bar, moment)
-        if bar != 1:
-            self.size = self.size + np.abs(moment) * self.fastest
-
-    def couple(self, pin: str, couple: Any) -> None:
-        super().couple(pin, couple)
-        self.size = self.size + np.abs(couple) * self.fastest
-
-
-class _Range(NamedTuple):
-    """A part of a row of the circuit."""
-
-    ends: tuple[RestPosition, RestPosition]
-    row: int
-    low: float
-    """Where it begins, and how far it goes, rad of the row's own angle."""
-    width: float
-    samples: int
-    """How many are in it."""
-
-
-class _Curve:
-    """The circuit of a scene: its branches as closed rows of psi = theta_2 - theta_1 and mu = theta_4 - theta_3.
-
-    A row is sampled by an angle tau: psi itself where the input turns fully, else psi = middle - half width cos tau, on
-    the open branch up to half a turn and back on the crossed one, so that it is smooth through the limits.
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene, self.case = scene, Case.of(scene)
-        self.case = self.case.with_start(command(scene)) if scene.counts_turns else self.case
-        linkage = scene.linkage
-        self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
-        self.ratios = self.case.path.lengths
-        """The lengths by a unit near them, of which no product leaves the range of doubles."""
-        at = command(scene)
-        number = circuit_of(linkage, at.theta_2, at.branch)
-        if (number < 0).all():
-            raise NotAssembledError("motion.theta_2: the linkage assembles at none of the positions requested")
-        self.circuit = circuits(linkage)[number[number >= 0][0]]
-        self.full = turns_fully(linkage)
-        self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
-        stated = isinstance(scene.motion.theta_2, Sweep) or scene.motion.law is not None
-        self.sweep = (float(at.theta_2.min()), float(at.theta_2.max())) if stated else None
-        self.singular = [
-            (point - self.theta_1, 0.0 if point == self.theta_1 else math.pi) for point in change_points(linkage)
-        ]
-        self.singular = [each for each in self.singular if self.inside(np.array([each[0]]), np.zeros(1))[0]]
-
-    def inside(self, psi: Array, radius: Array) -> NDArray[np.bool_]:
-        """Whether psi, within a radius, lies in the sweep, if one is stated."""
-        if self.sweep is None or self.sweep[1] - self.sweep[0] >= TURN:
-            return np.ones(psi.shape, dtype=bool)
-        middle, half = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1, 0.5 * (self.sweep[1] - self.sweep[0])
-        away = psi - middle - TURN * np.rint((psi - middle) / TURN)
-        return np.asarray(np.abs(away) <= half + radius + AT_END)
-
-    def point(self, tau: Array, branch: int) -> Array:
-        """Return psi and mu, (n, 2), at places of a row; `branch` where the input turns fully."""
-        tau = np.asarray(np.remainder(tau, TURN), dtype=float)
-        if self.full:
-            psi, sign = self.low + tau, np.full(tau.shape, float(branch))
-        else:
-            psi = 0.5 * (self.low + self.high) - 0.5 * (self.high - self.low) * np.cos(tau)
-            sign = np.where(tau <= math.pi, 1.0, -1.0)
-        return np.stack([psi, sign * transmission(self.ratios, psi)], axis=1)
-
-    def tau(self, points: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return the place and the row (index into `rows`) of points."""
-        psi = self.low + np.remainder(points[:, 0] - self.low, TURN)
-        sign = np.where(np.sin(points[:, 1]) >= 0.0, 1, -1)
-        if self.full:
-            return psi - self.low, np.array([self.rows.index(each) for each in sign], dtype=np.intp)
-        part = np.clip((0.5 * (self.low + self.high) - psi) / (0.5 * (self.high - self.low)), -1.0, 1.0)
-        tau = np.where(sign > 0, np.arccos(part), TURN - np.arccos(part))
-        return tau, np.zeros(len(points), dtype=np.intp)
-
-    @property
-    def rows(self) -> tuple[int, ...]:
-        """The branch of each row; one row holds both where the input has limits."""
-        return self.circuit.branches if self.full else (1,)
-
-    def samples(self) -> Array:
-        """All rows at even places within the sweep, off the limits and change points, (n, 2)."""
-        tau = np.linspace(0.0, TURN, SAMPLES, endpoint=False) + 0.5 * TURN / SAMPLES
-        points = np.concatenate([self.point(tau, branch) for branch in self.rows])
-        return points[self.inside(points[:, 0], np.zeros(1))]
-
-    def sorted(self, points: Array) -> Array:
-        """Those in the sweep, along the rows."""
-        points = points[self.inside(points[:, 0], np.zeros(1))]
-        tau, row = self.tau(points)
-        return points[np.lexsort((tau, row))]
-
-    def state(self, points: Array) -> State:
-        """Positions with their derivatives along the curve."""
-        return on_curve(self.lengths, self.theta_1, points[:, 0], points[:, 1])
-
-    def force(self, points: Array) -> Array:
-        """Q of all but dry friction, by the curve's parameter."""
-        return np.broadcast_to(generalised_force(self.scene, self.case.terms, self.state(points)), len(points))
-
-    def slope(self, points: Array) -> Array:
-        """dQ/ds."""
-        k = self.state(points).k
-        psi, mu = (Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True))
-        Q = generalised_force(self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu))
-        return np.broadcast_to(Q.slopes[0], len(points)) if isinstance(Q, Sloped) else np.zeros(len(points))
-
-    def size(self, points: Array) -> Array:
-        """Sum of the absolute terms of Q."""
-        actions = _Sizes(state := self.state(points), self.case.bodies)
-        for term in self.case.terms:
-            term.act(actions, state)
-        return np.broadcast_to(actions.size, len(points))
-
-    def level(self, points: Array) -> NDArray[np.bool_]:
-        """Whether rounding leaves nothing of Q."""
-        return np.asarray(np.abs(self.force(points)) <= NOTHING * self.size(points))
-
-    def sign_changes(self, points: Array) -> Zeros:
-        """Find the zeros between samples at which Q changes its sign."""
-        tau, row = self.tau(points)
-        Q, size, one = self.force(points), self.size(points), np.arange(len(points))
-        other = np.concatenate([np.roll(one[row == each], -1) for each in range(len(self.rows))])
-        gap = np.remainder(tau[other] - tau, TURN)
-        idle = self.level(points)
-        between = np.flatnonzero((Q * Q[other] <= 0.0) & (gap < 1.5 * TURN / SAMPLES) & ~idle & ~idle[other])
-        low, high, start = tau[between], tau[between] + gap[between], Q[between]
-        branch = np.array(self.rows)[row[between]]
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            before = self.force(self._at(middle, branch)) * start > 0.0
-            low, high = np.where(before, middle, low), np.where(before, high, middle)
-        found = self._at(high, branch)
-        real = np.abs(self.force(found)) <= A_JUMP * size[between]
-        for point in self.singular:  # where Q vanishes because nothing moves
-            real &= ~(np.abs(np.sin(0.5 * (found - point))) < AT_CHANGE_POINT).all(axis=1)
-        found = found[real]
-        level = np.abs(self.slope(found)) <= A_JUMP * self.size(found)
-        return Zeros(found[~level], found[level], False)
-
-    def _at(self, tau: Array, branch: Array) -> Array:
-        """Points of several rows."""
-        found = np.empty((len(tau), 2))
-        for each in self.rows:
-            found[branch == each] = self.point(tau[branch == each], each)
-        return found
-
-    def with_friction(self, points: Array, side: int) -> Array:
-        """Q with what friction does against a motion that begins to one side; -inf or inf where it jams that motion."""
-        state, result = self.state(points), np.empty(len(points))
-        along = np.abs(state.k.h2) >= np.abs(state.k.h4)  # the torque that balances Q, on the bar that turns faster
-        for bar, chosen in ((2, along), (4, ~along)):
-            if chosen.any():
-                part = self.state(points[chosen])
-                # the path of bar 4 takes the drive's sine from directions
-                case = self.case._replace(drive_bar=bar, path=path(self.lengths, self.theta_1, 4))
-                found = case.dynamics(part, 0.0, side)
-                Q = -found.torque * part.k[bar - 2]
-                result[chosen] = Q if found.status is None else np.where(found.status == JAMMED, -side * np.inf, Q)
-        return result
-
-    def holds(self, points: Array) -> NDArray[np.bool_]:
-        """Whether friction holds."""
-        return (self.with_friction(points, 1) <= 0.0) & (self.with_friction(points, -1) >= 0.0)
-
-    def moves(self, points: Array) -> NDArray[np.int8]:
-        """How positions begin to move: +1 as theta_2 grows, -1 as it falls, 0 they stay."""
-        state = self.state(points)
-        ahead, back = self.with_friction(points, 1), self.with_friction(points, -1)
-        level = NOTHING * self.size(points)
-        sense = np.where(ahead > level, 1, np.where(back < -level, -1, 0))
-        return np.asarray(sense * np.sign(state.k.h2), dtype=np.int8)
-
-    def ranges(self, holds: Callable[[Array], NDArray[np.bool_]], known: Array) -> "list[_Range]":
-        """List the ranges within the sweep in which something holds, row by row; it holds at the points known."""
-        result = []
-        own_tau, own_row = self.tau(known)
-        for row, branch in enumerate(self.rows):
-
-            def there(tau: Array, branch: int = branch) -> NDArray[np.bool_]:
-                points = self.point(tau, branch)
-                return self.inside(points[:, 0], np.zeros(1)) & holds(points)
-
-            tau = np.concatenate([(np.arange(SAMPLES) + 0.5) * (TURN / SAMPLES), own_tau[own_row == row]])
-            order = np.argsort(tau)
-            tau, inside = tau[order], (there(tau) | (np.arange(len(tau)) >= SAMPLES))[order]
-            if inside.all():
-                first, last = self.point(np.array([0.0, math.nextafter(TURN, 0.0)]), branch)
-                result.append(_Range((self.place(first), self.place(last)), row, 0.0, TURN, SAMPLES))
-                continue
-            starts, stops = (np.flatnonzero(inside & ~np.roll(inside, by)) for by in (1, -1))
-            if len(starts) and stops[0] < starts[0]:
-                stops = np.roll(stops, -1)
-            following = tau[(stops + 1) % len(tau)]
-            begin = _edge(there, tau[starts], np.remainder(tau[starts] - tau[starts - 1], TURN), -1.0)
-            end = _edge(there, tau[stops], np.remainder(following - tau[stops], TURN), 1.0)
-            for low, high, count in zip(begin, end, (stops - starts) % len(tau) + 1, strict=True):
-                one, other = (self.place(point) for point in self.point(np.array([low, high]), branch))
-                if self.full and other.theta_2 < one.theta_2:
-                    other = other._replace(theta_2=other.theta_2 + TURN)
-                ends = (other, one) if not self.full and one.branch == other.branch == -1 else (one, other)
-                width = float(np.remainder(high - low, TURN))
-                result.append(_Range(ends, row, low, width, int(count)))
-        return result
-
-    def lies_in(self, point: Array, of: "_Range") -> bool:
-        """Whether a point lies in a range."""
-        tau, row = self.tau(point[None])
-        return bool(row[0] == of.row and np.remainder(tau[0] - of.low, TURN) <= of.width)
-
-    def place(self, point: Array) -> RestPosition:
-        """Describe a point, theta_2 within the sweep, else counted from the circuit's range."""
-        at, from_ = (
-            self.state(point[None]).at,
-            self.low if self.sweep is None else self.sweep[0] - self.theta_1 - AT_END,
-        )
-        theta_2 = self.theta_1 + from_ + math.remainder(point[0] - from_ - math.pi, TURN) + math.pi
-        theta_3, theta_4 = (float(np.angle(u)[0]) for u in (at.u3, at.u4))
-        sine = math.sin(point[1])
-        return RestPosition(
-            float(theta_2), theta_3, theta_4, 0 if abs(sine) < AT_END else int(math.copysign(1.0, sine))
-        )
-
-    def described(
-        self, point: Array, held: tuple[RestPosition, RestPosition] | None, *, undecided: bool
-    ) -> Equilibrium:
-        """Describe an equilibrium by theta_2, at a limit by theta_4."""
-        state = self.state(point[None])
-        bar = 4 if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]) else 2
-        square = float(state.k[bar - 2][0]) ** 2
-        slope = float(self.slope(point[None])[0]) / square
-        J = float(np.sum(inertia(self.lengths.a, self.case.bodies, state.at, state.k))) / square
-        stable = "undecided" if undecided else "stable" if slope < 0.0 else "unstable"
-        frequency = math.sqrt(-slope / J) / TURN if stable == "stable" and J > 0.0 else None
-        return Equilibrium(self.place(point), stable, f"theta_{bar}", slope, J, frequency, held)
-
-
-def _edge(held: Callable[[Array], NDArray[np.bool_]], tau: Array, gap: Array, sense: float) -> Array:
-    """Find where a range ends, between a place that is held and the next one, which is not."""
-    low, high = np.zeros(tau.shape), gap
+def _sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
+    """Find the zeros between samples at which Q changes its sign."""
+    idle = curve.level(points)
+    points = points[~idle | np.roll(idle, 1) | np.roll(idle, -1)]  # but for a zero that falls on a sample
+    tau, row = curve.tau(points)
+    Q, size, one, idle = curve.force(points), curve.size(points), np.arange(len(points)), curve.level(points)
+    other = np.concatenate([np.roll(one[row == each], -1) for each in range(len(curve.rows))])
+    gap = np.remainder(tau[other] - tau, TURN)
+    between = np.flatnonzero((Q * Q[other] < 0.0) & (gap < 2.5 * TURN / SAMPLES) & ~idle & ~idle[other])
+    low, high, start = tau[between], tau[between] + gap[between], Q[between]
+    branch = np.array(curve.rows)[row[between]]
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        inside = held(tau + sense * middle)
-        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    return np.asarray(np.remainder(tau + sense * low, TURN))
+        before = curve.force(curve.in_rows(middle, branch)) * start > 0.0
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    found = curve.in_rows(high, branch)
+    real = np.abs(curve.force(found)) <= A_JUMP * size[between]
+    for point in curve.singular:  # where Q vanishes because nothing moves
+        real &= ~(np.abs(np.sin(0.5 * (found - point))) < AT_CHANGE_POINT).all(axis=1)
+    found = found[real]
+    level = np.abs(curve.slope(found)) <= A_JUMP * curve.size(found)
+    return Zeros(found[~level], found[level], False)
 
 
-def _proven(curve: _Curve, idle: Array) -> Zeros | None:
+def _proven(curve: CircuitCurve, idle: Array) -> Zeros | None:
     """All zeros of Q on the circuit; None where ball arithmetic or an effect's form in it is missing.
 
     Between two change points, where signs of psi and mu tell the ways of moving apart, Q may be zero throughout: a load

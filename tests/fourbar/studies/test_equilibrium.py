@@ -17,6 +17,7 @@ from fourbar.effects import SpringEnd
 from fourbar.mjcf import mjcf
 from fourbar.scene.motion import Free
 from fourbar.studies import equilibrium as module
+from fourbar.studies.circuit_curve import SAMPLES
 from fourbar.studies.equilibrium import Equilibria, Equilibrium, equilibrium
 from fourbar_validation.engines.free_body import FreeBody
 
@@ -311,3 +312,11 @@ def test_no_unit_of_length_changes_an_equilibrium(unit: float) -> None:
     for one_of, other in zip(found.found, same.found, strict=True):
         assert one_of.place == pytest.approx(other.place, abs=CLOSE)
         assert one_of.slope / unit == pytest.approx(other.slope, rel=1e-9)
+
+
+def test_a_zero_that_falls_on_a_sample_is_found_by_signs_too() -> None:
+    sample = 0.5 * 2 * math.pi / SAMPLES + 700 * (2 * math.pi / SAMPLES)
+    linkage = replace(crank_as_pendulum().linkage, ground_angle=0.0)
+    scene = replace(crank_as_pendulum(Torsion.at(O2=(2.0, sample, 0.0))), linkage=linkage)
+    (rest,) = equilibrium(scene).found
+    assert rest.place.theta_2 == pytest.approx(sample, abs=1e-9)
