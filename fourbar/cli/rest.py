@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
     """Find where a linkage stays by itself, stable or not, how fast it swings there, and what holds it elsewhere."""
     from fourbar.show import equilibrium as shown
+    from fourbar.show.progress import running
     from fourbar.studies.equilibrium import equilibrium as found
 
-    with opened(scene) as described:
+    with opened(scene) as described, running("the boxes are halved"):
         result = found(described)
     printed_to((shown.json_text if as_json else shown.printed)(described.title, result), out)
 

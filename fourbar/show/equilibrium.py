@@ -89,6 +89,10 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def _finite_parts(of: Any) -> dict[str, Any]:
+    return {name: _finite(value) for name, value in of._asdict().items()}
+
+
 def _number(value: float) -> str:
     return f"{value:.6g}" if math.isfinite(value) else "-"
 
@@ -97,7 +101,7 @@ def json_text(title: str, found: Equilibria) -> str:
     """One object, SI and rad."""
 
     def ends(of: tuple[RestPosition, RestPosition] | None) -> Any:
-        return None if of is None else [place._asdict() for place in of]
+        return None if of is None else [_finite_parts(place) for place in of]
 
     def column(values: Any) -> Any:
         return None if values is None else [*map(_finite, values.tolist())]
@@ -109,14 +113,14 @@ def json_text(title: str, found: Equilibria) -> str:
         "proven": found.proven,
         "equilibria": [
             {
-                **{name: _finite(value) for name, value in each._asdict().items()},
-                **{"place": each.place._asdict(), "held": ends(each.held)},
+                **_finite_parts(each),
+                **{"place": _finite_parts(each.place), "held": ends(each.held)},
             }
             for each in found.found
         ],
         "indifferent": [ends(each) for each in found.indifferent],
         "held": [ends(each) for each in found.held],
-        "not_decided": [place._asdict() for place in found.not_decided],
+        "not_decided": [_finite_parts(place) for place in found.not_decided],
         "positions": {
             "drive_bar": at.drive_bar,
             "status": list(at.status),

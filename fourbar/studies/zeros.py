@@ -30,8 +30,8 @@ FINEST = 1e-6
 """rad; a box as narrow that is not decided stays so: there the function and its derivative vanish both."""
 AT_CHANGE_POINT = 1e-4
 """rad; nearer to a change point nothing is decided: the curve crosses itself there."""
-MANY = 20_000
-"""Boxes left; a function that nearly vanishes along the curve has more, and is given up."""
+MANY = 10_000
+"""Boxes evaluated; a function that nearly vanishes along the curve needs more, and is given up."""
 STEPS = 6
 """Newton's steps from a unique zero to its last digits."""
 MARGIN = 1e-12
@@ -76,12 +76,14 @@ def zeros(
     radii = np.broadcast_to([0.5 * (x[1] - x[0]) * (1.0 + MARGIN) for x in ends], centres.shape)
     solved: list[tuple[Array, Array, Array]] = []  # the zero, and centre and radius of where it is alone
     undecided: list[Array] = []
+    evaluated = 0
     while len(centres):
         kept = _closes(lengths, centres, radii) & inside(centres, radii)
         for point in change_points:
             kept &= ~(np.abs(_wrapped(centres - point)) + radii < AT_CHANGE_POINT).all(axis=1)
         centres, radii = centres[kept], radii[kept]
-        if len(centres) > MANY:
+        evaluated += len(centres)
+        if evaluated > MANY:
             return Zeros(np.array([each[0] for each in solved]).reshape(-1, 2), np.empty((0, 2)), False)
         split = np.zeros(len(centres), dtype=bool)
         newton = _Newton(own, function, centres, 2.0 * radii)

@@ -293,6 +293,9 @@ def test_the_command_prints_what_python_finds(tmp_path: Path, capsys: pytest.Cap
     assert kept["proven"] and kept["positions"]["theta_2"] == found.positions.theta_2.tolist()
     friction = MODELS.parent / "tests" / "counterexamples" / "dry_friction_on_a_crank_at_rest.toml"
     assert status(["equilibrium", str(friction)]) == 0 and "friction alone holds" in capsys.readouterr().out
+    kite = MODELS.parent / "tests" / "counterexamples" / "kite_with_A_on_O4.toml"  # which has no theta_4 there
+    assert status(["equilibrium", str(kite), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["not_decided"][0]["theta_4"] is None
     bad = tmp_path / "bad.toml"
     bad.write_text(
         '[lengths]\nground = "1 m"\ninput = "1.5 m"\ncoupler = "1 m"\noutput = "0.2 m"\n[motion]\ntheta_2 = "180 deg"\n'
