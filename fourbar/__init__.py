@@ -58,6 +58,8 @@ if _TYPE_CHECKING:
     from fourbar.studies.derivatives import Sensitivity as Sensitivity
     from fourbar.studies.derivatives import sensitivity as sensitivity
     from fourbar.studies.enclosure import extremes as extremes
+    from fourbar.studies.equilibrium import equilibrium as equilibrium
+    from fourbar.studies.ratio import ratio as ratio
     from fourbar.studies.spread import tolerances as tolerances
     from fourbar.studies.study import Study as Study
     from fourbar.studies.study import vary as vary
@@ -70,6 +72,8 @@ _ON_FIRST_USE = {
     **{name: "fourbar.studies.derivatives" for name in ("Sensitivity", "sensitivity")},
     **{name: "fourbar.studies.study" for name in ("Study", "vary")},
     "extremes": "fourbar.studies.enclosure",
+    "equilibrium": "fourbar.studies.equilibrium",
+    "ratio": "fourbar.studies.ratio",
     "tolerances": "fourbar.studies.spread",
     "in_units": "fourbar.show.notebook",
     "units": "fourbar.show.units",

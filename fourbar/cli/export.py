@@ -17,6 +17,7 @@ from fourbar.cli.given import (
     units_option,
     waiting,
 )
+from fourbar.cli.rest import in_place_of_loop
 from fourbar.errors import InputError
 
 if TYPE_CHECKING:
@@ -94,8 +95,11 @@ def animate(
     show_default=True,
     help="What loads it: settings that suit it, and where its numbers stand.",
 )
+@click.option("--mimic", is_flag=True, help="Joints that follow the input in place of the loop (see `fourbar ratio`).")
 @out_option
-def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, simulator: str, out: Path) -> None:
+def mjcf(
+    scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, simulator: str, mimic: bool, out: Path
+) -> None:
     """Write a scene, or a linkage of uniform bars, as MJCF that runs on its own in MuJoCo and its kin."""
     from fourbar import mjcf as writer
 
@@ -105,12 +109,14 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
         if omega is not None:
             raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
         with opened(scene) as described:
-            printed_to(writer.mjcf_for(described, simulator), out)
+            text = writer.mjcf_for(described, simulator)
+            printed_to(in_place_of_loop(text, described) if mimic else text, out)
         return
     assert lengths is not None
     speed = {} if omega is None else {"omega": number_of("--omega", omega, "rad/s")}
     made = writer.scene_from_lengths(*lengths_of(lengths), **speed)
-    printed_to(writer.mjcf_for(made, simulator), out)
+    text = writer.mjcf_for(made, simulator)
+    printed_to(in_place_of_loop(text, made) if mimic else text, out)
     for line in writer.defaults_used(made):
         click.echo(line)
 

@@ -102,6 +102,8 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         "save": (fourbar.save, (scene, "a.toml")),
         "vary": (fourbar.vary, (scene, {"lengths.input": [0.1]})),
         "vary, a value": (lambda x: fourbar.solve(fourbar.vary(scene, {"lengths.input": x})), (0.1,)),
+        "equilibrium": (fourbar.equilibrium, (scene,)),
+        "ratio": (fourbar.ratio, (scene, 1)),
         "extremes": (fourbar.extremes, (scene, ("torque",))),
         "tolerances": (
             lambda *x: fourbar.tolerances(fourbar.Scene(link, scene.motion, tolerances=x[0]), samples=x[1], seed=x[2]),

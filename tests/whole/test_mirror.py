@@ -14,7 +14,7 @@ SOURCES = {"fourbar": ROOT / "fourbar", "validation": ROOT / "validation" / "fou
 """Folder of tests, and folder of the modules that it mirrors."""
 JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
-    "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given; fourbar/show: progress tables words",
+    "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given rest; fourbar/show: progress tables words",
     "whole/test_exits.py": "fourbar: errors writing; validation: cli; validation/report: terminal; "
     "validation/lab/stress: mutants",
     "whole/test_kills.py": "validation/run: pool run selection store; validation/scenes: suites",
@@ -25,6 +25,10 @@ JUDGED_BY = {
     "numbers pin_friction pins torsion viscous",
     "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text units",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
+    "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve holding zeros; fourbar/show: equilibrium; "
+    "fourbar/formulas: closed_curve",
+    "fourbar/studies/test_ratio.py": "fourbar/show: ratio; fourbar/mjcf: mimic",
+    "validation/lab/test_mimic.py": "validation/engines/mujoco: mimic",
     "fourbar/formulas/test_mobility.py": "fourbar/formulas: circuits linkage_type",
     "fourbar/test_solve.py": "fourbar: linkage quantities solution; "
     "fourbar/scene: motion scene; fourbar/evaluation: blocks case stages withheld",
