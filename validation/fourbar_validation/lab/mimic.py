@@ -15,7 +15,7 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.studies.ratio import MOST, ratio
 from fourbar.writing import write_text
-from fourbar_validation.compare.error import magnitude
+from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.places import MODELS, PROGRAM
 from fourbar_validation.report.machine import machine, versions
