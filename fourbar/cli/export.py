@@ -20,7 +20,12 @@ from fourbar.cli.given import (
 from fourbar.errors import InputError
 
 if TYPE_CHECKING:
+    from fourbar.mjcf.document import Drive
     from fourbar.solution import Conversion
+
+without_loads_option = click.option(
+    "--without-loads", is_flag=True, help="Leave the loads out: the form has none, your program applies them."
+)
 
 
 @click.command()
@@ -94,8 +99,17 @@ def animate(
     show_default=True,
     help="What loads it: settings that suit it, and where its numbers stand.",
 )
+@click.option(
+    "--drive",
+    type=click.Choice(["flywheel", "motor", "none"]),
+    default="flywheel",
+    show_default=True,
+    help="flywheel keeps omega_2; for a controller of your own: motor, whose ctrl is the drive's couple, or none.",
+)
 @out_option
-def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, simulator: str, out: Path) -> None:
+def mjcf(
+    scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, simulator: str, drive: "Drive", out: Path
+) -> None:
     """Write a scene, or a linkage of uniform bars, as MJCF that runs on its own in MuJoCo and its kin."""
     from fourbar import mjcf as writer
 
@@ -105,12 +119,12 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
         if omega is not None:
             raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
         with opened(scene) as described:
-            printed_to(writer.mjcf_for(described, simulator), out)
+            printed_to(writer.mjcf_for(described, simulator, drive), out)
         return
     assert lengths is not None
     speed = {} if omega is None else {"omega": number_of("--omega", omega, "rad/s")}
     made = writer.scene_from_lengths(*lengths_of(lengths), **speed)
-    printed_to(writer.mjcf_for(made, simulator), out)
+    printed_to(writer.mjcf_for(made, simulator, drive), out)
     for line in writer.defaults_used(made):
         click.echo(line)
 
@@ -118,21 +132,23 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
 @click.command()
 @scene_argument
 @click.option("--for", "reader", type=click.Choice(["gazebo", "drake"]), default="gazebo", show_default=True)
+@without_loads_option
 @out_option
-def sdf(scene: Path, reader: str, out: Path) -> None:
+def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
     """Write a scene as SDF, the loop closed by a fourth joint (Gazebo) or a ball constraint (Drake)."""
     from fourbar.mjcf.sdf import sdf as written
 
     with opened(scene) as described:
-        printed_to(written(described, reader), out)
+        printed_to(written(described, reader, without_loads=without_loads), out)
 
 
 @click.command()
 @scene_argument
+@without_loads_option
 @out_option
-def usd(scene: Path, out: Path) -> None:
+def usd(scene: Path, without_loads: bool, out: Path) -> None:
     """Write a scene as USD text (.usda) for Newton, the loop closed by a fourth revolute joint."""
     from fourbar.mjcf.usd import usd as written
 
     with opened(scene) as described:
-        printed_to(written(described), out)
+        printed_to(written(described, without_loads=without_loads), out)
