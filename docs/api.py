@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import fourbar
-from fourbar.quantities import QUANTITIES
+from fourbar.quantities import QUANTITIES, Quantities
 
 TARGET = Path(__file__).with_suffix(".md")
 HEAD = """\
@@ -16,18 +16,23 @@ HEAD = """\
 Everything that `dir(fourbar)` shows; SI and radians everywhere. `import fourbar` loads numpy alone: what needs
 more (files, effects, drawings) is loaded on first use.
 
-`scene.plot(figure="overview", position=..., branches=..., units=...)` draws a figure that a notebook shows and
-`.save("a.pdf")` writes; a scene and a solution as the last line of a cell show themselves.
+`scene.plot()` draws a figure that a notebook shows and `.save("a.pdf")` writes; a scene and every result as the last
+line of a cell show themselves.
 
 *Written by `python docs/api.py` from the docstrings.*
 """
 MEANINGS = {quantity.name: quantity for quantity in QUANTITIES}
-METHODS = {"Solution": ("status", "assembled", "evaluated", "to_csv", "to_pandas"), "Bar": ("moment_of_inertia",)}
+METHODS = {
+    "Solution": ("status", "assembled", "evaluated", "to_csv", "to_pandas"),
+    "Bar": ("moment_of_inertia",),
+    "Scene": ("plot",),
+    "Sensitivity": ("of", "value", "to_pandas"),
+}
 """Methods and properties that are shown with their class."""
 
 
 def fields(kind: type) -> list[tuple[str, str, str]]:
-    """Name, type and docstring of the fields of a class, as its source has them."""
+    """Name, type and docstring of the fields of a class, as its source has them; then the quantities it inherits."""
     body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
     found: list[tuple[str, str, str]] = []
     for statement in body:
@@ -36,7 +41,7 @@ def fields(kind: type) -> list[tuple[str, str, str]]:
         elif found and isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
             name, of, _ = found.pop()
             found.append((name, of, " ".join(str(statement.value.value).split())))
-    return found
+    return found + (fields(Quantities) if Quantities in kind.__bases__ else [])
 
 
 def signature(thing: Any) -> str:
@@ -58,7 +63,7 @@ def signature(thing: Any) -> str:
 def row(name: str, of: str, what: str) -> str:
     """One field as a row of a table; what a quantity is stands in the table of quantities."""
     known = MEANINGS.get(name)
-    what = what or (f"{known.meaning}, {known.unit}" if known else "")
+    what = what or (f"{known.meaning}, {known.unit}".removesuffix(", 1") if known else "")
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in (f"`{name}`", f"`{of}`", what)) + " |"
 
 

@@ -1,67 +1,88 @@
-"""The quantities of a solution, one row each, and the statuses of a position: every other list of them follows."""
+"""The quantities of a solution, one line each, and the statuses of a position: every other list of them follows."""
 
-from typing import NamedTuple
+# ruff: noqa: RUF009 - the lines are fields
+from dataclasses import dataclass, field, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 
 class Quantity(NamedTuple):
-    """One array of a solution."""
+    """One array of a solution, as its line below has it."""
 
     name: str
+    kind: str
+    """scalar, (n,), or vector, (n, 2)."""
     unit: str
     stage: str | None
     """That computes it; None: it is commanded."""
-    kind: str
-    """scalar, (n,), or vector, (n, 2)."""
     meaning: str
     group: str = ""
     """unknown: of the equations of a position, which an engine can be held to; dry friction, pin loads: exists only
     where the scene has dry friction, or friction that depends on the pin forces."""
 
 
-QUANTITIES = tuple(
-    Quantity(*row)
-    for row in (
-        ("theta_2", "rad", None, "scalar", "angle of the input"),
-        ("theta_3", "rad", "position", "scalar", "angle of the coupler", "unknown"),
-        ("theta_4", "rad", "position", "scalar", "angle of the output", "unknown"),
-        ("sin_mu", "1", "position", "scalar", "sin(theta_4 - theta_3), signed like the branch"),
-        ("condition", "1", "position", "scalar", "motion condition |sin_mu|, in (0, 1]; 1 is best"),
-        ("A", "m", "position", "vector", "pin of input and coupler"),
-        ("B", "m", "position", "vector", "pin of coupler and output"),
-        ("G2", "m", "position", "vector", "mass centre of the input"),
-        ("G3", "m", "position", "vector", "mass centre of the coupler"),
-        ("G4", "m", "position", "vector", "mass centre of the output"),
-        ("omega_2", "rad/s", "velocity", "scalar", "angular velocity of the input"),
-        ("omega_3", "rad/s", "velocity", "scalar", "angular velocity of the coupler", "unknown"),
-        ("omega_4", "rad/s", "velocity", "scalar", "angular velocity of the output", "unknown"),
-        ("v_A", "m/s", "velocity", "vector", "velocity of A"),
-        ("v_B", "m/s", "velocity", "vector", "velocity of B"),
-        ("v_G2", "m/s", "velocity", "vector", "velocity of G2"),
-        ("v_G3", "m/s", "velocity", "vector", "velocity of G3"),
-        ("v_G4", "m/s", "velocity", "vector", "velocity of G4"),
-        ("alpha_2", "rad/s^2", "acceleration", "scalar", "angular acceleration of the input"),
-        ("alpha_3", "rad/s^2", "acceleration", "scalar", "angular acceleration of the coupler", "unknown"),
-        ("alpha_4", "rad/s^2", "acceleration", "scalar", "angular acceleration of the output", "unknown"),
-        ("a_A", "m/s^2", "acceleration", "vector", "acceleration of A"),
-        ("a_B", "m/s^2", "acceleration", "vector", "acceleration of B"),
-        ("a_G2", "m/s^2", "acceleration", "vector", "acceleration of G2"),
-        ("a_G3", "m/s^2", "acceleration", "vector", "acceleration of G3"),
-        ("a_G4", "m/s^2", "acceleration", "vector", "acceleration of G4"),
-        ("F12", "N", "force", "vector", "force of ground on the input, at O2", "unknown"),
-        ("F32", "N", "force", "vector", "force of the coupler on the input, at A", "unknown"),
-        ("F43", "N", "force", "vector", "force of the output on the coupler, at B", "unknown"),
-        ("F14", "N", "force", "vector", "force of ground on the output, at O4", "unknown"),
-        ("torque", "N m", "force", "scalar", "couple of ground on the driven bar", "unknown"),
-        ("drive_condition", "1", "force", "scalar", "sine between the two bars that are not driven, in (0, 1]"),
-        ("torque_error", "N m", "error", "scalar", "error bar of the torque"),
-        ("force_error", "N", "error", "scalar", "error bar of the pin forces, of the worst of the four"),
-        ("torque_low", "N m", "force", "scalar", "least torque where dry friction holds a pin at rest", "dry friction"),
-        ("torque_high", "N m", "force", "scalar", "the greatest torque there", "dry friction"),
-        ("friction_residual", "N m", "force", "scalar", "what the solved pin friction leaves", "pin loads"),
-        ("time", "s", None, "scalar", "of a motion law or a free motion"),
-    )
-)
-"""In the order of the fields of `Solution`, which is that of its columns."""
+def _scalar(*line: str | None) -> Any:
+    """Declare a number at each position: unit, stage, meaning and group."""
+    return field(default=None, metadata={"line": ("scalar", *line)})
+
+
+def _vector(*line: str | None) -> Any:
+    """Declare a vector at each position: unit, stage, meaning and group."""
+    return field(default=None, metadata={"line": ("vector", *line)})
+
+
+@dataclass(slots=True, eq=False, kw_only=True)
+class Quantities:
+    """The quantities, one line each; `Solution` inherits them as fields, tables have them in this order.
+
+    The positions are None only where `out` of `solve` named other quantities, which then are all that is wanted.
+    """
+
+    theta_2: Array = _scalar("rad", None, "angle of the input")
+    theta_3: Array = _scalar("rad", "position", "angle of the coupler", "unknown")
+    theta_4: Array = _scalar("rad", "position", "angle of the output", "unknown")
+    sin_mu: Array = _scalar("1", "position", "sin(theta_4 - theta_3), signed like the branch")
+    condition: Array = _scalar("1", "position", "motion condition |sin_mu|, in (0, 1]; 1 is best")
+    A: Array = _vector("m", "position", "pin of input and coupler")
+    B: Array = _vector("m", "position", "pin of coupler and output")
+    G2: Array = _vector("m", "position", "mass centre of the input")
+    G3: Array = _vector("m", "position", "mass centre of the coupler")
+    G4: Array = _vector("m", "position", "mass centre of the output")
+    omega_2: Array | None = _scalar("rad/s", "velocity", "angular velocity of the input")
+    omega_3: Array | None = _scalar("rad/s", "velocity", "angular velocity of the coupler", "unknown")
+    omega_4: Array | None = _scalar("rad/s", "velocity", "angular velocity of the output", "unknown")
+    v_A: Array | None = _vector("m/s", "velocity", "velocity of A")
+    v_B: Array | None = _vector("m/s", "velocity", "velocity of B")
+    v_G2: Array | None = _vector("m/s", "velocity", "velocity of G2")
+    v_G3: Array | None = _vector("m/s", "velocity", "velocity of G3")
+    v_G4: Array | None = _vector("m/s", "velocity", "velocity of G4")
+    alpha_2: Array | None = _scalar("rad/s^2", "acceleration", "angular acceleration of the input")
+    alpha_3: Array | None = _scalar("rad/s^2", "acceleration", "angular acceleration of the coupler", "unknown")
+    alpha_4: Array | None = _scalar("rad/s^2", "acceleration", "angular acceleration of the output", "unknown")
+    a_A: Array | None = _vector("m/s^2", "acceleration", "acceleration of A")
+    a_B: Array | None = _vector("m/s^2", "acceleration", "acceleration of B")
+    a_G2: Array | None = _vector("m/s^2", "acceleration", "acceleration of G2")
+    a_G3: Array | None = _vector("m/s^2", "acceleration", "acceleration of G3")
+    a_G4: Array | None = _vector("m/s^2", "acceleration", "acceleration of G4")
+    F12: Array | None = _vector("N", "force", "force of ground on the input, at O2", "unknown")
+    F32: Array | None = _vector("N", "force", "force of the coupler on the input, at A", "unknown")
+    F43: Array | None = _vector("N", "force", "force of the output on the coupler, at B", "unknown")
+    F14: Array | None = _vector("N", "force", "force of ground on the output, at O4", "unknown")
+    torque: Array | None = _scalar("N m", "force", "couple of ground on the driven bar", "unknown")
+    drive_condition: Array | None = _scalar("1", "force", "sine between the two bars that are not driven, in (0, 1]")
+    torque_error: Array | None = _scalar("N m", "error", "error bar of the torque: what rounding makes it scatter by")
+    force_error: Array | None = _scalar("N", "error", "error bar of the pin forces, of the worst of the four")
+    torque_low: Array | None = _scalar("N m", "force", "least torque while dry friction holds a pin", "dry friction")
+    torque_high: Array | None = _scalar("N m", "force", "greatest then; otherwise both are torque", "dry friction")
+    friction_residual: Array | None = _scalar("N m", "force", "largest remaining |mu r |F| - couple|", "pin loads")
+    time: Array | None = _scalar("s", None, "of a motion law or a free motion, which ends at a limit position")
+
+
+QUANTITIES = tuple(Quantity(each.name, *each.metadata["line"]) for each in fields(Quantities))
 UNITS = {q.name: q.unit for q in QUANTITIES}
 STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None}
 """Every evaluated quantity and the stage that computes it."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import require
-from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, STATUS_NAMES, UNITS, is_scalar
+from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, STATUS_NAMES, UNITS, Quantities, is_scalar
 from fourbar.writing import between, data_frame, extent, listed, write_text
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ DEGREES: Conversion = {"rad": ("deg", 180.0 / math.pi)}
 
 
 @dataclass(slots=True, eq=False)
-class Solution:
+class Solution(Quantities):
     """The answer of the formulas at n positions, or at n positions of each of m linkages, SI units and radians.
 
     Scalars have shape (n,), vectors (n, 2), of a study (m, n) and (m, n, 2); NaN marks a position where a
@@ -50,56 +50,6 @@ class Solution:
     a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN."""
     branch: NDArray[np.int8]
     """+1 open, -1 crossed."""
-    theta_2: Array
-    # the positions are None only where `out` named other quantities, which then are all that is wanted
-    theta_3: Array = None  # type: ignore[assignment]
-    theta_4: Array = None  # type: ignore[assignment]
-    sin_mu: Array = None  # type: ignore[assignment]
-    """sin(theta_4 - theta_3), signed like the branch."""
-    condition: Array = None  # type: ignore[assignment]
-    """Motion condition |sin(theta_4 - theta_3)|, in (0, 1]; 1 is best."""
-    A: Array = None  # type: ignore[assignment]
-    B: Array = None  # type: ignore[assignment]
-    G2: Array = None  # type: ignore[assignment]
-    G3: Array = None  # type: ignore[assignment]
-    G4: Array = None  # type: ignore[assignment]
-    omega_2: Array | None = None
-    omega_3: Array | None = None
-    omega_4: Array | None = None
-    v_A: Array | None = None
-    v_B: Array | None = None
-    v_G2: Array | None = None
-    v_G3: Array | None = None
-    v_G4: Array | None = None
-    alpha_2: Array | None = None
-    alpha_3: Array | None = None
-    alpha_4: Array | None = None
-    a_A: Array | None = None
-    a_B: Array | None = None
-    a_G2: Array | None = None
-    a_G3: Array | None = None
-    a_G4: Array | None = None
-    F12: Array | None = None
-    F32: Array | None = None
-    F43: Array | None = None
-    F14: Array | None = None
-    torque: Array | None = None
-    """Couple of ground on the driven bar, N m."""
-    drive_condition: Array | None = None
-    """|sine| between the two bars that are not driven, in (0, 1]."""
-    torque_error: Array | None = None
-    """Error bar of the torque, N m: what rounding makes it scatter by."""
-    force_error: Array | None = None
-    """Error bar of the pin forces, N: the same for the worst of the four."""
-    torque_low: Array | None = None
-    """Where dry friction holds a pin at rest the least torque that may act, else the torque itself, N m."""
-    torque_high: Array | None = None
-    """The greatest one; NaN where friction jams the motion that would begin."""
-    friction_residual: Array | None = None
-    """Largest |mu r |F| - couple| that the solved pin friction leaves, N m."""
-
-    time: Array | None = None
-    """Of a motion law, or of a free motion, s; the latter ends where the linkage stops at a limit position."""
     points: dict[str, Array] = field(default_factory=dict, init=False)
     """Positions of the scene's own points by name, (n, 2), m."""
     velocity: dict[str, Array] = field(default_factory=dict, init=False)
@@ -109,7 +59,7 @@ class Solution:
     ground: tuple[Any, Any] | None = field(default=None, init=False)
     """Length and angle of the ground bar, m and rad; of a study (m, 1) each where they vary."""
     stopped_at: float | None = field(default=None, init=False)
-    """When a free motion reached that limit position or change point, s; None: it did not."""
+    """When a free motion reached a limit position or change point, s; None: it did not."""
 
     def __len__(self) -> int:
         return len(self.theta_2)

@@ -25,7 +25,7 @@ def basis_of(scene: Scene, answer: Answer) -> Solution | None:
     theta_2, known = answer.at.theta_2, answer.quantities
     theta = {2: theta_2, 3: known["theta_3"], 4: known["theta_4"]}
     code = np.full(len(theta_2), OK, dtype=np.uint8)
-    basis = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2, theta[3], theta[4])
+    basis = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2)
     for name in UNITS:
         if name in known:
             setattr(basis, name, known[name])
