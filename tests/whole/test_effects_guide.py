@@ -200,10 +200,10 @@ def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
 
 
 NEED_NO_LINE = {
-    "docs/api.md", "docs/examples/effects-cost.md", "fourbar/show/page/acting.js",
-    "fourbar/show/plot/symbols.py", "validation/fourbar_validation/lab/stress/mutation/specimens.py",
-}  # fmt: skip
-"""Where every effect is named and a new one need not be: written by a program, or for what is drawn."""
+    *("docs/api.md", "docs/examples/effects-cost.md"),
+    "validation/fourbar_validation/lab/stress/mutation/specimens.py",
+}
+"""Where every effect is named and a new one need not be: written by a program, or what faults are planted in."""
 
 
 def test_the_guide_names_every_file_that_names_every_effect() -> None:
