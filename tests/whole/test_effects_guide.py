@@ -216,3 +216,15 @@ def test_the_guide_names_every_file_that_names_every_effect() -> None:
             found += [name] if all(re.search(rf"\b({key}|{kind})\b", text) for key, kind in kinds.items()) else []
     assert len(found) > 8
     assert not [name for name in found if name not in NEED_NO_LINE and name.removeprefix("validation/") not in PAGE]
+
+
+def test_the_places_that_the_guide_to_a_quantity_names_are_there() -> None:
+    root = Path(__file__).parents[2]
+    page = (root / "docs" / "adding-a-quantity.md").read_text(encoding="utf-8")
+    files = set(re.findall(r"`((?:fourbar|fourbar_validation|docs|tests)/[\w/-]+\.\w+)`", page))
+    texts = {
+        name: (root / ("validation" if name.startswith("fourbar_v") else ".") / name).read_text() for name in files
+    }
+    for name, word in (("quantities", "_scalar("), ("stages", "OF_BARS"), ("loop", "NOT_ANSWERED"), ("basis", "v_A"),
+                       ("balls", "omega[k]"), ("results-format", "| `v_A` |")):  # fmt: skip
+        assert any(file.rpartition("/")[2].startswith(name) and word in text for file, text in texts.items()), name
