@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.errors import InputError, expect
 from fourbar.linkage import require
-from fourbar.quantities import NOT_ASSEMBLED, STATUS_NAMES, UNITS, Quantities, is_scalar
+from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, STATUS_NAMES, UNITS, Quantities, is_scalar
+from fourbar.writing import between, data_frame, extent, listed, write_text
 
 Array = NDArray[np.float64]
 
@@ -55,11 +56,24 @@ class Solution(Quantities):
     """Their velocities, m/s."""
     acceleration: dict[str, Array] = field(default_factory=dict, init=False)
     """Their accelerations, m/s^2."""
+    ground: tuple[Any, Any] | None = field(default=None, init=False)
+    """Length and angle of the ground bar, m and rad; of a study (m, 1) each where they vary."""
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached a limit position or change point, s; None: it did not."""
 
     def __len__(self) -> int:
         return len(self.theta_2)
+
+    def __repr__(self) -> str:
+        """Say in ten lines what it holds."""
+        counts = zip(STATUS_NAMES, np.bincount(self.status_code.ravel(), minlength=len(STATUS_NAMES)), strict=True)
+        shown = parts_of({name: values_of(self, name) for name in _quantities(self)}, scalars=("theta_2", "torque"))
+        lines = [
+            f"Solution {self.title!r}: {extent(self.theta_2)}, drive on bar {self.drive_bar}",
+            "status: " + ", ".join(f"{count} {name}" for name, count in counts if count),
+            *(f"{name}: {between(values)} {unit_of(name.strip('|'))}" for name, values in shown.items()),
+        ]
+        return "\n".join([*lines, listed("evaluated", self.evaluated())])
 
     @property
     def assembled(self) -> NDArray[np.bool_]:
@@ -83,8 +97,6 @@ class Solution(Quantities):
         degrees : theta in deg.
         units : other units, as `fourbar.units("mm N.mm")` makes them; a heading names a unit that is not SI.
         """
-        from fourbar.writing import write_text
-
         expect("path", path, str, Path, type(None))
         expect("degrees", degrees, bool)
         text = csv_text(self, {**require_units(units), **(DEGREES if degrees else SI)})
@@ -98,12 +110,25 @@ class Solution(Quantities):
 
         Raises DependencyError where pandas is not installed.
         """
-        try:
-            from pandas import DataFrame
-        except ImportError:
-            raise DependencyError(f"to_pandas needs pandas: {installing('pandas')}") from None
         known = {name: values for name, values in scalars(self, require_units(units)).items() if values is not None}
-        return DataFrame({**leading(self), **known})
+        return data_frame({**leading(self), **known})
+
+
+def parts(name: str, values: Array) -> dict[str, Array]:
+    """Split a quantity into scalars: components, and the magnitude of a pin force."""
+    if is_scalar(name):
+        return {name: values}
+    found = {f"{name}_x": values[..., 0], f"{name}_y": values[..., 1]}
+    return {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **found} if name in PIN_FORCES else found
+
+
+def parts_of(values: Mapping[str, Array | None], scalars: tuple[str, ...]) -> dict[str, Array]:
+    """Of the quantities that have values the scalars named and the magnitudes of the pin forces."""
+    found: dict[str, Array] = {}
+    for name in (*scalars, *PIN_FORCES):
+        if (own := values.get(name)) is not None:
+            found |= {part: array for part, array in parts(name, own).items() if part[-2:] not in ("_x", "_y")}
+    return found
 
 
 def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:

@@ -21,7 +21,12 @@ from fourbar.cli.rest import in_place_of_loop
 from fourbar.errors import InputError
 
 if TYPE_CHECKING:
+    from fourbar.mjcf.document import Drive
     from fourbar.solution import Conversion
+
+without_loads_option = click.option(
+    "--without-loads", is_flag=True, help="Leave the loads out: the form has none, your program applies them."
+)
 
 
 @click.command()
@@ -96,9 +101,22 @@ def animate(
     help="What loads it: settings that suit it, and where its numbers stand.",
 )
 @click.option("--mimic", is_flag=True, help="Joints that follow the input in place of the loop (see `fourbar ratio`).")
+@click.option(
+    "--drive",
+    type=click.Choice(["flywheel", "motor", "none"]),
+    default="flywheel",
+    show_default=True,
+    help="flywheel keeps omega_2; for a controller of your own: motor, whose ctrl is the drive's couple, or none.",
+)
 @out_option
 def mjcf(
-    scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, simulator: str, mimic: bool, out: Path
+    scene: Path | None,
+    lengths: tuple[str, ...] | None,
+    omega: str | None,
+    simulator: str,
+    drive: "Drive",
+    mimic: bool,
+    out: Path,
 ) -> None:
     """Write a scene, or a linkage of uniform bars, as MJCF that runs on its own in MuJoCo and its kin."""
     from fourbar import mjcf as writer
@@ -109,13 +127,13 @@ def mjcf(
         if omega is not None:
             raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
         with opened(scene) as described:
-            text = writer.mjcf_for(described, simulator)
+            text = writer.mjcf_for(described, simulator, drive)
             printed_to(in_place_of_loop(text, described) if mimic else text, out)
         return
     assert lengths is not None
     speed = {} if omega is None else {"omega": number_of("--omega", omega, "rad/s")}
     made = writer.scene_from_lengths(*lengths_of(lengths), **speed)
-    text = writer.mjcf_for(made, simulator)
+    text = writer.mjcf_for(made, simulator, drive)
     printed_to(in_place_of_loop(text, made) if mimic else text, out)
     for line in writer.defaults_used(made):
         click.echo(line)
@@ -124,21 +142,23 @@ def mjcf(
 @click.command()
 @scene_argument
 @click.option("--for", "reader", type=click.Choice(["gazebo", "drake"]), default="gazebo", show_default=True)
+@without_loads_option
 @out_option
-def sdf(scene: Path, reader: str, out: Path) -> None:
+def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
     """Write a scene as SDF, the loop closed by a fourth joint (Gazebo) or a ball constraint (Drake)."""
     from fourbar.mjcf.sdf import sdf as written
 
     with opened(scene) as described:
-        printed_to(written(described, reader), out)
+        printed_to(written(described, reader, without_loads=without_loads), out)
 
 
 @click.command()
 @scene_argument
+@without_loads_option
 @out_option
-def usd(scene: Path, out: Path) -> None:
+def usd(scene: Path, without_loads: bool, out: Path) -> None:
     """Write a scene as USD text (.usda) for Newton, the loop closed by a fourth revolute joint."""
     from fourbar.mjcf.usd import usd as written
 
     with opened(scene) as described:
-        printed_to(written(described), out)
+        printed_to(written(described, without_loads=without_loads), out)

@@ -27,7 +27,8 @@ def with_mimic(model: str, scene: Scene, about: float, joint_A: Sequence[float],
     joint_A, theta_4 : coefficients of theta_3 - theta_2 and of theta_4 (rad), lowest power first, five at most.
     """
     root, start = ET.fromstring(model), at_start(scene)
-    root.insert(0, ET.Comment(f" {NOTES['mjcf']['mimic']} "))
+    for line in reversed(NOTES["mimic"].values()):
+        root.insert(0, ET.Comment(f" {line} "))
     for body in list(root.iter("body")):  # they only carried the closure; its sites stay, and show what it is open by
         for pad in [each for each in body.findall("body") if each.get("name", "").endswith("_pad")]:
             body.remove(pad)

@@ -110,3 +110,18 @@ class Motion:
             raise InputError("motion.law", self.law.ends, "stands alone: it gives theta_2, omega_2 and alpha_2")
         if self.through not in ("sign", "follow"):
             raise InputError("motion.through", self.through, 'must be "sign" or "follow"')
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Motion):
+            return NotImplemented
+        one, two = self.theta_2, other.theta_2
+        if isinstance(one, np.ndarray) or isinstance(two, np.ndarray):
+            return bool(np.array_equal(one, two)) and self._rest() == other._rest()  # type: ignore[arg-type]
+        return one == two and self._rest() == other._rest()
+
+    def __hash__(self) -> int:
+        return hash(self._rest())
+
+    def _rest(self) -> tuple[object, ...]:
+        """Everything but the angles."""
+        return (self.omega_2, self.alpha_2, self.branch, self.through, self.free, self.law)

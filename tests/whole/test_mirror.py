@@ -38,7 +38,7 @@ JUDGED_BY = {
     "fourbar/studies/test_derivatives.py": "fourbar/show: influence",
     "fourbar/studies/test_enclosure.py": "fourbar/studies: interval; fourbar/show: extremes",
     # parts of one document or picture
-    "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: defaults document effects model notes settings",
+    "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: defaults document effects model settings",
     "fourbar/mjcf/test_simulators.py": "fourbar/mjcf: assembly sdf usd",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_notebook.py": "fourbar/files: new; fourbar/show: drawing",

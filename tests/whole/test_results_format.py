@@ -32,7 +32,7 @@ from tests.support.scenes import crank_rocker
 
 PAGE = (Path(__file__).parents[2] / "docs" / "results-format.md").read_text()
 NOT_QUANTITIES = (
-    *("title", "drive_bar", "status_code", "branch", "stopped_at"),
+    *("title", "drive_bar", "status_code", "branch", "ground", "stopped_at"),
     *("points", "velocity", "acceleration"),
 )
 OF_A_SCENE = ("assembled", "undecided", "torque_inertia")

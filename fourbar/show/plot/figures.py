@@ -144,23 +144,7 @@ def drawn(
     units: Conversion = SI,
     dimensions: bool = False,
 ) -> Drawing:
-    """Draw a figure of a scene for a notebook (`scene.plot()`).
-
-    Parameters
-    ----------
-    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "points", "torque",
-        "forces", "hodograph", "energy", "transmission", "freebody", "sensitivity".
-    position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
-    branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
-    units : in which numbers are drawn; left out: SI with the prefix that suits. Angles are in degrees.
-    dimensions : write the lengths of the bars at them.
-
-    Raises
-    ------
-    InputError : unknown figure or choice of branches; a figure of forces without omega_2.
-    NotAssembledError : there is no position to draw.
-    DependencyError : matplotlib is missing.
-    """
+    """Draw a figure of a scene for a notebook: `Scene.plot`, which says the parameters."""
     painter, size = _painter(scene, figure, branches)
     require_units(units)
     position = None if position is None else require("position", position)

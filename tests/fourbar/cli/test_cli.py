@@ -324,6 +324,15 @@ def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> No
     scene = scene_from_lengths(0.3, 0.1, 0.25, 0.22, omega=2.0 * math.pi)
     assert (code, err) == (HOLDS, "") and out.splitlines() == defaults_used(scene)
     assert (tmp_path / "b.xml").read_text() == mjcf_for(scene)
+    assert run("mjcf", MODELS / "thesis.toml", "--drive", "motor", "-o", tmp_path / "c.xml")[0] == HOLDS
+    assert (tmp_path / "c.xml").read_text() == mjcf_for(load(MODELS / "thesis.toml"), drive="motor")
+
+
+@pytest.mark.parametrize("form", ["sdf", "usd"])
+def test_sdf_and_usd_name_the_loads_that_they_leave_out(form: str, tmp_path: Path, run: Fourbar) -> None:
+    code, _, err = run(form, MODELS / "crank_rocker.toml", "-o", tmp_path / "a")
+    assert code == BAD_INPUT and "loads (here on bar 3, bar 4)" in err and "--without-loads" in err
+    assert run(form, MODELS / "crank_rocker.toml", "--without-loads", "-o", tmp_path / "a")[0] == HOLDS
 
 
 def test_plot_and_animate_write_what_their_ending_says(tmp_path: Path, run: Fourbar) -> None:
