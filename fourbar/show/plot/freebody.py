@@ -13,7 +13,7 @@ from fourbar.effects.actions import bodies
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.linkage import mass_centre, pin_name
+from fourbar.show.plot.mechanism import mass_centre, pin_name
 from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, HEADED, INK, MUTED, OPEN, force_name, quantity, unit_for
 from fourbar.show.plot.symbols import components, place_of
 from fourbar.show.plot.view import Recorder, View, one

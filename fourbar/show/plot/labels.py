@@ -12,6 +12,7 @@ from fourbar.show.plot.style import INK
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -51,6 +52,20 @@ class Labels:
         A broad line (`width` in typographic points) counts by what of it would be covered.
         """
         self.lines.append((axes, list(points), width))
+
+    def beside(self) -> "list[Annotation]":
+        """Write every label at once, each outwards from its point: what moves is not searched a free spot for."""
+        written = []
+        for label in self.wanted:
+            dx, dy = (p - q for p, q in zip(label.at, label.shun, strict=True))
+            away = max(math.hypot(dx, dy), 1e-300)
+            side = "center" if abs(dx) < 0.5 * away else "left" if dx > 0.0 else "right"
+            text = label.axes.annotate(
+                label.text, label.at, (8.0 * dx / away, 11.0 * dy / away), textcoords="offset points", ha=side,
+                va="center", size=label.size, color=label.colour, zorder=9, annotation_clip=False,
+            )  # fmt: skip
+            written.append(text)
+        return written
 
     def settle(self, figure: "Figure") -> None:
         """Place every label once the layout is final: the first free spot, nearest first."""

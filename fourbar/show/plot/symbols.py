@@ -112,7 +112,7 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
                 1j * np.linspace(0.0, math.tau, 60)
             )
         _line(axes, drawn, points, colour, 2.2 if symbol.kind == "flywheel" else 1.2)
-        drawn.label = components(points[-1])
+        drawn.label, drawn.away = components(points[-1]), 1.0
     return drawn
 
 
