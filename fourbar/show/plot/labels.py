@@ -16,9 +16,11 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
-REACH = (7.0, 11.0, 16.0, 23.0, 32.0)
+REACH = (7.0, 11.0, 16.0, 23.0, 32.0, 44.0)
 """Distances from the point to the label's edge that are tried, typographic points."""
 DIRECTIONS = 16
+LED = 15.0
+"""A label further away than this is led to its point by a thin line, typographic points."""
 
 
 @dataclass(slots=True)
@@ -94,7 +96,11 @@ class Labels:
             boxes = [box for owner, box in taken if owner is axes]
             centre = _spot((x, y), away, half, dots, boxes, per_point, label.dots_clear, _inside(axes))
             taken.append((axes, (centre[0] - half[0], centre[1] - half[1], centre[0] + half[0], centre[1] + half[1])))
-            text.set_position(tuple(axes.transData.inverted().transform(centre)))
+            to_data = axes.transData.inverted().transform
+            text.set_position(tuple(to_data(centre)))
+            edge = np.clip((x, y), *np.reshape(taken[-1][1], (2, 2)))
+            if math.dist(edge, (x, y)) > (LED + label.dots_clear) * per_point:
+                axes.plot(*zip(label.at, to_data(edge), strict=True), color=label.colour, lw=0.5, zorder=8.5)
 
 
 def _inside(axes: "Axes") -> Box:

@@ -1,6 +1,8 @@
 """The linkage drawn to scale over the paths of its points, and coupler curves."""
 
 import math
+from collections.abc import Iterator
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +17,12 @@ from fourbar.solution import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
+    *((colour, "-") for colour in ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A")),
+    *(("#8A3B78", dashes) for dashes in ((0, (5, 1.5)), (0, (1.4, 1.4)))),
+)
+"""Colours and dashes, one after the other."""
 
 
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
@@ -77,29 +85,21 @@ def paths(view: View) -> list[tuple[Array, str, Any, str]]:
 
 
 def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
-    """Paths of points along the coupler's line and off it, from one full sweep."""
-    sweep = view.sweep
-    along = sweep.B - sweep.A
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    points = ((0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (1.0, 0.0), (0.5, 0.5), (0.5, -0.5))
-    paths = [sweep.A + u * along + v * across for u, v in points]
+    """Paths of the scene's own points of the coupler; where it has none, of points along its line and off it."""
     factor, unit, _ = scale_of(view)
-    greys = ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A", "#8A3B78", "#8A3B78")
-    for (u, v), path, colour in zip(points, paths, greys, strict=True):
-        dashes = "-" if v == 0.0 else (0, (5, 1.5)) if v > 0 else (0, (1.4, 1.4))
-        lw = 1.8 if (u, v) == (0.5, 0.0) else 1.1
-        name = {0.0: "$A$", 1.0: "$B$"}.get(u, f"{u:g}") if v == 0.0 else f"{u:g}, {v:+g}".replace("-", "−")
+    where, names = pins(view, factor), [point.name for point in view.scene.points if point.bar == 3]
+    for (name, path), (colour, dashes) in zip(_coupler_points(view, names), cycle(COUPLER_CURVES), strict=False):
+        lw = 1.8 if name in (*names, "0.5") else 1.1
         axes.plot(*(factor * path).T, color=colour, lw=lw, ls=dashes, label=name, zorder=3)
-    where = pins(view, factor)
+    faint: dict[str, Any] = {"color": MUTED, "alpha": 0.55, "solid_capstyle": "round", "zorder": 2}
     for ends in ENDS.values():
-        axes.plot(
-            *zip(*(where[end] for end in ends), strict=True),
-            color=MUTED,
-            lw=2.5,
-            alpha=0.55,
-            solid_capstyle="round",
-            zorder=2,
-        )
+        axes.plot(*zip(*(where[end] for end in ends), strict=True), lw=2.5, **faint)
+    for name in names:
+        x, y = (float(x) for x in factor * view.here.points[name][0])
+        axes.plot(*zip(where["A"], (x, y), where["B"], strict=True), lw=0.8, ls=":", **faint)
+        axes.plot([x], [y], "D", ms=4.5, mew=1.2, zorder=8, **{**OPEN, "mec": POINT})
+        labels.keep_off(axes, where["A"], (x, y), where["B"])
+        labels.add(Label(axes, name, (x, y), where["A"], POINT, 8.5, 2.5))
     for name, (x, y) in where.items():
         axes.plot([x], [y], "o", ms=4.5, mew=1.0, zorder=5, **OPEN)
         if name in ("O2", "O4"):
@@ -108,9 +108,19 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     title = f"Coupler curves, {view.branch_name} branch"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
-    of_points: dict[str, Any] = {
-        "title": "point along AB (and off it), in lengths of the coupler",
-        "title_fontsize": 7.5,
-    }
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4, **of_points)
+    heading = "point of the coupler" if names else "point along AB (and off it), in lengths of the coupler"
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4, title=heading, title_fontsize=7.5)
     view.notes.append(f"The linkage is drawn at {view.at}.")
+
+
+def _coupler_points(view: View, names: list[str]) -> Iterator[tuple[str, Array]]:
+    """List the paths that are drawn of the coupler, each with its name."""
+    sweep = view.sweep
+    along = sweep.B - sweep.A
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    if names:
+        yield from (("$A$", sweep.A), ("$B$", sweep.B), *((name, sweep.points[name]) for name in names))
+        return
+    for u, v in ((0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (1.0, 0.0), (0.5, 0.5), (0.5, -0.5)):
+        name = {0.0: "$A$", 1.0: "$B$"}.get(u, f"{u:g}") if v == 0.0 else f"{u:g}, {v:+g}".replace("-", "−")
+        yield name, sweep.A + u * along + v * across

@@ -1,5 +1,7 @@
 """The mechanism at one position, drawn alike for a plot and each frame of a film: bars, pins, points, what acts."""
 
+import cmath
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -8,8 +10,8 @@ from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.show.acting import acting
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.style import BAR_COLOURS, INK, OPEN, largest, length_unit, quantity
-from fourbar.show.plot.symbols import components, place_of
+from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, largest, length_unit, quantity
+from fourbar.show.plot.symbols import Place, components, place_of
 from fourbar.show.plot.view import View
 from fourbar.solution import Solution
 
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 POINT = "#8A3B78"
 """Of the scene's own points."""
+ON_BAR = 1e-3
+"""Of a bar's length: a point that lies nearer to its line is on it, as far as can be seen."""
 
 
 def pins(view: View, factor: float = 1.0) -> dict[str, Point]:
@@ -51,15 +55,15 @@ def draw_mechanism(axes: "Axes", view: View, solution: Solution, index: int, lab
         drawn += axes.plot(*[[v] for v in here], "D", ms=4.5, mew=1.2, zorder=8, **{**OPEN, "mec": POINT})
         labels.keep_off(axes, here, here)
         labels.add(Label(axes, name, here, middle, POINT, 8.5, 2.5))
+    for carrier, corner in _carried(view, place):
+        first, last = (place.pins[pin] for pin in ENDS.get(carrier, ("O2", "O4")))
+        drawn += plate(axes, carrier, (first, corner, last), labels)
     for number in MOVING_BARS:
         bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
         if bar.mass == 0.0:
             continue
         G = place.point(number, bar.to_centre)
-        here, along = components(G), bar.to_centre.real
-        if bar.to_centre.imag != 0.0 or not 0.0 <= along <= bar.length:  # off the bar: tied to it by a line
-            drawn += axes.plot(*zip(where[ENDS[number][0]], here, strict=True), color=colour, lw=0.8, ls=":", zorder=3)
-            labels.keep_off(axes, where[ENDS[number][0]], here)
+        here = components(G)
         drawn += mass_centre(axes, here)
         labels.keep_off(axes, here, here)
         beyond = components(2.0 * G - centre)  # across the bar from its number
@@ -73,6 +77,35 @@ def draw_mechanism(axes: "Axes", view: View, solution: Solution, index: int, lab
             away = components(complex(*shown.label) - shown.away) if shown.away else middle
             labels.add(Label(axes, shown.text, shown.label, away, symbols.COLOURS[symbol.kind], 8.0))
     return drawn
+
+
+def _carried(view: View, place: Place) -> Iterator[tuple[int, complex]]:
+    """List what may lie off its bar: own points, mass centres, and where forces, moments and springs act."""
+    for own in view.scene.points:
+        yield own.bar, place.point(own.bar, cmath.rect(*own.from_pin))
+    for number in MOVING_BARS:
+        if view.scene.linkage.bar(number).mass > 0.0:
+            yield number, place.point(number, view.scene.linkage.bar(number).to_centre)
+    for symbol in acting(view.scene):
+        if symbol.kind in ("force", "moment", "spring"):
+            yield symbol.bar, place.tail(symbol)
+        if symbol.end is not None:
+            yield symbol.end[0], place.point(*symbol.end)
+
+
+def plate(axes: "Axes", bar: int, corners: tuple[complex, complex, complex], labels: Labels) -> list[Any]:
+    """Join a point to its bar, from pin to point to pin, as a plate; nothing where it lies on the bar."""
+    from matplotlib.colors import to_rgba
+    from matplotlib.patches import Polygon
+
+    first, point, last = corners
+    along = (point - first) / (last - first)
+    if abs(along.imag) < ON_BAR and -ON_BAR < along.real < 1.0 + ON_BAR:
+        return []
+    shape, colour = [components(corner) for corner in corners], BAR_COLOURS.get(bar, MUTED)
+    labels.keep_off(axes, *shape)
+    shade = to_rgba(colour, 0.08 if bar > 1 else 0.0)
+    return [axes.add_patch(Polygon(shape, closed=False, fc=shade, ec=colour, lw=0.8, ls=":", zorder=1.5))]
 
 
 def mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> "list[Line2D]":

@@ -146,6 +146,19 @@ def test_bars_are_drawn_to_scale_at_the_requested_position() -> None:
     assert x_scale[0] == pytest.approx(y_scale[1])
 
 
+def test_the_coupler_figure_shows_the_points_of_the_scene() -> None:
+    scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)), fourbar.Point("Q", 4, (0.1, 0.0))))
+    (axes,) = drawn(scene, "coupler", units=fourbar.units("m")).figure.axes
+    curves = {line.get_label(): line.get_xydata() for line in axes.lines if line.get_label()[0] != "_"}
+    assert list(curves) == ["$A$", "$B$", "P"]  # Q belongs to the output
+    np.testing.assert_allclose(curves["P"], fourbar.solve(scene).points["P"], atol=1e-15)
+
+
+def test_couples_of_a_free_body_have_an_arrow_and_no_sign() -> None:
+    lines = [text for text, _ in texts_shown(composed(crank_rocker(), "freebody")) if text[0] in "↺↻"]
+    assert lines and not any(" = −" in line for line in lines)
+
+
 def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> None:
     shown = view(thesis(FULL_TURN))
     panel = composed(thesis(FULL_TURN), "torque").axes[0]
@@ -175,7 +188,9 @@ def test_an_ordinary_curve_is_not_clipped() -> None:
 
 def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     panel = composed(thesis(FULL_TURN), "transmission").axes[0]
-    marks = {line.get_label(): np.sort(line.get_xdata()) for line in panel.lines if line.get_marker() in "sD"}
+    marks = {
+        line.get_label().split(":")[0]: np.sort(line.get_xdata()) for line in panel.lines if line.get_marker() in "sD"
+    }
     d, a, b, c = thesis().linkage.lengths
     # bars 3 and 4 folded: |b - c| between A and O4; bars 2 and 3 in line on the sweep: c seen from O2 at b - a or a + b
     limit = math.degrees(math.acos((a * a + d * d - (b - c) ** 2) / (2 * a * d)))
