@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -71,13 +71,15 @@ class Labels:
 
     def settle(self, figure: "Figure") -> None:
         """Place every label once the layout is final: the first free spot, nearest first."""
+        from matplotlib.axes import Axes
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
         figure.draw_without_rendering()
         figure.set_layout_engine(None)  # labels must not move what they were measured against
         per_point = figure.dpi / 72.0
-        taken: list[tuple[Axes, Box]] = []
+        texts = [(axes, text) for axes in figure.findobj(Axes) for text in axes.texts if text.get_text()]
+        taken: list[tuple[Axes, Box]] = [(axes, text.get_window_extent(renderer).extents) for axes, text in texts]
         samples: dict[int, list[np.ndarray]] = {}
         for axes, points, width in self.lines:
             own = _sampled(axes.transData.transform(points), per_point)
@@ -100,7 +102,8 @@ class Labels:
             text.set_position(tuple(to_data(centre)))
             edge = np.clip((x, y), *np.reshape(taken[-1][1], (2, 2)))
             if math.dist(edge, (x, y)) > (LED + label.dots_clear) * per_point:
-                axes.plot(*zip(label.at, to_data(edge), strict=True), color=label.colour, lw=0.5, zorder=8.5)
+                look: dict[str, Any] = {"scalex": False, "scaley": False}  # what was measured stays
+                axes.plot(*zip(label.at, to_data(edge), strict=True), color=label.colour, lw=0.5, zorder=8.5, **look)
 
 
 def _inside(axes: "Axes") -> Box:

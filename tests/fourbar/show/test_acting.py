@@ -18,6 +18,7 @@ from fourbar.files.effects import REGISTRY
 from fourbar.scene import Scene
 from fourbar.show import animate
 from fourbar.show.acting import acting
+from fourbar.show.between import between
 from fourbar.show.page_data import page_data
 from tests.support.scenes import crank_rocker
 
@@ -127,7 +128,9 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     from fourbar.show.plot.figures import drawn
 
     scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
-    solution = fourbar.solve(scene)
+    found = between(scene, fourbar.solve(scene))
+    assert found is not None
+    solution = found.solution
     panels = drawn(scene, "points", units=fourbar.units("m m/s m/s^2")).figure.subfigs[0].axes
     path = next(line for line in panels[0].lines if line.get_label() == "path of P")
     assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {line.get_label() for line in panels[0].lines}
