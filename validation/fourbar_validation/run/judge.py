@@ -12,7 +12,9 @@ import numpy as np
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.identities import FORMULAS
 from fourbar_validation.compare.rows import Row, plain
+from fourbar_validation.engines.added import numbers
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.report.colours import NUMBERS
 from fourbar_validation.report.record import Record, Timing
 from fourbar_validation.run.answers import check_mjcf, compare_answers, compare_inertia, compare_statements
 from fourbar_validation.run.printed import check_blocks, check_error_bars, check_law, check_points, check_residual
@@ -71,6 +73,7 @@ def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *,
     if draw:
         from fourbar_validation.report.figures import scene_figure
 
+        NUMBERS.update(numbers(witnesses))
         figure = scene_figure(record)
     return record.kept(figure)
 
