@@ -79,6 +79,7 @@ def analyze(
             raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")
         _sensitivity(scene, as_json, out)
         return
+    from fourbar.show.between import between
     from fourbar.show.duty import motor_entry
     from fourbar.show.tables import printed
     from fourbar.solution import DEGREES, csv_text, json_text
@@ -98,7 +99,8 @@ def analyze(
     if not solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions requested")
     if as_json:
-        text = json_text(solution, shown, motor=motor_entry(solution, shown))
+        found = between(described, solution)
+        text = json_text(solution, shown, motor=motor_entry(solution, shown, found and found.solution))
     elif as_csv:
         text = csv_text(solution, shown)
     else:

@@ -131,7 +131,7 @@ DUTY_UNITS = {
 }
 
 
-def motor_duty(solution: Solution) -> MotorDuty | None:
+def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty | None:
     """Peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
 
     E = integral of P dt, dt = d theta_2/omega_2 in a sweep; E_in of the positive part of P, E_out of the negative.
@@ -142,19 +142,19 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     Parameters
     ----------
     solution : positions of a sweep or of a motion law, to the stage "force".
+    located : the same with the positions of the peaks among its own, of which the peaks are taken.
     """
     expect("solution", solution, Solution)
     if solution.torque is None or not np.isfinite(solution.torque).any():
         return None
     power = drive_power(solution)
-    speed: Array = getattr(solution, f"omega_{solution.drive_bar}")
-    closed = once_round(solution)
+    closed, peak = once_round(solution), solution if located is None else located
     energy_in, energy_out = _energy(solution, power)
     return MotorDuty(
-        _peak(solution.torque),
+        _peak(_evaluated(peak, "torque")),
         _rms(_counted(solution, solution.torque)),
-        _peak(np.broadcast_to(speed, power.shape)),
-        _peak(power),
+        _peak(_evaluated(peak, f"omega_{solution.drive_bar}")),
+        _peak(drive_power(peak)),
         _rms(_counted(solution, power)),
         energy_in,
         energy_out,
@@ -188,9 +188,9 @@ def _rms(values: Array) -> float:
     return _plain(np.sqrt(_of_known(np.nanmean, np.square(values))))  # type: ignore[no-any-return]
 
 
-def motor_entry(solution: Solution, units: Conversion) -> dict[str, Any] | None:
-    """Write the duty and the loads of the pins as the JSON has them, in the units of the output."""
-    duty = motor_duty(solution)
+def motor_entry(solution: Solution, units: Conversion, located: Solution | None = None) -> dict[str, Any] | None:
+    """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
+    duty = motor_duty(solution, located)
     if duty is None:
         return None
     entry: dict[str, Any] = {"closed": duty.closed}
@@ -199,8 +199,9 @@ def motor_entry(solution: Solution, units: Conversion) -> dict[str, Any] | None:
         entry[name] = None if number is None else number * unit_in(unit, units)[1]
     force, angle = unit_in("N", units)[1], unit_in("rad", units)[1]
     loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
+    peaks = loads if located is None else {pin: bearing_load(located, pin) for pin in PIN_FORCE}
     entry["pins"] = {
-        pin: {"peak": load.largest * force, "rms": load.rms * force, "theta_2": load.where * angle}
+        pin: {"peak": peaks[pin].largest * force, "rms": load.rms * force, "theta_2": peaks[pin].where * angle}
         for pin, load in loads.items()
     }
     entry["units"] = {name: unit_in(unit, units)[0] for name, unit in DUTY_UNITS.items()}

@@ -2,6 +2,7 @@
 
 import json
 import math
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.scene import Scene
+from fourbar.show.progress import running
 from fourbar.show.tables import plain_table
 from fourbar.solution import Array, nulled
 from fourbar.studies.spread import BAND, Spread, Tolerances, tolerances
@@ -113,8 +115,10 @@ def embedded_tolerances(scene: Scene, theta_2: list[float]) -> dict[str, Any]:
     A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so.
     """
     positions = scene if scene.motion.law else replace(scene, motion=replace(scene.motion, theta_2=np.array(theta_2)))
+    shown = nullcontext() if scene.motion.free is not None else running("the samples of the tolerances are solved")
     try:
-        found = tolerances(positions, PAGE_SAMPLES)
+        with shown as progress:
+            found = tolerances(positions, PAGE_SAMPLES, progress=progress)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
     at = np.linspace(0, len(found.theta_2) - 1, len(theta_2)).round().astype(int)  # a law is thinned as in `page_data`

@@ -147,6 +147,8 @@ def tolerances(
         raise InputError("seed", seed, "must be a whole number, 0 or more")
     if not scene.tolerances:
         raise InputError("tolerances", None, 'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"')
+    if progress is not None:
+        progress(0.0)
     found, study = sensitivity(scene), _members(scene, samples, seed)
     n = len(found.solution)
     names = list(found.by)

@@ -43,7 +43,7 @@ JUDGED_BY = {
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_notebook.py": "fourbar/files: new; fourbar/show: drawing",
     "fourbar/show/test_page.py": "fourbar/show: page_data tolerances",
-    "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody hodograph labels linkage "
+    "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody hodograph labels linkage mechanism "
     "studies style symbols transmission view",
     "validation/engines/mujoco/test_picture.py": "fourbar/mjcf: appearance",
     # a comparison is tested by witnesses with given answers

@@ -42,6 +42,8 @@ OFF_SCALE = 98.0
 """Percentile of the half widths beyond which an axis is not stretched: towards a limit they grow without end."""
 MOST_NUMBERS = 12
 """Of a scene's numbers, those that matter most: more are thin bars that nobody reads."""
+BELOW = 30.0
+"""Space that numbers and name of an axis take, typographic points."""
 MOST_PANELS = 6
 """Torque, the four pin forces, and a point."""
 
@@ -108,6 +110,8 @@ def _band(axes: "Axes", found: Tolerances, part: str) -> None:
 
 
 def _shares(axes: "Axes", found: Tolerances, part: str) -> None:
+    from matplotlib.transforms import offset_copy
+
     spread, over = found.spreads[part], _over(axes, found)
     with np.errstate(all="ignore"):
         shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
@@ -119,7 +123,10 @@ def _shares(axes: "Axes", found: Tolerances, part: str) -> None:
         names = [*names[:MOST_SHARES], "the others"]
     axes.stackplot(over, rows, colors=SHADES[: len(rows)], labels=names, lw=0.0)
     axes.set(ylim=(0.0, 100.0), ylabel="share of the variance (%)", title=f"{part}: from which dimension")
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.28), ncols=1, fontsize=6.5)
+    below = offset_copy(
+        axes.transAxes, axes.get_figure(root=True), y=-BELOW, units="points"
+    )  # of the axis and its name
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), bbox_transform=below, borderaxespad=0.0, fontsize=6.5)
 
 
 def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:

@@ -168,13 +168,14 @@ def test_the_table_says_what_was_requested_and_in_what_units(run: Fourbar) -> No
 
 
 def test_the_largest_pin_loads_stand_above_the_table(run: Fourbar) -> None:
-    """As found row by row in the JSON."""
+    """As found in the rows of the JSON, or a little larger and between two of them."""
     _, printed, _ = run("analyze", str(MODELS / "crank_rocker.toml"))
     whole = json.loads(run("analyze", str(MODELS / "crank_rocker.toml"), "--json")[1])
     line = next(line for line in printed.splitlines() if line.startswith("largest pin loads"))
     for pin, name in {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}.items():
         size, at = max((math.hypot(*force), at) for force, at in zip(whole[name], whole["theta_2"], strict=True))
-        assert f" {pin} {size:.6g} N at {math.degrees(at):.6g} deg" in line
+        largest, where = map(float, re.search(rf"\b{pin} (\S+) N at (\S+) deg", line).groups())  # type: ignore[union-attr]
+        assert size - 1e-4 <= largest < 1.0001 * size and abs(where - math.degrees(at)) < 1.0
 
 
 def test_a_terminal_gets_some_forty_rows_and_the_summary_last() -> None:

@@ -15,6 +15,7 @@ from fourbar.cli import status
 from fourbar.files import dump, loads
 from fourbar.studies import spread as studied
 from fourbar.studies.spread import tolerances
+from tests.support.scenes import crank_rocker
 
 MODEL = (Path(__file__).parents[3] / "models" / "crank_rocker.toml").read_text()
 TABLE = '[tolerances]\n"lengths.input" = "0.05 mm"\nlengths.coupler = ["0.02 mm", "sigma"]\n'
@@ -132,3 +133,10 @@ def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.Capt
     scene.write_text(text)
     assert status(["tolerance", str(scene)]) == 2
     assert "tolerances = None: the scene states none" in capsys.readouterr().err
+
+
+def test_the_share_that_is_done_is_told_from_the_start_and_reaches_all_of_it() -> None:
+    told: list[float] = []
+    scene = crank_rocker(tolerances=(Tolerance("lengths.input", 5e-5),))
+    tolerances(scene, 16384, progress=told.append)
+    assert told[0] == 0.0 and told[-1] == 1.0 and len(told) > 3 and np.all(np.diff(told) > 0.0)

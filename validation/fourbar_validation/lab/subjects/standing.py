@@ -103,6 +103,7 @@ def table(found: Examination) -> str:
 
 def work_precision(found: Examination) -> str:
     """Draw the error of the torque through a turn over the cost of a simulated second, as SVG."""
+    from matplotlib import colormaps
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.5, 4.2), layout="constrained")
@@ -111,11 +112,15 @@ def work_precision(found: Examination) -> str:
     for line in found.lines:
         if line.cost:
             series.setdefault((line.simulator, line.setting), []).append(line)
+    names = list(dict.fromkeys(simulator for simulator, _ in series))
     for index, ((simulator, setting), lines) in enumerate(series.items()):
+        nth = [own for name, own in series if name == simulator].index(setting)
         axes.loglog(
             [line.cost or 0.0 for line in lines],
             [line.errors["torque"] for line in lines],
+            color=[0.8 * part for part in colormaps["turbo"]((names.index(simulator) + 0.5) / len(names))[:3]],
             marker="osD^vP*Xh<>"[index % 11],
+            linestyle=("-", "--", ":", "-.")[nth % 4],
             markersize=4,
             linewidth=1,
             label=f"{simulator}: {setting}",
