@@ -14,8 +14,9 @@ class Quantity(NamedTuple):
     """scalar, (n,), or vector, (n, 2)."""
     meaning: str
     group: str = ""
-    """unknown: of the equations of a position, which an engine can be held to; dry friction, pin loads: exists only
-    where the scene has dry friction, or friction that depends on the pin forces."""
+    """unknown: of the equations of a position, which an engine can be held to; product: of other quantities, by
+    `Solution`; dry friction, pin loads: exists only where the scene has dry friction, or friction that depends on the
+    pin forces."""
 
 
 QUANTITIES = tuple(
@@ -52,6 +53,7 @@ QUANTITIES = tuple(
         ("F43", "N", "force", "vector", "force of the output on the coupler, at B", "unknown"),
         ("F14", "N", "force", "vector", "force of ground on the output, at O4", "unknown"),
         ("torque", "N m", "force", "scalar", "couple of ground on the driven bar", "unknown"),
+        ("power", "W", "force", "scalar", "torque times the angular velocity of the driven bar", "product"),
         ("drive_condition", "1", "force", "scalar", "sine between the two bars that are not driven, in (0, 1]"),
         ("torque_error", "N m", "error", "scalar", "error bar of the torque"),
         ("force_error", "N", "error", "scalar", "error bar of the pin forces, of the worst of the four"),
@@ -63,7 +65,7 @@ QUANTITIES = tuple(
 )
 """In the order of the fields of `Solution`, which is that of its columns."""
 UNITS = {q.name: q.unit for q in QUANTITIES}
-STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None}
+STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None and q.group != "product"}
 """Every evaluated quantity and the stage that computes it."""
 STAGES = tuple(dict.fromkeys(STAGE_OF.values()))
 KIND = {q.name: q.kind for q in QUANTITIES}

@@ -112,6 +112,13 @@ class Solution:
         return len(self.theta_2)
 
     @property
+    def power(self) -> Array | None:
+        """Of the drive, T_k omega_k, W."""
+        speed: Array | None = getattr(self, f"omega_{self.drive_bar}")
+        with np.errstate(all="ignore"):
+            return None if self.torque is None or speed is None else self.torque * speed
+
+    @property
     def assembled(self) -> NDArray[np.bool_]:
         """Where the loop closes, (n,)."""
         return np.not_equal(self.status_code, NOT_ASSEMBLED)

@@ -53,11 +53,6 @@ def shaking_moment(linkage: FourBar, solution: Solution) -> Array:
     return np.asarray(-torque - (x * F14[:, 1] - y * F14[:, 0]))
 
 
-def drive_power(solution: Solution) -> Array:
-    """T_k omega_k, W, (n,)."""
-    return np.asarray(_evaluated(solution, "torque") * _evaluated(solution, f"omega_{solution.drive_bar}"))
-
-
 def once_round(solution: Solution) -> slice:
     """All positions, but of a sweep over whole turns not the last one, which repeats the first."""
     turns = abs(solution.theta_2[-1] - solution.theta_2[0]) / (2.0 * np.pi)
@@ -122,7 +117,7 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     expect("solution", solution, Solution)
     if solution.torque is None or not np.isfinite(solution.torque).any():
         return None
-    power = drive_power(solution)
+    power = _evaluated(solution, "power")
     speed: Array = getattr(solution, f"omega_{solution.drive_bar}")
     one = once_round(solution)
     energy_in, energy_out = _energy(solution, power)
