@@ -22,7 +22,10 @@ more (files, effects, drawings) is loaded on first use.
 *Written by `python docs/api.py` from the docstrings.*
 """
 MEANINGS = {quantity.name: quantity for quantity in QUANTITIES}
-METHODS = {"Solution": ("status", "assembled", "evaluated", "to_csv", "to_pandas"), "Bar": ("moment_of_inertia",)}
+METHODS = {
+    "Solution": ("power", "status", "assembled", "evaluated", "to_csv", "to_pandas"),
+    "Bar": ("moment_of_inertia",),
+}
 """Methods and properties that are shown with their class."""
 
 

@@ -56,7 +56,8 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
 @click.command()
 @scene_argument
 @click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
-@click.option("--csv", "as_csv", is_flag=True, help="One line per position, SI, every digit.")
+@click.option("--csv", "as_csv", flag_value=".", help="One line per position, SI, every digit.")
+@click.option("--csv-comma", "as_csv", flag_value=",", help="The same with decimal commas, and semicolons between.")
 @click.option("--degrees/--radians", default=None, help="Angles theta; left out: degrees in the table, else radians.")
 @units_option
 @click.option("--sensitivity", is_flag=True, help="What the quantities depend on: d(quantity)/d(number).")
@@ -66,7 +67,7 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
 def analyze(
     scene: Path,
     as_json: bool,
-    as_csv: bool,
+    as_csv: str | None,
     degrees: bool | None,
     units: "Conversion",
     sensitivity: bool,
@@ -100,7 +101,7 @@ def analyze(
     if as_json:
         text = json_text(solution, shown, motor=motor_entry(solution, shown))
     elif as_csv:
-        text = csv_text(solution, shown)
+        text = csv_text(solution, shown, as_csv)
     else:
         width = None if out or not sys.stdout.isatty() else shutil.get_terminal_size().columns
         text = printed(described, solution, width, shown, every=every)
