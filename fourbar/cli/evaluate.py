@@ -129,15 +129,20 @@ def _sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
 @click.option("--samples", type=int, metavar="N", help="Linkages that are tried; left out: 8192.")
 @click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Of the quasi-random samples.")
 @click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
+@units_option
 @click.option("-o", "--out", type=FILE, metavar="PLOT", help="Draw the bands: svg, png or pdf.")
-def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: Path | None) -> None:
+def tolerance(
+    scene: Path, samples: int | None, seed: int, as_json: bool, units: "Conversion", out: Path | None
+) -> None:
     """Show what the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
     from fourbar.show.progress import running
     from fourbar.show.tables import under_heading
+    from fourbar.solution import DEGREES
     from fourbar.studies.spread import SAMPLES, tolerances
 
+    _refuse_units_of_json(as_json, units)
     if out is not None:
         format_of(out)
     with opened(scene) as stated, running("samples are solved") as progress:
@@ -145,30 +150,40 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: P
     if (found.without == found.samples).all():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
     if out is not None:
-        draw_tolerances(found, out)
+        draw_tolerances(found, out, units)
     if as_json:
         printed_to(shown.json_text(found), None)
     else:
-        printed_to(under_heading(stated.title, shown.heading(found), shown.table(found)), None)
+        own = {**DEGREES, **units}
+        printed_to(under_heading(stated.title, shown.heading(found, own), shown.table(found, own)), None)
+
+
+def _refuse_units_of_json(as_json: bool, units: "Conversion") -> None:
+    if as_json and units:
+        raise click.UsageError("--json is SI and radians, every digit; --units is of the table")
 
 
 @click.command()
 @scene_argument
 @click.option("--quantity", "quantities", multiple=True, metavar="NAME", help="torque, F12 .. F14, transmission.")
 @click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
+@units_option
 @or_out_option
-def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, out: Path | None) -> None:
+def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: "Conversion", out: Path | None) -> None:
     """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
     from fourbar.show import extremes as shown
     from fourbar.show.progress import running
     from fourbar.show.tables import under_heading
+    from fourbar.solution import DEGREES
     from fourbar.studies.enclosure import NAMES
     from fourbar.studies.enclosure import extremes as proven
 
-    with opened(scene) as stated, running("the boxes are halved"):
+    _refuse_units_of_json(as_json, units)
+    with opened(scene) as stated, running("pieces of the interval are halved"):
         found = proven(stated, quantities or NAMES)
     if as_json:
         text = shown.json_text(stated, found)
     else:
-        text = under_heading(stated.title, shown.heading(stated, found), shown.table(found))
+        own = {**DEGREES, **units}
+        text = under_heading(stated.title, shown.heading(stated, found, own), shown.table(found, own))
     printed_to(text, out)
