@@ -36,12 +36,15 @@ class SpringEnd(NamedTuple):
 class Spring:
     """A spring that pulls its two points together with preload + stiffness (distance - length), N.
 
+    Where that is negative it pushes them apart: a compression spring is shorter than `length`, a gas spring has a
+    negative preload. With stiffness 0 the force is constant.
+
     Parameters
     ----------
     start, end : points on two different bars.
-    stiffness : N/m, > 0.
+    stiffness : N/m, >= 0.
     length : distance at which it pulls with the preload alone, m, >= 0.
-    preload : N.
+    preload : N, > 0 pulls, < 0 pushes.
     """
 
     start: SpringEnd
@@ -59,9 +62,40 @@ class Spring:
             object.__setattr__(self, {"from": "start", "to": "end"}[key], SpringEnd(bar, *place))
         if self.start.bar == self.end.bar:
             raise InputError("effects.springs.to.bar", self.end.bar, "must be another bar than that of `from`")
-        for name, limit in (("stiffness", POSITIVE), ("length", AT_LEAST_ZERO), ("preload", ANY)):
+        for name, limit in (("stiffness", AT_LEAST_ZERO), ("length", AT_LEAST_ZERO), ("preload", ANY)):
             number = require(f"effects.springs.{name}", getattr(self, name), **limit)
             object.__setattr__(self, name, number)
+
+    @classmethod
+    def gas(
+        cls,
+        start: SpringEnd,
+        end: SpringEnd,
+        extended: float,
+        stroke: float,
+        extended_force: float,
+        compressed_force: float | None = None,
+    ) -> "Spring":
+        """Make a gas spring, which pushes its two points apart with a force that grows evenly over the stroke.
+
+        It has no end stops: beyond the stroke the force goes on along the same line.
+
+        Parameters
+        ----------
+        extended : distance of its ends at no stroke, m.
+        stroke : by which it can be shortened, m, less than `extended`.
+        extended_force : at no stroke, N, >= 0.
+        compressed_force : at full stroke, N, no less; left out: the same.
+        """
+        key, last = "effects.springs.gas", extended_force if compressed_force is None else compressed_force
+        extended = require(f"{key}.extended", extended, **POSITIVE)
+        stroke, first = require(f"{key}.stroke", stroke, **POSITIVE), require(f"{key}.extended_force", extended_force)
+        growth = require(f"{key}.compressed_force", last) - first
+        if stroke >= extended:
+            raise InputError(f"{key}.stroke", stroke, f"must be less than the extended length, {extended:.6g} m")
+        if not 0.0 <= first <= first + growth:
+            raise InputError(f"{key}.compressed_force", last, "must be no less than the extended_force, both N, >= 0")
+        return cls(start, end, growth / stroke, extended, -first)
 
     @property
     def slack(self) -> float:
