@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fourbar.cli.given import FILE, lengths_of, opened, or_out_option, printed_to, scene_argument, units_option, waiting
+from fourbar.cli.given import (
+    FILE,
+    is_bare,
+    lengths_of,
+    opened,
+    or_out_option,
+    printed_to,
+    scene_argument,
+    units_option,
+    waiting,
+)
 from fourbar.errors import InputError, NotAssembledError
 
 if TYPE_CHECKING:
@@ -21,24 +31,29 @@ if TYPE_CHECKING:
 def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     """Name a linkage by its bar lengths (ground, input, coupler, output), and say what turns and how far.
 
-    Bare numbers are metres; "30 cm" works too.
+    Four bare numbers are ratios; lengths like 30cm work too.
     """
     from fourbar.linkage import Bar, FourBar
     from fourbar.show.words import type_json, type_lines
 
+    ratios = [is_bare(text) for text in lengths]
+    if any(ratios) and not all(ratios):
+        raise InputError("D A B C", " ".join(lengths), "must be four ratios, or four lengths each with its unit")
     d, a, b, c = lengths_of(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
-    printed_to((type_json(linkage) if as_json else "\n".join(type_lines(linkage))) + "\n", out)
+    unit = "" if all(ratios) else " m"
+    printed_to((type_json(linkage) if as_json else "\n".join(type_lines(linkage, unit))) + "\n", out)
 
 
 @click.command()
 @click.argument("file", type=FILE, required=False)
 @click.option("-o", "--out", type=FILE, metavar="FILE", help="The same, as an option.")
-@click.option("--lengths", nargs=4, required=True, metavar="D A B C", help="Ground, input, coupler, output.")
-def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
+@click.option("--lengths", nargs=4, required=True, metavar="D A B C", help="Ground, input, coupler, output: 300mm ...")
+@click.option("--unit", metavar="UNIT", help="Of bare numbers, like mm.")
+def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str | None) -> None:
     """Write a new scene file with the four lengths, the rest explained in comments.
 
-    Bare numbers are metres; "30 cm" works too.
+    Each length has a unit, like 300mm; or --unit mm is the unit of all.
     """
     from fourbar.files.new import new_scene
     from fourbar.writing import write_text
@@ -49,7 +64,12 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
     assert file is not None
     if file.exists():
         raise InputError("FILE", str(file), "is there already; a new scene needs a new name")
-    write_text(file, new_scene(lengths))
+    bare = [text for text in lengths if is_bare(text)]
+    if bare and unit is None:
+        raise InputError(
+            "--lengths", bare[0], "the unit is missing; write each with its own, like 300mm, or --unit mm once"
+        )
+    write_text(file, new_scene([f"{text} {unit}" if text in bare else text for text in lengths]))
     click.echo(f"wrote {file}; edit it, then: fourbar analyze {file}")
 
 
