@@ -13,7 +13,8 @@ TARGET = Path(__file__).with_suffix(".md")
 HEAD = """\
 # The Python API
 
-Everything that `dir(fourbar)` shows; SI and radians everywhere. `import fourbar` loads numpy alone: what needs
+Everything that `dir(fourbar)` shows; SI and radians everywhere; a description takes texts with units too,
+like `uniform("6 in", ...)`. `import fourbar` loads numpy alone: what needs
 more (files, effects, drawings) is loaded on first use.
 
 `scene.plot(figure="overview", position=..., branches=..., units=...)` draws a figure that a notebook shows and

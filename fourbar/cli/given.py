@@ -98,7 +98,7 @@ def number_of(key: str, text: str, unit: str, *, positive: bool = False) -> floa
     try:
         return require(key, float(text), positive=positive)
     except ValueError:
-        from fourbar.files.units import UnitError, to_si
+        from fourbar.quantities.units import UnitError, to_si
 
         try:
             return require(key, to_si(text, unit), positive=positive)

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import ANY, AT_LEAST_ZERO, POSITIVE
+from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING
+from fourbar.effects.pins import required
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import anywhere, polar
 from fourbar.formulas.motion import State
@@ -58,13 +59,13 @@ class Spring:
             if not isinstance(point, SpringEnd):
                 raise InputError(f"effects.springs.{key}", point, "must be a fourbar.effects.SpringEnd")
             bar = require_whole(f"effects.springs.{key}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
-            place = (require(f"effects.springs.{key}.at", number) for number in point[1:])
+            numbers = zip(point[1:], ("m", "rad"), strict=True)
+            place = (require(f"effects.springs.{key}.at", *number) for number in numbers)
             object.__setattr__(self, {"from": "start", "to": "end"}[key], SpringEnd(bar, *place))
         if self.start.bar == self.end.bar:
             raise InputError("effects.springs.to.bar", self.end.bar, "must be another bar than that of `from`")
-        for name, limit in (("stiffness", AT_LEAST_ZERO), ("length", AT_LEAST_ZERO), ("preload", ANY)):
-            number = require(f"effects.springs.{name}", getattr(self, name), **limit)
-            object.__setattr__(self, name, number)
+        for name, of in OF_EFFECT["springs"].items():
+            object.__setattr__(self, name, required(f"effects.springs.{name}", getattr(self, name), of))
 
     @classmethod
     def gas(
@@ -88,14 +89,13 @@ class Spring:
         compressed_force : at full stroke, N, no less; left out: the same.
         """
         key, last = "effects.springs.gas", extended_force if compressed_force is None else compressed_force
-        extended = require(f"{key}.extended", extended, **POSITIVE)
-        stroke, first = require(f"{key}.stroke", stroke, **POSITIVE), require(f"{key}.extended_force", extended_force)
-        growth = require(f"{key}.compressed_force", last) - first
+        given = zip(OF_GAS_SPRING.items(), (extended, stroke, extended_force, last), strict=True)
+        extended, stroke, first, last = (required(f"{key}.{name}", value, of) for (name, of), value in given)
         if stroke >= extended:
             raise InputError(f"{key}.stroke", stroke, f"must be less than the extended length, {extended:.6g} m")
-        if not 0.0 <= first <= first + growth:
-            raise InputError(f"{key}.compressed_force", last, "must be no less than the extended_force, both N, >= 0")
-        return cls(start, end, growth / stroke, extended, -first)
+        if last < first:
+            raise InputError(f"{key}.compressed_force", last, f"must be no less than the extended_force, {first:.6g} N")
+        return cls(start, end, (last - first) / stroke, extended, -first)
 
     @property
     def slack(self) -> float:

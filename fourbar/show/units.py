@@ -1,7 +1,7 @@
 """The units in which results are shown: a list such as "mm N N.mm deg", or "imperial"."""
 
 from fourbar.errors import InputError
-from fourbar.files.units import factor_to, to_si
+from fourbar.quantities.units import factor_to, to_si
 from fourbar.solution import SI, Conversion
 
 ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'

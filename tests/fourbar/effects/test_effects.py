@@ -316,7 +316,7 @@ HERE = SpringEnd(2, 0.1, 0.0), SpringEnd(4, 0.2, 0.0)
         (lambda: Spring(SpringEnd(2, 0.1, 0.0), SpringEnd(2, 0.2, 0.0), 1.0), "effects.springs.to.bar"),
         (lambda: Spring.gas(*HERE, 0.3, 0.3, 1.0), "effects.springs.gas.stroke"),
         (lambda: Spring.gas(*HERE, 0.3, 0.1, 2.0, 1.0), "effects.springs.gas.compressed_force"),
-        (lambda: Spring.gas(*HERE, 0.3, 0.1, -2.0), "effects.springs.gas.compressed_force"),
+        (lambda: Spring.gas(*HERE, 0.3, 0.1, -2.0), "effects.springs.gas.extended_force"),
         (lambda: Torsion.at(A=(0.0, 1.0, 0.0)), "effects.torsion.A.stiffness"),
         (lambda: PinFriction.at(C=(0.1, 0.1)), "effects.pin_friction.C"),
         (lambda: PinFriction.at(A=(-0.1, 0.1)), "effects.pin_friction.A.coefficient"),

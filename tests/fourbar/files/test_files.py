@@ -15,7 +15,7 @@ import fourbar
 from fourbar.effects import SpringEnd
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
-from fourbar.files.units import UnitError, to_si
+from fourbar.quantities.units import UnitError, to_si
 
 MODELS = sorted((Path(__file__).parents[3] / "models").glob("*.toml"))
 LENGTHS = '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\ncoupler = "0.25 m"\noutput = "0.22 m"\n'

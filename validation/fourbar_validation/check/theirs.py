@@ -192,7 +192,7 @@ def _columns(
 def _unit(path: Path, heading: str, quantity: str, text: str) -> Unit:
     if not text or text == UNITS[quantity]:
         return Unit(UNITS[quantity], 1.0)
-    from fourbar.files.units import factor_to
+    from fourbar.quantities.units import factor_to
 
     try:
         return Unit(text, factor_to(UNITS[quantity], text))
