@@ -87,7 +87,7 @@ class Solution:
     drive_condition: Array | None = None
     """|sine| between the two bars that are not driven, in (0, 1]."""
     torque_error: Array | None = None
-    """Error bar of the torque, N m: what rounding makes it scatter by."""
+    """Error bar of the torque, N m: by how much rounding may have changed it."""
     force_error: Array | None = None
     """Error bar of the pin forces, N: the same for the worst of the four."""
     torque_low: Array | None = None

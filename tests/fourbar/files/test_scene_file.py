@@ -69,6 +69,8 @@ MISTAKES = [
     ("Hz is no angular speed", '"10 rad/s"', '"10 Hz"', ["motion.omega_2", "10 Hz", "rad/s"]),
     ("damping without an angle", '"0.01 N m s/rad"', '"0.01 N m s"', ["effects.viscous.O2", "N m s/rad"]),
     ("temperature", '"0.2 kg"', '"20 degC"', ["bars.input.mass", "20 degC"]),
+    ("inches without quotes", '"0.1 m"', "9 in", ["line 4, column", 'in quotes, like "9 in"']),
+    ("angle without quotes", '"40 deg"', "40 deg", ['in quotes, like "40 deg"']),
     ("bare length", '"0.1 m"', "0.1", ["lengths.input", "0.1", "with a unit"]),
     ("length without unit", '"0.1 m"', '"0.1"', ["lengths.input", "unit is missing"]),
     ("bare angle", '"60 deg"', "60", ["motion.theta_2", "60", "135 deg"]),
