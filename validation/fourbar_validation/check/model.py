@@ -37,7 +37,7 @@ SECONDS = 120.0
 """A four-bar takes less than one."""
 ABOUT_SHARES = (
     "share: by how much the error of that quantity falls when this one entry is set as in the generated file and all "
-    "others stay; the shares do not add up to 100 %. A dash: this entry cannot be changed by itself in the compiled file"
+    "others stay; shares do not add up to 100 %. A dash: this entry cannot be changed by itself in the compiled file"
 )
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
