@@ -70,8 +70,8 @@ def test_the_summary_and_the_json_hold_the_duty() -> None:
     duty, entry = motor_duty(s), motor_entry(s, imperial)
     assert duty is not None and entry is not None and duty.energy_out is not None
     inch_pound = 0.0254 * 0.45359237 * 9.80665
-    assert entry["units"]["rms_power"] == "lbf in/s" and entry["units"]["energy_out"] == "lbf in"
-    assert abs(entry["rms_power"] * inch_pound - duty.rms_power) < ROUND_OFF * duty.rms_power
+    assert entry["units"]["rms_power"] == "hp" and entry["units"]["energy_out"] == "lbf in"
+    assert abs(entry["rms_power"] * 6600.0 * inch_pound - duty.rms_power) < ROUND_OFF * duty.rms_power
     assert abs(entry["energy_out"] * inch_pound - duty.energy_out) < ROUND_OFF * duty.energy_out
     assert abs(entry["pins"]["B"]["rms"] * inch_pound / 0.0254 - bearing_load(s, "B").rms) < ROUND_OFF * 100.0
     lines = "\n".join(heading(scene, s))
