@@ -76,6 +76,13 @@ class Solution(Quantities):
         return "\n".join([*lines, listed("evaluated", self.evaluated())])
 
     @property
+    def power(self) -> Array | None:
+        """Of the drive, T_k omega_k, W."""
+        speed: Array | None = getattr(self, f"omega_{self.drive_bar}")
+        with np.errstate(all="ignore"):
+            return None if self.torque is None or speed is None else self.torque * speed
+
+    @property
     def assembled(self) -> NDArray[np.bool_]:
         """Where the loop closes, (n,)."""
         return np.not_equal(self.status_code, NOT_ASSEMBLED)
@@ -89,17 +96,22 @@ class Solution(Quantities):
         """Names of the quantities that were evaluated, theta_2 first; without the scene's own points."""
         return [name for name in UNITS if getattr(self, name) is not None]
 
-    def to_csv(self, path: str | Path | None = None, *, degrees: bool = False, units: Conversion = SI) -> str | None:
+    def to_csv(
+        self, path: str | Path | None = None, *, degrees: bool = False, units: Conversion = SI, decimal: str = "."
+    ) -> str | None:
         """One line per position, every digit; the text itself, or written to a file, whole or not at all.
 
         Parameters
         ----------
         degrees : theta in deg.
-        units : other units, as `fourbar.units("mm N.mm")` makes them; a heading names a unit that is not SI.
+        units : other units, as `fourbar.units("mm N.mm")` makes them; every heading then names its unit.
+        decimal : "," writes decimal commas, and semicolons between the columns, as many spreadsheets expect.
         """
         expect("path", path, str, Path, type(None))
         expect("degrees", degrees, bool)
-        text = csv_text(self, {**require_units(units), **(DEGREES if degrees else SI)})
+        if decimal not in (".", ","):
+            raise InputError("decimal", decimal, 'must be "." or ","')
+        text = csv_text(self, {**require_units(units), **(DEGREES if degrees else SI)}, decimal)
         if path is None:
             return text
         write_text(path, text)
@@ -156,17 +168,17 @@ def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
     return json.dumps(document, allow_nan=False) + "\n"
 
 
-def csv_text(solution: Solution, units: Conversion = SI) -> str:
+def csv_text(solution: Solution, units: Conversion = SI, decimal: str = ".") -> str:
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
     size, first = solution.theta_2.size, leading(solution)
     columns = {
         name: [None] * size if values is None else nulled(values) for name, values in scalars(solution, units).items()
     }
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = csv.writer(text, lineterminator="\n", delimiter=";" if decimal == "," else ",")
     writer.writerow([*first, *columns])
     for start, row in zip(zip(*first.values(), strict=True), zip(*columns.values(), strict=True), strict=True):
-        writer.writerow([*start, *("" if cell is None else repr(cell) for cell in row)])
+        writer.writerow([*start, *("" if cell is None else repr(cell).replace(".", decimal) for cell in row)])
     return text.getvalue()
 
 
@@ -186,18 +198,34 @@ def leading(solution: Solution) -> dict[str, list[Any]]:
 def scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
     """Every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated.
 
-    A heading names a unit that is not SI: `F12_x [lbf]`.
+    Of a pin force the magnitude too, and where it is known the time. In other units than SI every heading names its
+    own: `F12_x [lbf]`.
     """
     found: dict[str, Array | None] = {}
     for name in _quantities(solution):
         values, unit = values_of(solution, name, units), unit_of(name)
-        heading = f" [{units[unit][0]}]" if unit in units else ""
+        heading = f" [{unit_in(unit, units)[0]}]" if units and unit != "1" else ""
         if not is_scalar(name):
             for axis, letter in enumerate("xy"):
                 found[f"{name}_{letter}{heading}"] = None if values is None else values[..., axis].ravel()
+            if name in PIN_FORCES:
+                found[f"|{name}|{heading}"] = None if values is None else np.hypot(*values.T).T.ravel()
         else:
             found[name + heading] = None if values is None else values.ravel()
+    if solution.time is None and (time := _time_turned(solution)) is not None:
+        found["time [s]" if units else "time"] = time
     return found
+
+
+def _time_turned(solution: Solution) -> Array | None:
+    """Compute when each position of a sweep at one constant speed is passed, s; None for any other."""
+    if solution.omega_2 is None or solution.alpha_2 is None or solution.theta_2.ndim > 1 or not solution.omega_2.all():
+        return None
+    if np.ptp(solution.omega_2) != 0.0 or solution.alpha_2.any():
+        return None
+    time: Array = solution.theta_2 / solution.omega_2
+    time -= time.min()
+    return time
 
 
 def require_units(units: object) -> Conversion:

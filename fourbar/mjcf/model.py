@@ -7,7 +7,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from fourbar.errors import InputError, LimitError
+from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
 from fourbar.mjcf.appearance import add_camera, rounded
 from fourbar.mjcf.settings import Settings
@@ -219,12 +219,11 @@ class Model:
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
         for index, spring in enumerate(self.springs, 1):
-            rest = -spring.slack / spring.stiffness
-            if rest < 0.0:
-                raise LimitError("a spring that pulls at every length has no counterpart in MJCF")
             name = f"spring_{index}"
-            attributes = {"stiffness": text(spring.stiffness), "springlength": text(rest)}
-            tendon = ET.SubElement(tendons, "spatial", {"name": name, **attributes})
+            tendon = ET.SubElement(tendons, "spatial", name=name)
+            if _is_slack_somewhere(spring):
+                tendon.set("stiffness", text(spring.stiffness))
+                tendon.set("springlength", text(-spring.slack / spring.stiffness))
             for end, point in (("start", spring.start), ("end", spring.end)):
                 ET.SubElement(tendon, "site", site=f"{name}_{end}")
                 x, y = point.in_bar.real, point.in_bar.imag
@@ -244,12 +243,16 @@ class Model:
             self._add_site(_body(root, load.bar), f"load_{index}", x, y)
 
     def add_actuators(self, root: ET.Element, drive: dict[str, str]) -> None:
-        """Actuators: the drive by its attributes, without any there is none, and the loads, without a control."""
-        if not drive and not self.loads:
+        """Actuators: the drive by its attributes, without any there is none; loads and some springs, uncontrolled."""
+        springs = {f"spring_{i}": s for i, s in enumerate(self.springs, 1) if not _is_slack_somewhere(s)}
+        if not drive and not self.loads and not springs:
             return
         actuators = ET.SubElement(root, "actuator")
         if drive:
             ET.SubElement(actuators, "general", drive, name="drive")
+        for name, spring in springs.items():
+            tension = text(-spring.slack, 0.0 - spring.stiffness, 0.0)
+            ET.SubElement(actuators, "general", UNCONTROLLED, name=name, tendon=name, biasprm=tension)
         for index, load in enumerate(self.loads, 1):
             fx = fy = 0.0
             couple = load.moment
@@ -262,3 +265,8 @@ class Model:
                 placed["refsite"] = "O2"
             gear = text(fx, fy, 0.0, 0.0, 0.0, couple)
             ET.SubElement(actuators, "general", {**UNCONTROLLED, **placed}, gear=gear, biasprm="1 0 0")
+
+
+def _is_slack_somewhere(spring: "Spring") -> bool:
+    """Whether a tendon has a rest length for it; any other, a constant force say, is an actuator on the tendon."""
+    return spring.stiffness > 0.0 and spring.slack <= 0.0

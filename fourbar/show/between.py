@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from fourbar.linkage import PINS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
-from fourbar.show.duty import drive_power
 from fourbar.solution import Array, Solution
 from fourbar.solve import solve
 
@@ -43,7 +42,7 @@ class Between(NamedTuple):
 def sizes(solution: Solution) -> dict[str, Array]:
     """List the magnitudes whose largest values are located: torque, power and speed of the drive, and pin forces."""
     speed = getattr(solution, f"omega_{solution.drive_bar}")
-    drive = {"torque": solution.torque, "power": drive_power(solution), "speed": speed}
+    drive = {"torque": solution.torque, "power": solution.power, "speed": speed}
     forces = {name: np.hypot(*getattr(solution, name).T) for name in PIN_FORCES}
     return {**{name: np.abs(values) for name, values in drive.items()}, **forces}
 

@@ -54,11 +54,6 @@ def shaking_moment(solution: Solution) -> Array:
     return np.asarray(-torque - length * (np.cos(angle) * F14[..., 1] - np.sin(angle) * F14[..., 0]))
 
 
-def drive_power(solution: Solution) -> Array:
-    """T_k omega_k, W, (n,)."""
-    return np.asarray(_evaluated(solution, "torque") * _evaluated(solution, f"omega_{solution.drive_bar}"))
-
-
 def once_round(solution: Solution) -> Any:
     """Whether a sweep goes over whole turns: its last position then repeats the first; of a study (m,)."""
     if solution.theta_2.shape[-1] == 1:
@@ -147,14 +142,14 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
     expect("solution", solution, Solution)
     if solution.torque is None or not np.isfinite(solution.torque).any():
         return None
-    power = drive_power(solution)
+    power = _evaluated(solution, "power")
     closed, peak = once_round(solution), solution if located is None else located
     energy_in, energy_out = _energy(solution, power)
     return MotorDuty(
         _peak(_evaluated(peak, "torque")),
         _rms(_counted(solution, solution.torque)),
         _peak(_evaluated(peak, f"omega_{solution.drive_bar}")),
-        _peak(drive_power(peak)),
+        _peak(_evaluated(peak, "power")),
         _rms(_counted(solution, power)),
         energy_in,
         energy_out,

@@ -13,7 +13,7 @@ from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.between import Between, between
-from fourbar.show.duty import bearing_load, drive_power, motor_duty
+from fourbar.show.duty import bearing_load, motor_duty
 from fourbar.solution import DEGREES, Array, Conversion, Solution, unit_in, unit_of
 
 if TYPE_CHECKING:
@@ -207,7 +207,8 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
     """List the columns of the table, most wanted first: heading with unit -> cells."""
     shown: dict[str, list[str]] = {}
 
-    def add(name: str, unit: str, values: Array) -> None:
+    def add(name: str, unit: str, values: Array | None) -> None:
+        assert values is not None
         label, factor = unit_in(unit, units)
         shown[f"{name}\n{label}"] = _cells(values * factor, ".4f" if unit == "rad" else ".6g")
 
@@ -217,7 +218,7 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
     if solution.torque is not None:
         if solution.time is None:  # released, it has no drive: its torque is rounding
             add(f"T{solution.drive_bar}", "N m", solution.torque)
-            add("power", "W", drive_power(solution))
+            add("power", "W", solution.power)
         for name in PIN_FORCES:
             add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
     moving = {"": solution.points, "v_": solution.velocity, "a_": solution.acceleration}

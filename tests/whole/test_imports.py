@@ -15,7 +15,8 @@ ENGINES = {name: name.removeprefix("py") for name in ("mujoco", "pinocchio", "ex
 PACKAGES = {"fourbar": ROOT / "fourbar", "fourbar_validation": ROOT / "validation" / "fourbar_validation"}
 LAYERS = {
     "fourbar": (
-        "errors quantities",
+        "errors",
+        "quantities",
         "linkage writing",
         "formulas",
         "solution",

@@ -23,14 +23,14 @@ JUDGED_BY = {
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: actions cones effect flywheel friction gravity load "
     "numbers pin_friction pins torsion viscous",
-    "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text units",
+    "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve holding zeros; fourbar/show: equilibrium; "
     "fourbar/formulas: closed_curve",
     "fourbar/studies/test_ratio.py": "fourbar/show: ratio; fourbar/mjcf: mimic",
     "validation/lab/test_mimic.py": "validation/engines/mujoco: mimic",
     "fourbar/formulas/test_mobility.py": "fourbar/formulas: circuits linkage_type",
-    "fourbar/test_solve.py": "fourbar: linkage quantities solution; "
+    "fourbar/test_solve.py": "fourbar: linkage solution; "
     "fourbar/scene: motion scene; fourbar/evaluation: blocks case stages withheld",
     "fourbar/evaluation/test_compiled.py": "fourbar/evaluation: compiled_case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion_law; fourbar/studies: keys",

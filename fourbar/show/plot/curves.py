@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
-from fourbar.show.duty import drive_power, energies
+from fourbar.show.duty import energies
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,
@@ -214,7 +214,9 @@ def _of_drive(
 draw_torque = partial(
     _of_drive, of=attrgetter("torque"), letter="T", unit="N m", title="Driving torque on", what="Torque"
 )
-draw_power = partial(_of_drive, of=drive_power, letter="P", unit="W", title="Power of the drive on", what="Power")
+draw_power = partial(
+    _of_drive, of=attrgetter("power"), letter="P", unit="W", title="Power of the drive on", what="Power"
+)
 
 
 def force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:

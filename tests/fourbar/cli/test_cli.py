@@ -134,7 +134,7 @@ def test_a_heading_of_csv_is_a_word_and_no_formula(name: str, tmp_path: Path, ru
     """A spreadsheet calculates a cell that begins with =, and a point's name heads its columns."""
     save(crank_rocker(points=(fourbar.Point("P", 3, (0.1, 0.7)),)), tmp_path / "scene.toml")
     header = run("analyze", tmp_path / "scene.toml", "--csv")[1].splitlines()[0]
-    assert "P_x" in header and all(cell.isidentifier() for cell in header.split(","))
+    assert "P_x" in header and all(cell.strip("|").isidentifier() for cell in header.split(","))
     text = (tmp_path / "scene.toml").read_text()
     (tmp_path / "scene.toml").write_text(text.replace("P = ", f"{json.dumps(name)} = ", 1))
     code, out, err = run("analyze", tmp_path / "scene.toml", "--csv")
@@ -275,10 +275,18 @@ def test_classify(lengths: str, name: str, run: Fourbar) -> None:
 def test_what_is_printed_can_be_written(tmp_path: Path, run: Fourbar) -> None:
     assert run("classify", 3, 1, 2.5, 2.2, "-o", tmp_path / "type.txt") == (HOLDS, "", "")
     assert (tmp_path / "type.txt").read_text() == run("classify", 3, 1, 2.5, 2.2)[1]
-    assert run("new", "-o", tmp_path / "a.toml", "--lengths", 3, 1, 2.5, 2.2)[0] == HOLDS
-    assert load(tmp_path / "a.toml").linkage.lengths == (3.0, 1.0, 2.5, 2.2)
+    assert run("new", "-o", tmp_path / "a.toml", "--lengths", 300, 100, "25cm", 220, "--unit", "mm")[0] == HOLDS
+    assert load(tmp_path / "a.toml").linkage.lengths == (0.3, 0.1, 0.25, 0.22)
     for name, command in group.commands.items():
         assert any("--out" in option.opts for option in command.params), name
+
+
+def test_a_length_that_is_written_to_a_file_has_a_unit(tmp_path: Path, run: Fourbar) -> None:
+    code, _, err = run("new", tmp_path / "a.toml", "--lengths", 300, 100, 250, 220)
+    assert code == BAD_INPUT and "--unit mm" in err and not (tmp_path / "a.toml").exists()
+    assert "s + l = 400 < p + q = 470\n" in run("classify", 300, 100, 250, 220)[1]
+    assert "s + l = 0.4 m < p + q = 0.47 m\n" in run("classify", "30cm", "100mm", "25cm", "0.22m")[1]
+    assert run("classify", "30cm", 100, 250, 220)[0] == BAD_INPUT
 
 
 def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:

@@ -97,7 +97,7 @@ def test_showing_needs_numpy_alone() -> None:
 
 
 def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> None:
-    text = new_scene(("20 cm", "0.48", "55 cm", "20 cm"))
+    text = new_scene(("20 cm", "0.48 m", "55 cm", "20 cm"))
     scene = files.loads(text)
     assert scene.linkage.lengths == (0.2, 0.48, 0.55, 0.2)
     assert [scene.linkage.bar(n).mass for n in (2, 3, 4)] == [0.48, 0.55, 0.2]
@@ -113,7 +113,12 @@ def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> 
 
 @pytest.mark.parametrize(
     ("lengths", "named"),
-    [(("1", "2", "3", "40"), "never close"), (("1 kg", "2", "3", "4"), "ground"), (("1", "2", "-3", "4"), "coupler")],
+    [
+        (("1 m", "2 m", "3 m", "40 m"), "never close"),
+        (("1 kg", "2 m", "3 m", "4 m"), "ground"),
+        (("1 m", "2 m", "-3 m", "4 m"), "coupler"),
+        (("1 m", "2 m", "3 m", "4"), "output.*unit is missing"),
+    ],
 )
 def test_a_new_scene_of_bad_lengths_is_refused(lengths: tuple[str, ...], named: str) -> None:
     with pytest.raises(InputError, match=named):
@@ -122,9 +127,9 @@ def test_a_new_scene_of_bad_lengths_is_refused(lengths: tuple[str, ...], named: 
 
 def test_a_new_scene_never_replaces_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "mine.toml"
-    assert status(["new", str(file), "--lengths", "4", "2", "5", "5"]) == 0
+    assert status(["new", str(file), "--lengths", "4", "2", "5", "5", "--unit", "m"]) == 0
     before = file.read_text()
-    assert status(["new", str(file), "--lengths", "4", "2", "5", "6"]) == 2
+    assert status(["new", str(file), "--lengths", "4", "2", "5", "6", "--unit", "m"]) == 2
     assert "is there already" in capsys.readouterr().err
     assert file.read_text() == before
 

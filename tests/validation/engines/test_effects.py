@@ -51,6 +51,9 @@ ACTING: dict[str, Effect] = {
         (
             Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05, 3.0),
             Spring(SpringEnd(2, 0.05, 0.5), SpringEnd(3, 0.1, 0.3), 50.0, 0.05, 1.0),
+            Spring.gas(SpringEnd(1, 0.2, 2.0), SpringEnd(3, 0.05, 1.0), 0.5, 0.3, 4.0, 7.0),
+            Spring(SpringEnd(1, 0.15, -0.6), SpringEnd(4, 0.1, 0.4), 0.0, preload=-2.0),
+            Spring(SpringEnd(1, 0.12, -2.0), SpringEnd(2, 0.05, 0.4), 30.0, 0.0, 2.0),
         )
     ),
     "flywheel": Flywheel(0.02, 2),
