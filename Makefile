@@ -24,7 +24,7 @@ long-test: setup
 	$(BIN)/python -m pytest tests/fourbar/mjcf/test_simulators.py tests/validation/lab/subjects/test_subjects.py
 	PROBLEMS=all $(BIN)/python -m pytest tests/validation/lab/subjects/test_problems.py
 	RELEASES=pip $(BIN)/python -m pytest tests/validation/lab/subjects/test_versions.py
-	$(BIN)/python -m validation standing
+	$(BIN)/python -m validation standing --history mujoco --history pinocchio
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/evaluation/test_free_motion_reference.py
 	$(BIN)/python -m validation fuzz --files --count 100000
 	$(BIN)/python -m validation fuzz

@@ -24,6 +24,7 @@ from fourbar.scene import command
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.lab.subjects import examine, motion, standing
 from fourbar_validation.lab.subjects.findings import findings
+from fourbar_validation.lab.subjects.releases import module_of
 from fourbar_validation.lab.subjects.standing import PROBLEM
 from fourbar_validation.run.elsewhere import Ended
 from tests.whole.test_imports import ROOT, imported
@@ -222,8 +223,17 @@ def test_the_page_is_written_and_names_what_is_not_there(tmp_path: Path, monkeyp
     monkeypatch.setattr("fourbar_validation.lab.subjects.standing.examine", lambda *_: given)
     stated = [(finding, f"mended in {number}") for number, finding in enumerate(findings())]
     monkeypatch.setattr("fourbar_validation.lab.subjects.standing.examined", lambda *_: stated)
-    done = CliRunner().invoke(standing.command, ["--out", str(tmp_path)], catch_exceptions=False)
-    assert done.exit_code == 0 and "not examined: PyBullet" in done.output
+    compared = []
+    monkeypatch.setattr(
+        standing, "released", lambda engine, *_: ["1", "2", "3"] if engine == "drake" else module_of("")
+    )
+    monkeypatch.setattr(
+        standing.versions, "callback", lambda **given: compared.append((given["engine"], given["first"]))
+    )
+    wanted = ["--out", str(tmp_path), "--history", "drake", "--history", "nothing"]
+    done = CliRunner().invoke(standing.command, wanted, catch_exceptions=False)
+    assert done.exit_code == 0 and "not examined: PyBullet" in done.output and compared == [("drake", "2")]
+    assert "not examined: the two newest releases of nothing: InputError" in done.output
     for name in ("standing.html", "standing.md"):
         text = (tmp_path / name).read_text()
         for each in ("1e-7", "nan", "PyBullet", "generated file: F43 alone and torque to 1 % in 314 steps.", "slack",

@@ -8,12 +8,14 @@ from typing import Any
 import click
 
 import fourbar
-from fourbar.errors import InputError
+from fourbar.errors import FourBarError, InputError
 from fourbar.quantities import PIN_FORCES
 from fourbar.writing import write_text
-from fourbar_validation.compare.rows import csv_text
+from fourbar_validation.compare.rows import csv_text, in_words
 from fourbar_validation.lab.subjects.examine import TORQUE_AND_FORCES, Examination, Line, examine
 from fourbar_validation.lab.subjects.findings import examined
+from fourbar_validation.lab.subjects.releases import CACHE, released
+from fourbar_validation.lab.subjects.versions import command as versions
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import machine
 from fourbar_validation.report.svg import drawn, inline
@@ -39,9 +41,18 @@ EXPLAINED = (
     "--python", "pythons", type=click.Path(path_type=Path), multiple=True, help="An environment of simulators."
 )
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("results/standing"), show_default=True)
-@click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each simulator.")
-def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float) -> None:
-    """Examine every simulator that is installed here or under a --python, and write one page (repeat --python)."""
+@click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each simulator and each finding.")
+@click.option(
+    "--history", "engines", metavar="ENGINE", multiple=True, help="Compare its two newest releases too (repeat)."
+)
+@click.pass_context
+def command(
+    ctx: click.Context, scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float, engines: tuple[str, ...]
+) -> None:
+    """Examine every simulator that is installed here or under a --python, and write one page (repeat --python).
+
+    It runs the findings too, and says what could not run: the command of a night.
+    """
     for python in pythons:
         if not python.is_file():
             raise InputError("--python", str(python), "must be a Python interpreter, such as .venv-warp/bin/python")
@@ -51,12 +62,18 @@ def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float
     found = examine(given, scene, interpreters, time_limit)
     if not found.lines:
         raise InputError("--python", ", ".join(map(str, pythons)) or None, "no simulator answered there")
+    for engine in engines:
+        try:
+            before, _ = released(engine, None, None)[-2:]
+            ctx.invoke(versions, engine=engine, first=before, jobs=1, cache=CACHE, out=out / f"versions-{engine}")
+        except FourBarError as error:
+            found.left_out[f"the two newest releases of {engine}"] = in_words(error)
     chart = work_precision(found)
-    versions = dict.fromkeys(f"{line.simulator} {line.version}" for line in found.lines)
+    examined_versions = dict.fromkeys(f"{line.simulator} {line.version}" for line in found.lines)
     examined_findings = examined(interpreters, time_limit)
     page = {
         "title": given.title,
-        "made": f"{machine()}; {', '.join(versions)}",
+        "made": f"{machine()}; {', '.join(examined_versions)}",
         "verdicts": verdicts(found),
         "explained": EXPLAINED,
         "head": HEAD,
@@ -131,7 +148,7 @@ def cells(line: Line) -> list[str]:
     """Format one line of the table."""
     of = "states" if line.steps is None else f"{line.steps} steps"
     numbers = [size(line.errors[name]) if name in line.errors else "" for name in TORQUE_AND_FORCES]
-    cost = "" if line.cost is None else f"{line.cost:.2g}"
+    cost = "" if line.cost is None else f"{float(f'{line.cost:.2g}'):g}"
     order = "" if line.order is None else f"{line.order:.1f}"
     return [line.setting, of, *numbers, size(line.gap), cost, order]
 
@@ -150,7 +167,7 @@ def work_precision(found: Examination) -> str:
     """Draw the greatest error through a turn over the cost of a simulated second, a colour a simulator, as SVG."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(6.4, 7.4), layout="constrained")
+    figure = Figure(figsize=(4.8, 8.2), layout="constrained")
     axes = figure.add_subplot()
     series: dict[tuple[str, str], list[Line]] = {}
     for line in found.lines:
@@ -173,5 +190,5 @@ def work_precision(found: Examination) -> str:
     axes.set_xlabel("processor seconds for one simulated second")
     axes.set_ylabel("greatest error of torque and pin forces")
     axes.grid(alpha=0.3)
-    figure.legend(loc="outside lower center", ncols=2, fontsize=6, frameon=False)
+    figure.legend(loc="outside lower center", fontsize=7, frameon=False)
     return drawn(figure, "standing")
