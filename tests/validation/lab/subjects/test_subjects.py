@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.effects import Friction, Viscous
-from fourbar.errors import LimitError
+from fourbar.errors import DependencyError, LimitError
 from fourbar.mjcf import mjcf
 from fourbar.mjcf.sdf import sdf
 from fourbar.quantities import PIN_FORCES
@@ -24,7 +24,6 @@ from fourbar.scene import command
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.lab.subjects import examine, motion, standing
 from fourbar_validation.lab.subjects.findings import findings
-from fourbar_validation.lab.subjects.releases import module_of
 from fourbar_validation.lab.subjects.standing import PROBLEM
 from fourbar_validation.run.elsewhere import Ended
 from tests.whole.test_imports import ROOT, imported
@@ -203,6 +202,9 @@ def test_what_a_simulator_prints_is_no_part_of_its_answer(tmp_path: Path) -> Non
     assert "hello" in done.stderr and "bye" in done.stderr
 
 
+LISTED = {"drake": ["1", "2", "3"], "exudyn": ["3", "4"]}
+
+
 @pytest.mark.parametrize(
     ("error", "shown"),
     [(0.0573, "6 %"), (9.6e-4, "0.1 %"), (9.4e-4, "9e-4"), (4.26e-7, "4e-7"), (10.4, "1000 %"), (0.0, "0e+00")],
@@ -224,16 +226,22 @@ def test_the_page_is_written_and_names_what_is_not_there(tmp_path: Path, monkeyp
     stated = [(finding, f"mended in {number}") for number, finding in enumerate(findings())]
     monkeypatch.setattr("fourbar_validation.lab.subjects.standing.examined", lambda *_: stated)
     compared = []
-    monkeypatch.setattr(
-        standing, "released", lambda engine, *_: ["1", "2", "3"] if engine == "drake" else module_of("")
-    )
-    monkeypatch.setattr(
-        standing.versions, "callback", lambda **given: compared.append((given["engine"], given["first"]))
-    )
-    wanted = ["--out", str(tmp_path), "--history", "drake", "--history", "nothing"]
+
+    def history(**asked: Any) -> None:
+        compared.append((asked["engine"], asked["first"]))
+        if asked["engine"] == "exudyn":
+            raise DependencyError("fewer than two versions of exudyn can be judged")
+
+    monkeypatch.setattr(standing, "released", lambda engine, *_: LISTED[engine])
+    monkeypatch.setattr(standing.versions, "callback", history)
+    wanted = ["--out", str(tmp_path), "--history", "drake", "--history", "exudyn"]
     done = CliRunner().invoke(standing.command, wanted, catch_exceptions=False)
-    assert done.exit_code == 0 and "not examined: PyBullet" in done.output and compared == [("drake", "2")]
-    assert "not examined: the two newest releases of nothing: InputError" in done.output
+    assert (
+        done.exit_code == 0
+        and "not examined: PyBullet" in done.output
+        and compared == [("drake", "2"), ("exudyn", "3")]
+    )
+    assert "not examined: the two newest releases of exudyn: DependencyError: fewer" in done.output
     for name in ("standing.html", "standing.md"):
         text = (tmp_path / name).read_text()
         for each in ("1e-7", "nan", "PyBullet", "generated file: F43 alone and torque to 1 % in 314 steps.", "slack",

@@ -14,7 +14,7 @@ from fourbar.writing import write_text
 from fourbar_validation.compare.rows import csv_text, in_words
 from fourbar_validation.lab.subjects.examine import TORQUE_AND_FORCES, Examination, Line, examine
 from fourbar_validation.lab.subjects.findings import examined
-from fourbar_validation.lab.subjects.releases import CACHE, released
+from fourbar_validation.lab.subjects.releases import CACHE, module_of, released
 from fourbar_validation.lab.subjects.versions import command as versions
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import machine
@@ -56,6 +56,8 @@ def command(
     for python in pythons:
         if not python.is_file():
             raise InputError("--python", str(python), "must be a Python interpreter, such as .venv-warp/bin/python")
+    for engine in engines:
+        module_of(engine)  # before anything is examined
     given = fourbar.load(scene)
     out.mkdir(parents=True, exist_ok=True)
     interpreters = [Path(sys.executable), *(path.absolute() for path in pythons)]
@@ -70,7 +72,6 @@ def command(
             found.left_out[f"the two newest releases of {engine}"] = in_words(error)
     chart = work_precision(found)
     examined_versions = dict.fromkeys(f"{line.simulator} {line.version}" for line in found.lines)
-    examined_findings = examined(interpreters, time_limit)
     page = {
         "title": given.title,
         "made": f"{machine()}; {', '.join(examined_versions)}",
@@ -82,7 +83,7 @@ def command(
             ("Apart: settings not meant for the simulator", groups(found, apart=True)),
         ],
         "lists": [(heading, texts) for heading, texts in _lists(found).items() if texts],
-        "findings": [(finding, state) for finding, state in examined_findings],
+        "findings": examined(interpreters, time_limit),
         "svg": inline(chart),
     }
     for ending in ("html", "md"):
