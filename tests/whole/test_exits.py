@@ -294,6 +294,8 @@ PROCESSES = [
     ("validation", "standing --versions nobody", BAD_INPUT),
     ("validation", "write --problems --no-such-option", BAD_INPUT),
     ("validation", "standing --no-such-option", BAD_INPUT),
+    ("validation", "standing --history nobody", BAD_INPUT),
+    ("validation", "standing --findings --release 1.0", BAD_INPUT),
     ("validation", f"accept {NO_FILE}", BAD_INPUT),
     ("validation", f"compare accepted {ROOT / 'validation/fourbar_validation/regression/accepted'}", HOLDS),
     ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
