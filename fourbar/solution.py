@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, expect, installing
 from fourbar.linkage import require
-from fourbar.quantities import NOT_ASSEMBLED, STATUS_NAMES, UNITS, is_scalar
+from fourbar.quantities import NOT_ASSEMBLED, OF_LINE, STATUS_NAMES, UNITS, is_scalar
 
 Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+    from fourbar.effects import LinearDrive
 
 SCHEMA = "fourbar-analyze/1"
 Conversion = Mapping[str, tuple[str, float]]
@@ -38,6 +40,7 @@ class Solution:
 
     title: str
     drive_bar: int
+    """2, 3 or 4; None where the drive is linear."""
     status_code: NDArray[np.uint8]
     """0 ok: every quantity that was requested is a number. 1 not_assembled, 2 singular (velocities are 0/0); of
     friction that depends on the pin forces: 3 jammed (no forces fulfil it: they are NaN; at rest, where it is the
@@ -46,7 +49,8 @@ class Solution:
     rest). 7 no_torque: the two bars that are not driven are in line, no couple on the driven bar holds them in balance,
     forces are NaN (T3 and T4 have these poles where omega_3, omega_4 are 0). 8 overflow: numbers beyond the range of
     doubles; from the first stage (position, velocity, ...) that meets them on everything is NaN. 9 invalid: a member of
-    a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN."""
+    a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN.
+    10 no_lever: the line of the drive has none there, its stroke stands still, forces are NaN."""
     branch: NDArray[np.int8]
     """+1 open, -1 crossed."""
     theta_2: Array
@@ -62,6 +66,10 @@ class Solution:
     G2: Array = None  # type: ignore[assignment]
     G3: Array = None  # type: ignore[assignment]
     G4: Array = None  # type: ignore[assignment]
+    stroke: Array | None = None
+    """Distance of the linear drive's ends, m."""
+    drive_line: Array | None = None
+    """Unit vector from its one end to the other."""
     omega_2: Array | None = None
     omega_3: Array | None = None
     omega_4: Array | None = None
@@ -70,6 +78,8 @@ class Solution:
     v_G2: Array | None = None
     v_G3: Array | None = None
     v_G4: Array | None = None
+    stroke_speed: Array | None = None
+    """ds/dt, m/s."""
     alpha_2: Array | None = None
     alpha_3: Array | None = None
     alpha_4: Array | None = None
@@ -84,16 +94,26 @@ class Solution:
     F14: Array | None = None
     torque: Array | None = None
     """Couple of ground on the driven bar, N m."""
+    drive_force: Array | None = None
+    """Of a linear drive, N, positive where it pushes its ends apart."""
+    power: Array | None = None
+    """Of the drive, W."""
     drive_condition: Array | None = None
-    """|sine| between the two bars that are not driven, in (0, 1]."""
+    """|sine| between the two bars that are not driven, in (0, 1]; of a linear drive |(ds/dtheta_2) sin_mu| as a part of
+    the most that its ends' distances from pins allow."""
     torque_error: Array | None = None
     """Error bar of the torque, N m: what rounding makes it scatter by."""
+    drive_force_error: Array | None = None
+    """Error bar of the drive's force, N."""
     force_error: Array | None = None
     """Error bar of the pin forces, N: the same for the worst of the four."""
     torque_low: Array | None = None
     """Where dry friction holds a pin at rest the least torque that may act, else the torque itself, N m."""
     torque_high: Array | None = None
     """The greatest one; NaN where friction jams the motion that would begin."""
+    drive_force_low: Array | None = None
+    """The same of a linear drive's force, N."""
+    drive_force_high: Array | None = None
     friction_residual: Array | None = None
     """Largest |mu r |F| - couple| that the solved pin friction leaves, N m."""
 
@@ -105,6 +125,8 @@ class Solution:
     """Their velocities, m/s."""
     acceleration: dict[str, Array] = field(default_factory=dict, init=False)
     """Their accelerations, m/s^2."""
+    drive: "LinearDrive | None" = field(default=None, init=False)
+    """Where the drive is linear."""
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached that limit position or change point, s; None: it did not."""
 
@@ -241,8 +263,9 @@ def unit_in(unit: str, units: Conversion) -> tuple[str, float]:
 
 
 def _quantities(solution: "Solution") -> list[str]:
-    """Every quantity of a solution, evaluated or not; the time only where a free motion has one."""
-    names = [name for name in UNITS if name != "time" or getattr(solution, name) is not None]
+    """Every quantity of a solution, evaluated or not; time and those of a linear drive only where there is one."""
+    left_out = () if solution.drive is not None else OF_LINE
+    names = [name for name in UNITS if name not in left_out and (name != "time" or solution.time is not None)]
     points = dict.fromkeys((*solution.points, *solution.velocity, *solution.acceleration))
     return names + [f"{start}{name}" for name in points for start in ("", "v_", "a_")]
 

@@ -153,7 +153,9 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: P
 
 @click.command()
 @scene_argument
-@click.option("--quantity", "quantities", multiple=True, metavar="NAME", help="torque, F12 .. F14, transmission.")
+@click.option(
+    "--quantity", "quantities", multiple=True, metavar="NAME", help="torque or drive_force, F12 .. F14, transmission."
+)
 @click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
 @or_out_option
 def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, out: Path | None) -> None:
@@ -161,11 +163,10 @@ def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, out: Path 
     from fourbar.show import extremes as shown
     from fourbar.show.progress import running
     from fourbar.show.tables import under_heading
-    from fourbar.studies.enclosure import NAMES
     from fourbar.studies.enclosure import extremes as proven
 
     with opened(scene) as stated, running("the boxes are halved"):
-        found = proven(stated, quantities or NAMES)
+        found = proven(stated, quantities)
     if as_json:
         text = shown.json_text(stated, found)
     else:

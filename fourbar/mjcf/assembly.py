@@ -44,6 +44,8 @@ def assemble(scene: Scene, start: Start | None, form: str, at_pins: Mapping[str,
     """
     if scene.motion.law is not None or scene.loads:
         raise LimitError(f"a motion law and a load have no counterpart in {form}; apply them in the simulator")
+    if scene.drive is not None:
+        raise LimitError(f"a linear drive (drive.from, drive.to) has no counterpart in {form}")
     linkage = scene.linkage
     carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}

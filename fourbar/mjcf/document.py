@@ -59,6 +59,8 @@ def mjcf(
         raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
     carriable(scene.linkage)
     free = scene.motion.free is not None
+    if scene.drive is not None and not free:
+        raise LimitError("a linear drive (drive.from, drive.to) is not exported to MJCF")
     if free:
         settings = _released(scene, settings)
     start = (start or at_start(scene)) if keyframe else None

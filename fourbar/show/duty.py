@@ -9,7 +9,8 @@ from fourbar.errors import DependencyError, InputError, expect, installing
 from fourbar.evaluation.case import state_at
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, PIN_FORCE, FourBar
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE, FourBar
+from fourbar.quantities import COUPLE, LINE, UNITS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Array, Conversion, Solution, unit_in
 
@@ -36,26 +37,70 @@ def _evaluated(solution: Solution, name: str) -> Array:
 def shaking_force(solution: Solution) -> Array:
     """Force of the bars on the frame through its pins, F21 + F41 = -(F12 + F14), N, (n, 2).
 
-    A spring with one end on the ground pulls there besides.
+    A linear drive with an end on the ground adds its own; a spring pulls there besides.
     """
-    return -(_evaluated(solution, "F12") + _evaluated(solution, "F14"))
+    return -(_evaluated(solution, "F12") + _evaluated(solution, "F14")) + _pushed(solution)
+
+
+def _pushed(solution: Solution) -> Array:
+    """Force of a linear drive on the frame, N, (n, 2)."""
+    ends = () if solution.drive is None else solution.drive.ends
+    sense = sum(sense for sense, point in ends if point.bar == 1)
+    if not sense:
+        return np.zeros((len(solution), 2))
+    return np.asarray(sense * _evaluated(solution, "drive_force")[:, None] * _evaluated(solution, "drive_line"))
 
 
 def shaking_moment(linkage: FourBar, solution: Solution) -> Array:
     """Moment of the bars and of the drive on the frame about O2, -T - O4 x F14, N m, (n,).
 
+    The moment of a linear drive with an end on the ground takes the place of -T.
+
     Couples that effects exert between the bars and ground (pin damping or friction at O2, O4)
     are not part of it.
     """
     expect("linkage", linkage, FourBar)
-    F14, torque = _evaluated(solution, "F14"), _evaluated(solution, "torque")
-    x, y = linkage.ground * np.cos(linkage.ground_angle), linkage.ground * np.sin(linkage.ground_angle)
-    return np.asarray(-torque - (x * F14[:, 1] - y * F14[:, 0]))
+    F14 = _evaluated(solution, "F14")
+    of_drive = 0.0 if solution.drive is not None else -_evaluated(solution, "torque")
+    for _, point in () if solution.drive is None else solution.drive.ends:
+        if point.bar == 1:
+            of_drive = _moment(point.distance, point.angle + linkage.ground_angle, _pushed(solution))
+    return np.asarray(of_drive - _moment(linkage.ground, linkage.ground_angle, F14))
 
 
-def drive_power(solution: Solution) -> Array:
-    """T_k omega_k, W, (n,)."""
-    return np.asarray(_evaluated(solution, "torque") * _evaluated(solution, f"omega_{solution.drive_bar}"))
+def _moment(distance: float, angle: float, force: Array) -> Array:
+    """About O2, of a force at a place, N m, (n,)."""
+    return np.asarray(distance * (np.cos(angle) * force[:, 1] - np.sin(angle) * force[:, 0]))
+
+
+class Driving(NamedTuple):
+    """What the drive does, as it is shown."""
+
+    name: str
+    symbol: str
+    unit: str
+    values: Array | None
+    """(n,); None where only positions are known."""
+    error: Array | None
+    speed: Array | None
+    """rad/s of the driven bar, or m/s of the stroke."""
+
+
+def driving(solution: Solution) -> Driving:
+    """Torque or force of the drive, with its error bar and speed."""
+    names, symbol, word, speed = COUPLE, f"T{solution.drive_bar}", "torque", f"omega_{solution.drive_bar}"
+    if solution.drive is not None:
+        names, symbol, word, speed = LINE, "F", "drive force", "stroke_speed"
+    values, error = (getattr(solution, name) for name in names[:2])
+    return Driving(word, symbol, UNITS[names.value], values, error, getattr(solution, speed))
+
+
+def drive_words(scene: Scene) -> str:
+    """Say what is driven."""
+    if scene.drive is not None:
+        start, end = scene.drive.start.bar, scene.drive.end.bar
+        return f"along a line from bar {start} ({BAR_NAMES[start]}) to bar {end} ({BAR_NAMES[end]})"
+    return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
 
 
 def once_round(solution: Solution) -> slice:
@@ -83,14 +128,14 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
 class MotorDuty(NamedTuple):
     """Peak and root mean square over the positions (a closed sweep counts its two equal ends once), and the energy."""
 
-    peak_torque: float
-    """Largest size, N m."""
-    rms_torque: float
+    peak_torque: float | None
+    """Largest size, N m; None where the drive is linear."""
+    rms_torque: float | None
     """N m."""
     peak_speed: float
-    """Largest size of omega of the driven bar, rad/s."""
+    """Largest size of omega of the driven bar, rad/s, or of the speed of the stroke, m/s."""
     peak_power: float
-    """Largest size of T_k omega_k, W."""
+    """Largest size of T_k omega_k, or of force times speed, W."""
     rms_power: float
     """W."""
     energy_in: float | None
@@ -99,12 +144,16 @@ class MotorDuty(NamedTuple):
     """That the linkage gives back, J."""
     closed: bool
     """The sweep is one turn of the input, or several."""
+    peak_force: float | None = None
+    """Of a linear drive, N."""
+    rms_force: float | None = None
 
 
 DUTY_UNITS = {
     **{"peak_torque": "N m", "rms_torque": "N m", "peak_speed": "rad/s", "peak_power": "W", "rms_power": "W"},
-    **{"energy_in": "J", "energy_out": "J"},
+    **{"energy_in": "J", "energy_out": "J", "peak_force": "N", "rms_force": "N"},
 }
+"""The speed of a linear drive is in m/s."""
 
 
 def motor_duty(solution: Solution) -> MotorDuty | None:
@@ -113,28 +162,31 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     E = integral of P dt, dt = d theta_2/omega_2 in a sweep; E_in of the positive part of P, E_out of the negative.
     Positions without a value are left out, and so are the steps from and to them.
 
-    Returns None where no position has a torque: a released linkage, or positions alone.
+    Returns None where no position has a torque or force of the drive: a released linkage, or positions alone.
 
     Parameters
     ----------
     solution : (n,) positions of a sweep or of a motion law, to the stage "force".
     """
     expect("solution", solution, Solution)
-    if solution.torque is None or not np.isfinite(solution.torque).any():
+    drive = driving(solution)
+    if drive.values is None or not np.isfinite(drive.values).any():
         return None
-    power = drive_power(solution)
-    speed: Array = getattr(solution, f"omega_{solution.drive_bar}")
-    one = once_round(solution)
+    power, one = _evaluated(solution, "power"), once_round(solution)
     energy_in, energy_out = _energy(solution, power)
+    peak, rms, linear = _peak(drive.values), _rms(drive.values[one]), solution.drive is not None
+    assert drive.speed is not None
     return MotorDuty(
-        _peak(solution.torque),
-        _rms(solution.torque[one]),
-        _peak(speed),
+        None if linear else peak,
+        None if linear else rms,
+        _peak(drive.speed),
         _peak(power),
         _rms(power[one]),
         energy_in,
         energy_out,
         one.stop is not None,
+        peak if linear else None,
+        rms if linear else None,
     )
 
 
@@ -168,7 +220,8 @@ def motor_entry(solution: Solution, units: Conversion) -> dict[str, Any] | None:
     if duty is None:
         return None
     entry: dict[str, Any] = {"closed": duty.closed}
-    for name, unit in DUTY_UNITS.items():
+    own = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
+    for name, unit in own.items():
         number = getattr(duty, name)
         entry[name] = None if number is None else number * unit_in(unit, units)[1]
     force, angle = unit_in("N", units)[1], unit_in("rad", units)[1]
@@ -177,7 +230,7 @@ def motor_entry(solution: Solution, units: Conversion) -> dict[str, Any] | None:
         pin: {"peak": load.largest * force, "rms": load.rms * force, "theta_2": load.where * angle}
         for pin, load in loads.items()
     }
-    entry["units"] = {name: unit_in(unit, units)[0] for name, unit in DUTY_UNITS.items()}
+    entry["units"] = {name: unit_in(unit, units)[0] for name, unit in own.items()}
     return entry
 
 

@@ -4,6 +4,7 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
+from fourbar.quantities import UNITS
 from fourbar.scene import Scene
 from fourbar.show.tables import plain_table
 from fourbar.studies.enclosure import PROVEN, Extremes
@@ -20,7 +21,7 @@ def heading(scene: Scene, found: Extremes) -> list[str]:
     lines = [f"proven over theta_2 = {parts} deg, in {found.boxes} boxes of ball arithmetic"]
     if found.distance:
         lines.append(
-            f"nearer than {math.degrees(found.distance):g} deg to a limit of the input, or to a pole of the torque, "
+            f"nearer than {math.degrees(found.distance):g} deg to a limit of the input, or to a pole of the drive, "
             "nothing is proven: there the loads grow without end"
         )
     if found.nominal is None:
@@ -51,7 +52,7 @@ def table(found: Extremes) -> "Table":
 def _unit(name: str) -> tuple[str, float]:
     if name == "transmission":
         return "deg", 180.0 / math.pi
-    return ("N m", 1.0) if name == "torque" else ("N", 1.0)
+    return UNITS.get(name, "N"), 1.0
 
 
 def json_text(scene: Scene, found: Extremes) -> str:

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.evaluation.case import Case, state_at
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
-from fourbar.show.duty import energies
+from fourbar.scene import Command
+from fourbar.show.duty import driving, energies
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,
@@ -91,6 +93,11 @@ def poles(view: View) -> Indices:
     s = view.sweep
     if view.scene.motion.free is not None:  # no drive, no pole
         return np.array([], dtype=np.intp)
+    if view.scene.drive is not None:
+        case = Case.of(view.scene)
+        state = state_at(view.scene, Command(s.theta_2, s.branch, 0.0, 0.0))
+        sine = view.scene.drive.leverage(state, case.sines(state.at))[0]
+        return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
     pair = {2: (s.theta_4, s.theta_3), 3: (s.theta_4, s.theta_2), 4: (s.theta_3, s.theta_2)}[view.scene.drive_bar]
     sine = np.sin(pair[0] - pair[1])
     return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
@@ -192,23 +199,27 @@ draw_speeds = partial(_of_points, letter="v", unit="m/s", title="Speeds of point
 draw_point_accelerations = partial(_of_points, letter="a", unit="m/s^2", title="Accelerations of points")
 
 
-def draw_torque(axes: "Axes", view: View) -> None:
-    """Draw the driving torque, with its poles."""
+def draw_drive(axes: "Axes", view: View) -> None:
+    """Draw the torque or force of the drive, with its poles."""
     over = bases(axes, view)
-    torque, bar = view.sweep.torque, view.scene.drive_bar
-    assert torque is not None
-    torques = [other.sweep.torque for other in view.alike if other.sweep.torque is not None]
-    limit = limit_of(torques)
-    factor, unit = unit_for(limit or largest(*torques), "N m", view.units)
+    drive, bar = driving(view.sweep), view.scene.drive_bar
+    values, name = drive.values, drive.symbol
+    assert values is not None
+    everywhere = [own for other in view.alike if (own := driving(other.sweep).values) is not None]
+    limit = limit_of(everywhere)
+    factor, unit = unit_for(limit or largest(*everywhere), drive.unit, view.units)
     where = poles(view)
-    axes.plot(broken(over, where), factor * broken(torque, where), color=INK, label=f"$T_{bar}$")
+    symbol = f"${name[0]}_{bar}$" if bar else f"${name}$"
+    axes.plot(broken(over, where), factor * broken(values, where), color=INK, label=symbol)
     for index in where:
         axes.axvline(0.5 * float(over[index] + over[index + 1]), color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
     if where.size:
-        note(view, f"Dotted: poles of the torque on bar {bar} ({POLE_REASON[bar]}).")
+        poles_of = f"torque on bar {bar} ({POLE_REASON[bar]})" if bar else "drive's force (its line has no lever)"
+        note(view, f"Dotted: poles of the {poles_of}.")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
-    axes.set(ylabel=f"$T_{bar}$ ({unit})", title=f"Driving torque on bar {bar}")
-    clip(axes, view, {f"T{'₂₃₄'[bar - 2]}": torque}, limit, "Torque", "N m")
+    axes.set(ylabel=f"{symbol} ({unit})", title=f"Driving torque on bar {bar}" if bar else "Force of the drive")
+    shown = f"T{'₂₃₄'[bar - 2]}" if bar else name
+    clip(axes, view, {shown: values}, limit, "Torque" if bar else "Force", drive.unit)
 
 
 def force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:

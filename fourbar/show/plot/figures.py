@@ -45,7 +45,7 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     curves.draw_velocities(panels["omega"], shown)
     curves.draw_accelerations(panels["alpha"], shown)
     # what drives: the torque, or in a free motion the work of loads and effects
-    (curves.draw_torque if shown.scene.motion.free is None else curves.draw_energy)(panels["torque"], shown)
+    (curves.draw_drive if shown.scene.motion.free is None else curves.draw_energy)(panels["torque"], shown)
     curves.draw_forces(panels["forces"], shown)
     draw_transmission(panels["mu"], shown)
     hodograph.draw_hodograph(cast("PolarAxes", panels["polar"]), shown)
@@ -92,7 +92,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "coupler": (lambda figure, *of: linkage.draw_coupler_curves(figure.subplots(), *of), (5.6, 5.4), False),
     "kinematics": (_kinematics, (5.6, 6.8), False),
     "points": (_points, (11.0, 5.6), True),
-    "torque": (_single(curves.draw_torque), (5.6, 3.2), True),
+    "torque": (_single(curves.draw_drive), (5.6, 3.2), True),
     "forces": (_single(curves.draw_forces), (5.6, 3.2), True),
     "hodograph": (_hodographs, (6.4, 6.6), True),
     "energy": (_single(curves.draw_energy), (5.6, 3.2), True),

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 import fourbar
-from fourbar.show.duty import bearing_load, drive_power, motor_duty, motor_entry, shaking_force, shaking_moment
+from fourbar.show.duty import bearing_load, motor_duty, motor_entry, shaking_force, shaking_moment
 from fourbar.show.tables import heading
 from fourbar.show.units import units
 from tests.support.scenes import crank_rocker
@@ -28,7 +28,7 @@ def test_shaking_is_the_momentum_that_the_bars_lose() -> None:
         moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0]) + bar.moment_of_inertia * alpha
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * np.abs(force).max()
     assert np.abs(shaking_moment(scene.linkage, s) - moment).max() < ROUND_OFF * np.abs(moment).max()
-    assert np.array_equal(drive_power(s), s.torque * 10.0)
+    assert np.array_equal(s.power, s.torque * 10.0)
 
 
 def test_bearing_load() -> None:

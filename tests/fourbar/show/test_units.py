@@ -21,7 +21,7 @@ MODEL = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
 INCH, POUND = 0.0254, 0.45359237 * 9.80665
 IN_SI = {
     **{"in": INCH, "in/s": INCH, "in/s^2": INCH, "lbf": POUND, "lbf in": POUND * INCH, "rpm": math.tau / 60.0},
-    **{"deg": math.pi / 180.0, "rad/s^2": 1.0, "1": 1.0, "J": 1.0},
+    **{"lbf in/s": POUND * INCH, "deg": math.pi / 180.0, "rad/s^2": 1.0, "1": 1.0, "J": 1.0},
 }
 """Size of each unit that a result of the model has in imperial units, by definition."""
 

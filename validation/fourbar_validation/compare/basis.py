@@ -6,11 +6,13 @@ acceleration that is too large.
 
 import numpy as np
 
+from fourbar.effects import LinearDrive
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import OK, UNITS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.line import line_of
 from fourbar_validation.compare.scales import yardstick
 from fourbar_validation.compare.tolerance import Array, condition_of
 
@@ -35,13 +37,27 @@ def basis_of(scene: Scene, answer: Answer) -> Solution | None:
         )
         if basis.omega_3 is not None and basis.omega_4 is not None:
             _add_velocities(scene.linkage, theta, basis)
-    one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
+    basis.drive = scene.drive
+    if scene.drive is not None:
+        _add_line(scene.linkage, scene.drive, theta, basis)
     basis.sin_mu = np.sin(theta[4] - theta[3])
     basis.condition = np.abs(basis.sin_mu)
     if basis.drive_condition is None:  # one that knows how near friction is to jamming answers it
+        one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits than its sine
         basis.drive_condition = np.abs(np.sin(other) * np.cos(one) - np.cos(other) * np.sin(one))
     return basis
+
+
+def _add_line(linkage: FourBar, drive: LinearDrive, theta: dict[int, Array], basis: Solution) -> None:
+    """Add stroke, direction, speed and leverage of a linear drive, from the answer's own angles and speeds."""
+    line = line_of(linkage, drive, theta)
+    basis.stroke, basis.drive_line = line.stroke, np.stack((line.unit.real, line.unit.imag), axis=1)
+    if basis.omega_2 is not None and basis.omega_3 is not None and basis.omega_4 is not None:
+        omega = {1: np.zeros(len(basis)), 2: basis.omega_2, 3: basis.omega_3, 4: basis.omega_4}
+        basis.stroke_speed = line.speed(omega)
+    if basis.drive_condition is None:
+        basis.drive_condition = line.condition
 
 
 def _add_velocities(linkage: FourBar, theta: dict[int, Array], basis: Solution) -> None:

@@ -9,9 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.quantities import (
+    COUPLE,
     FORCES,
     JAMMED,
+    LINE,
     OF_DRY_FRICTION,
+    OF_LINE,
     OF_PIN_LOADS,
     OK,
     OVERFLOW,
@@ -43,10 +46,12 @@ Nearby = Callable[[Mask], dict[str, Array]]
 Yardsticks = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
-OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, "torque_error", "force_error")
-"""What has judges of its own: the range in which dry friction holds, what it leaves, and the error bars."""
-COMPARED = tuple(name for name in STAGE_OF if name not in OF_THE_FORMULAS)
+OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, COUPLE.error, LINE.error, "force_error", "power")
+"""What has judges of its own: the range in which dry friction holds, what it leaves, error bars, a product."""
+COMPARED = tuple(name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *OF_LINE))
 """Every quantity that an exact engine is held to: all that is printed of a position."""
+OF_THE_LINE = tuple(name for name in OF_LINE if name not in OF_THE_FORMULAS)
+"""Where the drive is linear, who is held to all is held to these too, and to the force in the torque's place."""
 OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
@@ -89,6 +94,8 @@ def compare(
     if answer.assembled is None or len(answer.assembled) != len(formulas):
         what = "the engine did not say where the loop closes"
         return [Row.unmeasured(name, answer.engine, answer.setting, "assembled", FAILS, what)]
+    if scene.drive is not None and COUPLE.value in (expected := tuple(expected)):
+        expected += OF_THE_LINE if "drive_condition" in expected else (LINE.value,)
     own = basis_of(scene, answer)
     held_to = own if basis is None else basis
     known = {} if yardsticks is None or basis is None else yardsticks

@@ -12,7 +12,7 @@ from fourbar.effects.actions import bodies
 from fourbar.evaluation.case import state_at
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import OK, OVERFLOW
+from fourbar.quantities import COUPLE, LINE, OK, OVERFLOW
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
@@ -25,7 +25,7 @@ from fourbar_validation.compare.tolerance import IDENTITY, SIMULATED, Array, Err
 
 FORMULAS = "formulas"
 IDENTITIES = (
-    *("closure", "force_sum", "moment_sum", "status", "blocks", "points", "law", "sweep"),
+    *("closure", "force_sum", "moment_sum", "power", "status", "blocks", "points", "law", "sweep"),
     *("torque", "torque_error", "force_error", "friction_residual"),
 )
 """Rows of the formulas that no engine answers: they do not count as compared."""
@@ -39,7 +39,7 @@ def identities(name: str, scene: Scene, at: Command, solution: Solution) -> list
     rows = [closure(name, scene, ours)]
     if scene.motion.theta_2 is None and scene.motion.law is None:
         rows.append(_sweep(name, scene, at))
-    if solution.torque is not None and (solution.status_code == OK).any():
+    if solution.F12 is not None and (solution.status_code == OK).any():
         rows += _sums(name, scene, at, solution, ours)
     return rows
 
@@ -77,7 +77,7 @@ def closure(name: str, scene: Scene, answer: Answer, simulated: ErrorBound = SIM
 def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer) -> list[Row]:
     """F12 + F14 + sum of loads = sum of m a_G, and the moments of the same about O2 with the torque."""
     assert at.omega_2 is not None and solution.F12 is not None and solution.F14 is not None
-    assert solution.torque is not None and solution.F32 is not None and solution.F43 is not None
+    assert solution.F32 is not None and solution.F43 is not None
     state = state_at(scene, at)
     # what acts at the speeds that were answered, not at another evaluation of them
     state = state._replace(moving=state.moving._replace(omega_3=solution.omega_3, omega_4=solution.omega_4))
@@ -87,13 +87,19 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer
             term.act(actions, state)
             if term.loaded_pins:
                 term.act_known(actions, {name: getattr(solution, name) for name in PIN_FORCE.values()})
+    torque, drive = solution.torque, COUPLE.value
+    if solution.drive is not None:
+        torque, drive = np.zeros(len(solution)), LINE.value
+        with np.errstate(all="ignore"):
+            solution.drive.act(actions, solution.drive_force)
+    assert torque is not None
     acting = actions.wrenches(Wrenches())
     n, foot = len(solution), complex(np.ravel(state.foot(4))[0])
     O4 = np.array([foot.real, foot.imag])
     force = solution.F12 + solution.F14
     force_terms = magnitude(solution.F12) + magnitude(solution.F14)
-    moment = solution.torque + _cross(O4, solution.F14)
-    moment_terms = np.abs(solution.torque) + np.hypot(*O4) * magnitude(solution.F14)
+    moment = torque + _cross(O4, solution.F14)
+    moment_terms = np.abs(torque) + np.hypot(*O4) * magnitude(solution.F14)
     # the moments of the forces inside, which cancel
     moment_terms = moment_terms + _reach(solution.A) * magnitude(solution.F32)
     moment_terms = moment_terms + _reach(solution.B) * magnitude(solution.F43)
@@ -120,11 +126,14 @@ def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer
     assert solution.drive_condition is not None
     with np.errstate(divide="ignore", invalid="ignore"):
         force_terms = force_terms / (lever(scene.linkage) * solution.drive_condition)
-        moment_terms = moment_terms / condition_of("torque", scene.linkage, solution)
+        moment_terms = moment_terms / condition_of(drive, scene.linkage, solution)
     where = solution.status_code == OK
     # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
     where &= ~reversing(scene, solution, IDENTITY.factor)
+    driving, speed = getattr(solution, drive), getattr(solution, f"omega_{scene.drive_bar}", solution.stroke_speed)
+    works = driving * speed
     return [
+        _row(name, scene, ours, "power", "of the drive", np.abs(solution.power - works), np.abs(works), where),
         _row(name, scene, ours, "force_sum", "F12 + F14 + loads = sum of m a_G", magnitude(force), force_terms, where),
         _row(name, scene, ours, "moment_sum", "moments about O2, with the torque", np.abs(moment), moment_terms, where),
     ]

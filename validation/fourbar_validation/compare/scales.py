@@ -12,11 +12,12 @@ from collections.abc import Callable
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import UNITS
+from fourbar.quantities import LINE, UNITS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.effects import size as size_of
 from fourbar_validation.compare.error import magnitude
+from fourbar_validation.compare.line import line_of
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED, Array, K
 
 VANISHING = 1.0 / K
@@ -30,7 +31,7 @@ def yardstick(quantity: str, scene: Scene, formulas: Solution, values: Array) ->
     size = magnitude(values)
     terms = term_sizes(quantity, scene, formulas)
     well = (formulas.condition >= WELL_CONDITIONED) & np.isfinite(size)
-    if UNITS[quantity] == "N m":  # its poles are not where sin_mu vanishes
+    if UNITS[quantity] in ("N m", "W") or quantity == LINE.value:  # its poles are not where sin_mu vanishes
         assert formulas.drive_condition is not None
         well &= formulas.drive_condition >= WELL_CONDITIONED
     own = np.where(size < VANISHING * terms, terms, size)
@@ -55,7 +56,8 @@ def _one(quantity: str, scene: Scene, formulas: Solution) -> Array:
 
 
 def _lengths(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    return np.full(len(formulas), of_length(scene) + sum(_arm(scene, number) for number in MOVING_BARS))
+    arms = sum(_arm(scene, number) for number in MOVING_BARS) + sum(_drive_arms(scene).values())
+    return np.full(len(formulas), of_length(scene) + arms)
 
 
 def _speeds(quantity: str, scene: Scene, formulas: Solution) -> Array:
@@ -78,9 +80,10 @@ def _angular_accelerations(quantity: str, scene: Scene, formulas: Solution) -> A
 
 
 def _velocities(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    total = np.zeros(len(formulas))
+    total, drive = np.zeros(len(formulas)), _drive_arms(scene)
     for number in MOVING_BARS:
-        total += (scene.linkage.bar(number).length + _arm(scene, number)) * np.abs(getattr(formulas, f"omega_{number}"))
+        arm = scene.linkage.bar(number).length + _arm(scene, number) + drive.get(number, 0.0)
+        total += arm * np.abs(getattr(formulas, f"omega_{number}"))
     return total
 
 
@@ -94,11 +97,21 @@ def _accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
 
 def _forces(quantity: str, scene: Scene, formulas: Solution) -> Array:
     assert formulas.drive_condition is not None
-    return np.asarray(_force_terms(scene, formulas) / formulas.drive_condition)
+    gain = 1.0
+    if scene.drive is not None:  # of a short lever the force is as many times larger
+        short = line_of(scene.linkage, scene.drive, {bar: np.zeros(1) for bar in MOVING_BARS}).most
+        gain = max(1.0, max(scene.linkage.lengths) / short)
+    return np.asarray(gain * _force_terms(scene, formulas) / formulas.drive_condition)
 
 
 def _torques(quantity: str, scene: Scene, formulas: Solution) -> Array:
     return np.asarray(max(scene.linkage.lengths[1:]) * _forces(quantity, scene, formulas))
+
+
+def _powers(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    if scene.drive is not None:
+        return np.asarray(_forces(quantity, scene, formulas) * _velocities(quantity, scene, formulas))
+    return np.asarray(_torques(quantity, scene, formulas) * np.abs(getattr(formulas, f"omega_{scene.drive_bar}")))
 
 
 TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
@@ -111,8 +124,15 @@ TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
     "m/s^2": _accelerations,
     "N": _forces,
     "N m": _torques,
+    "W": _powers,
 }
 """By the unit of a quantity, the sum of the terms of its equation."""
+
+
+def _drive_arms(scene: Scene) -> dict[int, float]:
+    """Distances of the ends of a linear drive from the first pins of their bars, m."""
+    ends = () if scene.drive is None else (scene.drive.start, scene.drive.end)
+    return {end.bar: abs(end.distance) for end in ends}
 
 
 def _arm(scene: Scene, number: int) -> float:

@@ -5,7 +5,17 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.quantities import NO_TORQUE, NOT_ASSEMBLED, OK, OVERFLOW, SEVERAL, SINGULAR
+from fourbar.quantities import (
+    COUPLE,
+    LINE,
+    NO_LEVER,
+    NO_TORQUE,
+    NOT_ASSEMBLED,
+    OK,
+    OVERFLOW,
+    SEVERAL,
+    SINGULAR,
+)
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.compare import Mask, counted, touching
@@ -19,7 +29,7 @@ from fourbar_validation.engines.free_body import solutions
 from fourbar_validation.engines.witnesses import not_installed
 from fourbar_validation.run.question import Question, select_positions
 
-STAGES = ("omega_3", "alpha_3", "torque")
+STAGES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)
 """One quantity of each stage that a position may lack."""
 LARGE = 1e75
 """Numbers beyond this, or their squares, may leave the range of doubles in between: 1e300 in a product of four."""
@@ -100,7 +110,7 @@ def compare_status(
         moves = np.isfinite(np.hstack([a for a in own if a is not None])).all(axis=1)
         in_line = reference.drive_condition < IN_ONE_LINE
         differ |= (formulas.status_code == OVERFLOW) & moves & in_line
-        differ |= (formulas.status_code == NO_TORQUE) & (reference.drive_condition > NEAR)
+        differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (reference.drive_condition > NEAR)
     if sines is not None and len(near := np.flatnonzero(_near(scene, formulas, reference))):
         sine = np.abs(sines(near))
         closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR

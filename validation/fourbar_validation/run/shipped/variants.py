@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
-from fourbar.quantities import OK, UNKNOWNS, is_scalar
+from fourbar.quantities import LINE, OK, UNKNOWNS, is_scalar
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
@@ -45,8 +45,8 @@ def sampled(question: Question) -> Scene:
     if scene.motion.law is not None:
         raise NotAskedError("a motion law has no positions of its own choice")
     basis = question.reference
-    assert basis is not None and basis.drive_condition is not None and basis.torque is not None
-    fit = (solution.status_code == OK) & (basis.condition >= WELL_CONDITIONED) & np.isfinite(basis.torque)
+    assert basis is not None and basis.drive_condition is not None and basis.F12 is not None
+    fit = (solution.status_code == OK) & (basis.condition >= WELL_CONDITIONED) & np.isfinite(basis.F12).all(axis=1)
     fit &= (basis.drive_condition >= WELL_CONDITIONED) & (at.branch == scene.motion.branch)
     fit &= ~reversing(scene, solution, NOT_AT_REST) & (solution.omega_2 != 0.0)
     for load in scene.loads:
@@ -170,13 +170,14 @@ def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
 
     one = replace(study, **{field.name: own(getattr(study, field.name)) for field in fields(study) if field.init})
     one.points, one.velocity, one.acceleration = (own(of) for of in (study.points, study.velocity, study.acceleration))
+    one.drive = study.drive
     return one
 
 
 def parts(answer: Answer) -> dict[str, Array]:
     """Split the unknowns of a position: vectors as components, pin forces also as their magnitudes."""
     found = {}
-    for name in UNKNOWNS:
+    for name in (name for name in (*UNKNOWNS, LINE.value) if name in answer.quantities):
         values = answer.quantities[name]
         if is_scalar(name):
             found[name] = values
