@@ -39,6 +39,13 @@ def test_every_pair_of_bars_agrees_with_thirteen_equations(one: int, other: int)
             assert "drive_force_inertia" in known and "torque" not in known
 
 
+def test_positions_alone_have_a_stroke_that_is_judged() -> None:
+    scene = driven(3, 4)
+    rows = judge("", replace(scene, motion=replace(scene.motion, omega_2=None)), FREE_BODY).rows
+    assert not [row for row in rows if row.failed]
+    assert {"stroke", "drive_line"} <= {row.quantity for row in rows if row.verdict == AGREES}
+
+
 def test_statics_and_friction_at_rest_agree_too() -> None:
     scene = driven(1, 3, effects=(fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02)))
     rows = judge("", replace(scene, motion=replace(scene.motion, omega_2=0.0, alpha_2=0.0)), FREE_BODY).rows

@@ -50,8 +50,8 @@ OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, COUPLE.error, LINE.error, "f
 """What has judges of its own: the range in which dry friction holds, what it leaves, error bars, a product."""
 COMPARED = tuple(name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *OF_LINE))
 """Every quantity that an exact engine is held to: all that is printed of a position."""
-OF_THE_LINE = tuple(name for name in OF_LINE if name not in OF_THE_FORMULAS)
-"""Where the drive is linear, who is held to all is held to these too, and to the force in the torque's place."""
+OF_THE_LINE = {"stroke": "sin_mu", "drive_line": "sin_mu", "stroke_speed": "v_B", LINE.value: COUPLE.value}
+"""Where the drive is linear, who is held to the other quantity is held to this one too."""
 OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
@@ -94,8 +94,9 @@ def compare(
     if answer.assembled is None or len(answer.assembled) != len(formulas):
         what = "the engine did not say where the loop closes"
         return [Row.unmeasured(name, answer.engine, answer.setting, "assembled", FAILS, what)]
-    if scene.drive is not None and COUPLE.value in (expected := tuple(expected)):
-        expected += OF_THE_LINE if "drive_condition" in expected else (LINE.value,)
+    if scene.drive is not None:
+        held = tuple(expected)
+        expected = (*held, *(name for name, other in OF_THE_LINE.items() if other in held))
     own = basis_of(scene, answer)
     held_to = own if basis is None else basis
     known = {} if yardsticks is None or basis is None else yardsticks
