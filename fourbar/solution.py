@@ -108,6 +108,9 @@ class Solution:
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached that limit position or change point, s; None: it did not."""
 
+    commanded: str = field(default="theta_2", init=False)
+    """Name of the angle that was commanded."""
+
     def __len__(self) -> int:
         return len(self.theta_2)
 

@@ -8,7 +8,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
 from fourbar.mjcf.document import Start, at_start
 from fourbar.mjcf.model import carriable
-from fourbar.scene import Scene
+from fourbar.scene import Scene, require_input
 
 PARENT = {2: 1, 3: 2, 4: 1}
 """The bar that carries each bar's first pin."""
@@ -42,6 +42,7 @@ def assemble(scene: Scene, start: Start | None, form: str, at_pins: Mapping[str,
     Raises LimitError for a load, a motion law or an effect without a counterpart there, InputError for a bar without
     mass or inertia, NotAssembledError where the linkage closes at none of the scene's positions.
     """
+    require_input(scene, "the drive of an SDF or a USD")
     if scene.motion.law is not None or scene.loads:
         raise LimitError(f"a motion law and a load have no counterpart in {form}; apply them in the simulator")
     linkage = scene.linkage

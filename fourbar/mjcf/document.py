@@ -16,7 +16,7 @@ from fourbar.mjcf.model import Model, carriable, constant, servo, text
 from fourbar.mjcf.notes import NOTES
 from fourbar.mjcf.settings import RECIPE, Settings, WindowMotion, fitted_pad
 from fourbar.quantities import OK
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, require_input
 from fourbar.solution import Array
 from fourbar.solve import solve
 
@@ -55,6 +55,7 @@ def mjcf(
     LimitError : an effect or the motion has no counterpart in MJCF.
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
+    require_input(scene, "the drive of an MJCF")
     if scene.motion.law is not None:
         raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
     carriable(scene.linkage)

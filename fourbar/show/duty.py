@@ -60,7 +60,8 @@ def drive_power(solution: Solution) -> Array:
 
 def once_round(solution: Solution) -> slice:
     """All positions, but of a sweep over whole turns not the last one, which repeats the first."""
-    turns = abs(solution.theta_2[-1] - solution.theta_2[0]) / (2.0 * np.pi)
+    angle: Array = getattr(solution, solution.commanded)
+    turns = abs(angle[-1] - angle[0]) / (2.0 * np.pi)
     closed = len(solution) > 1 and turns > 0.5 and np.isclose(turns, round(turns), rtol=1e-12, atol=0.0)
     return slice(None, -1 if closed else None)
 
@@ -110,7 +111,8 @@ DUTY_UNITS = {
 def motor_duty(solution: Solution) -> MotorDuty | None:
     """Peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
 
-    E = integral of P dt, dt = d theta_2/omega_2 in a sweep; E_in of the positive part of P, E_out of the negative.
+    E = integral of P dt, dt = d theta/omega of the commanded bar in a sweep; E_in of the positive part of P, E_out of
+    the negative.
     Positions without a value are left out, and so are the steps from and to them.
 
     Returns None where no position has a torque: a released linkage, or positions alone.
@@ -140,11 +142,11 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
 
 def _energy(solution: Solution, power: Array) -> tuple[float | None, float | None]:
     """Integrate the positive and the negative part of the power, each over time."""
-    omega_2 = solution.omega_2
+    omega = getattr(solution, solution.commanded.replace("theta", "omega"))
     if solution.time is not None:
         spans = np.diff(solution.time)
-    elif omega_2 is not None and np.all(omega_2 != 0.0):
-        spans = np.abs(np.diff(solution.theta_2) / omega_2[:-1])
+    elif omega is not None and np.all(omega != 0.0):
+        spans = np.abs(np.diff(getattr(solution, solution.commanded)) / omega[:-1])
     else:
         return None, None
     parts = [0.5 * spans * (part[:-1] + part[1:]) for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0))]

@@ -102,9 +102,11 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
     if scene.motion.free is not None:
         drive = "released, no drive"
     branch = BRANCH_NAMES[scene.motion.branch]
+    theta, omega, _ = scene.motion.names
+    of_bar = "" if scene.motion.bar == 2 else f" of the command {theta}"
     lines = [
         ", ".join(f"{name} {value(length, 'm', units)}" for name, length in lengths),
-        f"{branch} branch; {drive}",
+        f"{branch} branch{of_bar}; {drive}",
     ]
     counts = np.bincount(solution.status_code, minlength=len(STATUS_NAMES))
     statuses = zip(STATUS_NAMES, counts.tolist(), strict=True)
@@ -115,8 +117,8 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
             f"{scene.motion.free.steps + 1} instants were wanted: the motion stops at a limit position at "
             f"t = {solution.stopped_at:.6g} s, where bars 3 and 4 are in line"
         )
-    if scene.motion.omega_2 is None and solution.torque is None and _acting(scene):
-        lines.append(f"positions only, since omega_2 is left out; {STATIC}")
+    if scene.motion.speed is None and solution.torque is None and _acting(scene):
+        lines.append(f"positions only, since {omega} is left out; {STATIC.replace('omega_2', omega)}")
     if scene.motion.free is None and solution.torque is not None and np.isfinite(solution.torque).any():
         worst = int(np.nanargmax(np.abs(solution.torque)))
         where = value(solution.theta_2[worst], "rad", units)
@@ -175,9 +177,9 @@ def _warning(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
     worst = int(np.nanargmax(share))
     left = max(math.floor(-math.log10(share[worst])), 0)
     where = f"at theta_2 = {value(solution.theta_2[worst], 'rad', units)}"
-    sines = {"3 and 4": abs(solution.sin_mu[worst])}
-    if scene.drive_bar != 2:
-        sines[{3: "2 and 4", 4: "2 and 3"}[scene.drive_bar]] = solution.drive_condition[worst]
+    others = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
+    sines = {others[scene.drive_bar]: solution.drive_condition[worst]}
+    sines[others[int(solution.commanded[-1])]] = solution.condition[worst]
     bars = min(sines, key=lambda pair: sines[pair])
     gap = math.asin(min(sines[bars], 1.0))
     return [f"{left} digits left of T{scene.drive_bar} {where}: bars {bars} are {gap:.2g} rad from being in line"]
