@@ -98,7 +98,7 @@ def error_bars(
     k = read_from(path.bar, rounded_coefficients(path.lengths, near, read_from(path.bar, k), rounded.next(13)))
     nearby = state._replace(at=near, k=k, moving=rates(k, state.speed, acceleration))
     if path.bar != 2:  # there both are found from the directions
-        to_O4, to_A = case.lengths.d * near.u1, case.lengths.a * near.u2
+        to_O4, to_A = rounded(case.lengths.d * near.u1), case.lengths.a * near.u2
         nearby = nearby._replace(at=near._replace(diagonal=rounded(to_O4 - to_A)), theta_2=rounded(angle(near.u2)))
     other = case.dynamics(nearby, acceleration, case.side, rounded)
     values, others = (*found.pins, found.torque), (*other.pins, other.torque)

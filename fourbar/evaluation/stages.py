@@ -11,7 +11,7 @@ from fourbar.evaluation.withheld import no_value
 from fourbar.formulas.arithmetic import angle, anywhere
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.position import HalfAngle
+from fourbar.formulas.position import HalfAngle, Position
 from fourbar.quantities import (
     ANGLES,
     JAMMED,
@@ -67,7 +67,7 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
     speed, acceleration = piece(where.speed, part), piece(where.acceleration, part)
     state = case.state(case.path, q, at, branch, speed, acceleration, moving=wanted > 0)
     values = kinematics(case, state, names)
-    values |= {name: value for name, value in of_command(case, state, q).items() if name in names}
+    values |= {name: value for name, value in of_command(case, at, state, q).items() if name in names}
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
         codes, forces = _forces(case, state, acceleration, branch, branch, codes, names, known)
@@ -75,12 +75,16 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
     return codes, values, state.at
 
 
-def of_command(case: Case, state: State, q: Any) -> dict[str, Any]:
-    """Quantities that a command of bar 3 or 4 has in the place of others: its angle, what was commanded, the sine."""
+def of_command(case: Case, at: Position, state: State, q: Any) -> dict[str, Any]:
+    """Quantities that a command of bar 3 or 4 has in the place of others: its angle as commanded, theta_2, its sine.
+
+    Parameters
+    ----------
+    at : in the order in which the path reads the loop.
+    """
     if case.path.bar == 2:
         return {}
-    condition = abs(case.path.drive_sine(state.at, case.path.bar))
-    return {f"theta_{case.path.bar}": q, "theta_2": state.theta_2, "condition": condition}
+    return {f"theta_{case.path.bar}": q, "theta_2": state.theta_2, "condition": abs(at.sin_mu)}
 
 
 def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:

@@ -114,21 +114,21 @@ class Path(NamedTuple):
         else:
             u1, u2, u3, u4, a = -at.u1, at.u4, -at.u3, at.u2, c
         diagonal = (d * self.unit) * u1 - (a * self.unit) * u2
-        at = Position(u1, u2, u3, u4, sine(u3, u4), diagonal, at.e2, at.root, at.half)
-        return at._replace(sin_mu=self.drive_sine(at, 2))
+        # a root that is withheld, for speeds that are 0/0, is that of the sine
+        known = at._replace(root=at.sin_mu * (2.0 * self.lengths.b * self.lengths.c))
+        return Position(u1, u2, u3, u4, self.drive_sine(known, 2), diagonal, at.e2, at.root, at.half)
 
     def drive_sine(self, at: Position, drive_bar: int) -> Number:
         """Sine between the two bars that are not driven; positions as `motion` returns them."""
         role = ROLES[self.bar][drive_bar - 2]
-        if self.bar != 2 and role == 2:
-            return at.root * (0.5 / (self.lengths.b * self.lengths.c))
-        sine = drive_sine_of_triangle(self.lengths, at, role)
-        if self.bar != 2 and self.bar + drive_bar == 7:  # there the two bars have changed places
-            sine = -sine
-        if self.may_stay_parallel:  # whose directions are exact
+        if role == 2:
+            return at.sin_mu if self.bar == 2 else at.root * (0.5 / (self.lengths.b * self.lengths.c))
+        found = drive_sine_of_triangle(self.lengths, at, role)
+        if self.may_stay_parallel:  # with the sine of the angle that all of them make
             first, second = parallel_pairs(self.lengths, at.half, np.sign(at.root))
-            sine = np.where(first | second, drive_sine(at, drive_bar), sine)
-        return sine
+            with_first, with_second = (0.0, 2.0 * at.half.sk) if role == 3 else (-2.0 * at.half.sk, 0.0)
+            found = np.where(first, with_first, np.where(second, with_second, found))
+        return -found if self.bar + drive_bar == 7 else found  # there the two bars have changed places
 
 
 def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:

@@ -213,7 +213,8 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
             add(f"{name}_{letter}", unit_of(name), vector[:, axis])
     for name in ANGLES:
         add(name, "rad", getattr(solution, name))
-    for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):
+    sought = [bar for bar in "234" if bar != solution.commanded[-1]]
+    for name in (f"{kind}_{bar}" for kind in ("omega", "alpha") for bar in sought):
         if getattr(solution, name) is not None:
             add(name, UNITS[name], getattr(solution, name))
     shown["sin mu\n"] = _cells(solution.sin_mu)

@@ -224,7 +224,7 @@ def _derivatives(
     case, branch = Case.of(scene, at.bar), at.branch[index].astype(float)
     position = _position(case.path, q, branch)
     state = case.state(case.path, q, position, branch, speed, acceleration, moving=moving)
-    found = kinematics(case, state, names) | of_command(case, state, q)
+    found = kinematics(case, state, names) | of_command(case, position, state, q)
     held = np.zeros(len(index), dtype=bool)
     if moving:
         actions = Actions(state, case.bodies)

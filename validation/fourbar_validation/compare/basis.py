@@ -22,22 +22,24 @@ def basis_of(scene: Scene, answer: Answer) -> Solution | None:
     """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
     if answer.at is None or not {"theta_3", "theta_4"} <= answer.quantities.keys():
         return None
-    theta_2, known = answer.at.theta_2, answer.quantities
+    known = answer.quantities
+    theta_2 = known["theta_2"] if answer.at.bar != 2 else answer.at.angle
     theta = {2: theta_2, 3: known["theta_3"], 4: known["theta_4"]}
     code = np.full(len(theta_2), OK, dtype=np.uint8)
     basis = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2, theta[3], theta[4])
     for name in UNITS:
         if name in known:
             setattr(basis, name, known[name])
-    if answer.at.omega_2 is not None:
-        basis.omega_2, basis.alpha_2 = (
-            np.broadcast_to(np.asarray(x, float), theta_2.shape) for x in (answer.at.omega_2, answer.at.alpha_2)
-        )
+    basis.commanded = answer.at.commanded
+    if answer.at.speed is not None:
+        for name, x in (("omega", answer.at.speed), ("alpha", answer.at.acceleration)):
+            setattr(basis, f"{name}_{answer.at.bar}", np.broadcast_to(np.asarray(x, float), theta_2.shape))
         if basis.omega_3 is not None and basis.omega_4 is not None:
             _add_velocities(scene.linkage, theta, basis)
-    one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
+    one, other = (theta[bar] for bar in theta if bar != answer.at.bar)
     basis.sin_mu = np.sin(theta[4] - theta[3])
-    basis.condition = np.abs(basis.sin_mu)
+    basis.condition = np.abs(np.sin(other - one))
+    one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
     if basis.drive_condition is None:  # one that knows how near friction is to jamming answers it
         # not of their difference: of an angle many turns away that has fewer digits than its sine
         basis.drive_condition = np.abs(np.sin(other) * np.cos(one) - np.cos(other) * np.sin(one))

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import (
     FORCES,
     JAMMED,
@@ -128,7 +129,8 @@ class _Comparison:
         """Compare where both close the loop."""
         theirs, ours = self.answer.assembled, self.formulas
         assert theirs is not None
-        differ = (theirs != ours.assembled) & ~touching(self.scene, ours.theta_2)
+        bar = int(ours.commanded[-1])
+        differ = (theirs != ours.assembled) & ~touching(self.scene, getattr(ours, ours.commanded), bar)
         count = np.count_nonzero(differ)
         return self.row(
             "assembled",
@@ -296,16 +298,17 @@ def counted(codes: NDArray[np.uint8]) -> str:
     return ", ".join(f"{count} {name}" for name, count in zip(STATUS_NAMES, counts, strict=True) if count)
 
 
-def closing_margin(scene: Scene, theta_2: Array) -> Array:
-    """Compute by what part of the sum of the lengths the loop closes (> 0) or misses (< 0)."""
-    d, a, b, c = scene.linkage.lengths
-    e = np.abs(d * np.exp(1j * scene.linkage.ground_angle) - a * np.exp(1j * theta_2))
+def closing_margin(scene: Scene, theta: Array, bar: int = 2) -> Array:
+    """Compute by what part of the sum of the lengths the loop closes (> 0) or misses (< 0) at a bar's angle."""
+    own = scene.linkage.bar(bar).length * (-1.0 if bar == 4 else 1.0)
+    b, c = (scene.linkage.bar(each).length for each in MOVING_BARS if each != bar)
+    e = np.abs(scene.linkage.ground * np.exp(1j * scene.linkage.ground_angle) - own * np.exp(1j * theta))
     return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / of_length(scene))
 
 
-def touching(scene: Scene, theta_2: Array) -> Mask:
+def touching(scene: Scene, theta: Array, bar: int = 2) -> Mask:
     """Mark positions at which rounding decides whether the loop closes."""
-    return np.asarray(np.abs(closing_margin(scene, theta_2)) < TOUCHING_MARGIN)
+    return np.asarray(np.abs(closing_margin(scene, theta, bar)) < TOUCHING_MARGIN)
 
 
 def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:

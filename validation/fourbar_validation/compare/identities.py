@@ -33,11 +33,11 @@ IDENTITIES = (
 
 def identities(name: str, scene: Scene, at: Command, solution: Solution) -> list[Row]:
     """One row per identity that the stage of the solution allows."""
-    angles = {"theta_3": solution.theta_3, "theta_4": solution.theta_4}
+    angles = {"theta_2": solution.theta_2, "theta_3": solution.theta_3, "theta_4": solution.theta_4}
     closing = solution.assembled & (solution.status_code != OVERFLOW)
     ours = Answer(FORMULAS, "exact", at, closing, angles)
     rows = [closure(name, scene, ours)]
-    if scene.motion.theta_2 is None and scene.motion.law is None:
+    if scene.motion.angle is None and scene.motion.law is None and at.bar == 2:
         rows.append(_sweep(name, scene, at))
     if solution.torque is not None and (solution.status_code == OK).any():
         rows += _sums(name, scene, at, solution, ours)
@@ -68,7 +68,8 @@ def closure(name: str, scene: Scene, answer: Answer, simulated: ErrorBound = SIM
     assert answer.at is not None and answer.assembled is not None
     theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
     ground = d * np.exp(1j * scene.linkage.ground_angle)
-    gap = np.abs(a * np.exp(1j * answer.at.theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4))
+    theta_2 = answer.at.angle if answer.at.bar == 2 else answer.quantities["theta_2"]
+    gap = np.abs(a * np.exp(1j * theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4))
     tolerance = IDENTITY if answer.setting == "exact" else simulated
     equation = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
     return _row(name, scene, answer, "closure", equation, gap, of_length(scene), answer.assembled, tolerance.factor)
@@ -76,11 +77,12 @@ def closure(name: str, scene: Scene, answer: Answer, simulated: ErrorBound = SIM
 
 def _sums(name: str, scene: Scene, at: Command, solution: Solution, ours: Answer) -> list[Row]:
     """F12 + F14 + sum of loads = sum of m a_G, and the moments of the same about O2 with the torque."""
-    assert at.omega_2 is not None and solution.F12 is not None and solution.F14 is not None
+    assert at.speed is not None and solution.F12 is not None and solution.F14 is not None
     assert solution.torque is not None and solution.F32 is not None and solution.F43 is not None
     state = state_at(scene, at)
     # what acts at the speeds that were answered, not at another evaluation of them
-    state = state._replace(moving=state.moving._replace(omega_3=solution.omega_3, omega_4=solution.omega_4))
+    speeds = {f"omega_{bar}": getattr(solution, f"omega_{bar}") for bar in MOVING_BARS if bar != at.bar}
+    state = state._replace(moving=state.moving._replace(**speeds))
     actions = Actions(state, bodies(scene.linkage, scene.effects))
     with np.errstate(all="ignore"):
         for term in (*scene.loads, *scene.effects):
@@ -143,7 +145,7 @@ def _row(
 ) -> Row:
     """By how much an equation is missed, in parts of its terms, where it is worst; NaN is beyond all."""
     assert answer.at is not None
-    theta_2 = answer.at.theta_2
+    theta_2 = answer.at.angle
     error = np.where(where, relative(gap, terms), 0.0)
     index = worst(error)
     condition = 1.0 / turned(scene.linkage.ground_angle, theta_2)

@@ -29,7 +29,7 @@ def compare_answers(question: Question) -> Iterator[Row]:
 def _answer(question: Question, witness: Witness) -> Iterator[Row]:
     answer = question.answer(witness)
     seconds = question.answered[witness.name][1]
-    question.timings.append(Timing(question.name, answer.engine, answer.setting, len(question.at.theta_2), seconds))
+    question.timings.append(Timing(question.name, answer.engine, answer.setting, len(question.at.angle), seconds))
     if answer.refusal is not None:
         question.left_out.append(f"{answer.engine}: {answer.refusal}")
     yield from compare_answer(question, witness, answer)

@@ -57,7 +57,7 @@ class Question:
         """Solve the scene as far as anything is compared: error bars take ten times as long as all the rest."""
         if self.scene.motion.free is not None:
             return solve(self.scene)
-        return solve(self.scene, "position" if self.at.omega_2 is None else "force", at=self.at)
+        return solve(self.scene, "position" if self.at.speed is None else "force", at=self.at)
 
     @cached_property
     def solution(self) -> Solution:
@@ -76,7 +76,7 @@ class Question:
     @property
     def forces_known(self) -> bool:
         """Whether the free bodies answer forces."""
-        return self.at.omega_2 is not None and self.free_body is not None and self.free_body.refusal is None
+        return self.at.speed is not None and self.free_body is not None and self.free_body.refusal is None
 
     @cached_property
     def reference(self) -> Solution | None:
@@ -98,7 +98,12 @@ class Question:
         if witness.name not in self.answered:
             with kept(self.output, witness.name):
                 engine, begin = self.engine(witness), time.perf_counter()
-                self.answered[witness.name] = engine.answer(self.scene, self.at), time.perf_counter() - begin
+                if self.at.commanded in getattr(engine, "commands", ("theta_2",)):
+                    answer = engine.answer(self.scene, self.at)
+                else:
+                    refusal = f"it takes a command of theta_2, and here {self.at.commanded} is commanded"
+                    answer = Answer(witness.name, "exact", refusal=refusal)
+                self.answered[witness.name] = answer, time.perf_counter() - begin
         return self.answered[witness.name][0]
 
     def attempt(self, check: Callable[[], Iterable[Row]], engine: str, part: str = "") -> Iterator[Row]:
@@ -118,4 +123,5 @@ def select_positions(at: Command, where: NDArray[np.intp]) -> Command:
         return value if value is None or np.ndim(value) == 0 else value[where]  # type: ignore[index]
 
     time = None if at.time is None else at.time[where]
-    return Command(at.theta_2[where], at.branch[where], of(at.omega_2), of(at.alpha_2), None, time)  # type: ignore[arg-type]
+    speed, acceleration = of(at.speed), of(at.acceleration)
+    return Command(at.angle[where], at.branch[where], speed, acceleration, None, time, at.bar)  # type: ignore[arg-type]

@@ -15,6 +15,7 @@ import click
 import numpy as np
 
 from fourbar.errors import FAILED, HOLDS
+from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.quantities import OK, PIN_FORCES, UNITS, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
@@ -171,7 +172,7 @@ def fed_back(scene: Scene, bar: int) -> Scene | None:
         return scene
     found = solve(scene, "acceleration")
     theta, omega, alpha, sine = commanded(found, bar)
-    if found.status_code[0] != OK or not np.isfinite([omega, alpha]).all() or sine == 0.0:
+    if found.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
         return None
     numbers = {f"theta_{bar}": theta, f"omega_{bar}": omega, f"alpha_{bar}": alpha}
     return replace(scene, motion=Motion(branch=1 if sine > 0.0 else -1, **numbers))  # type: ignore[arg-type]
