@@ -15,6 +15,7 @@ from fourbar.evaluation.stages import FORCE, Part, commanded, freely
 from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, STAGE_OF, STAGES, UNITS, is_scalar
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, unwrap
 
@@ -97,7 +98,7 @@ def _refuse(at: Command) -> None:
     """Raise an InputError where a command is none."""
     expect("at", at, Command)
     require_bar("at.bar", at.bar)
-    named = {"angle": at.commanded, "branch": "branch", "speed": f"omega_{at.bar}", "acceleration": f"alpha_{at.bar}"}
+    named = dict(zip(("angle", "speed", "acceleration", "branch"), (*COMMANDS[at.bar], "branch"), strict=True))
     for name in ("angle", "branch"):
         value = getattr(at, name)
         expect(f"at.{named[name]}", value, np.ndarray)
@@ -193,8 +194,9 @@ def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[s
 
 def unwrap_angles(result: Mapping[str, Array], bar: int) -> None:
     """Make every angle that was found continuous along its sweep; the commanded one is as it is stated."""
+    commanded = COMMANDS[bar][0]
     for name in ("theta_2", *ANGLES):
-        if name in result and name != f"theta_{bar}":
+        if name in result and name != commanded:
             unwrap(result[name])
 
 

@@ -195,7 +195,7 @@ class Case(NamedTuple):
             of_input, of_others = inertia(a, self.bodies, at, k)
             others = others + of_others * acceleration
             inertial = others + of_input * acceleration
-        if anywhere(k.dh2 != 0.0):
+        if self.path.bar != 2:  # bar 2 has inertia of its own
             others = others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
         if rounded is not as_it_is:
             own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))

@@ -67,7 +67,8 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
     speed, acceleration = piece(where.speed, part), piece(where.acceleration, part)
     state = case.state(case.path, q, at, branch, speed, acceleration, moving=wanted > 0)
     values = kinematics(case, state, names)
-    values |= {name: value for name, value in of_command(case, at, state, q).items() if name in names}
+    if where.bar != 2:
+        values |= {name: value for name, value in of_command(case, at, state, q).items() if name in names}
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
         codes, forces = _forces(case, state, acceleration, branch, branch, codes, names, known)

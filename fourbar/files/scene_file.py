@@ -20,10 +20,10 @@ from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.pictures import Picture
 from fourbar.files.scene_text import BARS, BRANCHES
 from fourbar.files.tolerances import read_tolerances
-from fourbar.linkage import BAR_NAMES, MOST_STEPS, MOVING_BARS, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, MOST_STEPS, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.motion import DEFAULT_STEPS, NUMBERS, Free, FromLimit, Motion, Sweep
-from fourbar.scene.motion_law import ENDS, Law
+from fourbar.scene.motion import DEFAULT_STEPS, Free, FromLimit, Motion, Sweep
+from fourbar.scene.motion_law import COMMANDS, ENDS, Law
 from fourbar.scene.point import Point
 from fourbar.solution import Array
 
@@ -157,14 +157,14 @@ def _bar(read: Reader, key: str, value: object, length: float) -> Bar:
 
 
 def _motion(read: Reader, value: object) -> Motion:
-    numbers = [f"{name}_{bar}" for bar in MOVING_BARS for name in NUMBERS]
+    numbers = [name for names in COMMANDS.values() for name in names]
     entry = read.table("motion", value, (*numbers, "branch", "through", "free", "law"))
     stated = [name for name in numbers if name in entry]
     bar = int(stated[0][-1]) if stated else 2
     for name in stated:
         if int(name[-1]) != bar:
             raise read.refuse(f"motion.{name}", entry[name], f"{stated[0]} commands bar {bar}; one bar is commanded")
-    theta, omega, alpha = (f"{name}_{bar}" for name in NUMBERS)
+    theta, omega, alpha = COMMANDS[bar]
     free = None
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
@@ -186,7 +186,7 @@ def _motion(read: Reader, value: object) -> Motion:
 
 def _law(read: Reader, value: object) -> Law:
     key = "motion.law"
-    angles = [f"theta_{bar}" for bar in MOVING_BARS]
+    angles = [names[0] for names in COMMANDS.values()]
     entry = read.table(key, value, ("time", *angles, "steps", "ends"))
     stated = [name for name in angles if name in entry] or angles[:1]
     return Law(

@@ -8,15 +8,13 @@ import numpy as np
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import A_BRANCH, require, require_numbers, require_whole
-from fourbar.scene.motion_law import STEPS, Law, the_bar
+from fourbar.scene.motion_law import COMMANDS, STEPS, Law, the_bar
 from fourbar.solution import Array
 
 OPEN, CROSSED = 1, -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
 FASTEST = math.sqrt(sys.float_info.max)
 """rad/s. The square of any greater speed is beyond the range of a double, and with it every acceleration."""
-NUMBERS = ("theta", "omega", "alpha")
-"""Of a bar, that command it."""
 DEFAULT_STEPS = 360
 """Of the default range, where a motion names no angle."""
 
@@ -100,7 +98,7 @@ class Motion:
 
     def __post_init__(self) -> None:
         expect("motion.law", self.law, Law, type(None))
-        stated = the_bar("motion", self, NUMBERS)
+        stated = the_bar("motion", self, COMMANDS)
         object.__setattr__(self, "bar", (stated or 2) if self.law is None else self.law.bar)
         theta, omega, alpha = self.names
         if self.law is not None and (stated is not None or self.free is not None):
@@ -129,8 +127,7 @@ class Motion:
     @property
     def names(self) -> tuple[str, str, str]:
         """Of what is commanded: theta_2, omega_2 and alpha_2, or those of bar 3 or 4."""
-        theta, omega, alpha = (f"{name}_{self.bar}" for name in NUMBERS)
-        return theta, omega, alpha
+        return COMMANDS[self.bar]
 
     @property
     def angle(self) -> float | Array | Sweep | FromLimit | None:

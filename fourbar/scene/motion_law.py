@@ -1,5 +1,6 @@
 """The motion as a table of an angle over time, smoothly interpolated: each position has its own speed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -18,14 +19,20 @@ STEPS = (range(1, MOST_STEPS + 1), f"must be a whole number from 1 to {MOST_STEP
 """Intervals of any motion."""
 
 
-def the_bar(key: str, stated: object, names: tuple[str, ...]) -> int | None:
+COMMANDS = {bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS}
+"""What commands a bar: its angle, speed and acceleration."""
+ANGLES = {bar: names[:1] for bar, names in COMMANDS.items()}
+
+
+def the_bar(key: str, stated: object, commands: Mapping[int, tuple[str, ...]]) -> int | None:
     """Return the bar of which numbers are stated, None where none is; InputError where there are two."""
-
-    def is_stated(name: str, bar: int) -> bool:
-        value = getattr(stated, f"{name}_{bar}")
-        return value is not None and not (name == "alpha" and isinstance(value, (int, float)) and value == 0.0)
-
-    found = [bar for bar in MOVING_BARS if any(is_stated(name, bar) for name in names)]
+    found = [
+        bar
+        for bar, names in commands.items()
+        for name in names
+        if (value := getattr(stated, name)) is not None and not (name[0] == "a" and type(value) is float and not value)
+    ]
+    found = list(dict.fromkeys(found))
     if len(found) > 1:
         named = " and ".join(f"of bar {bar}" for bar in found)
         raise InputError(key, named, "is the command of one bar: theta, omega and alpha of bar 2, 3 or 4")
@@ -73,7 +80,7 @@ class Law:
     @property
     def bar(self) -> int:
         """Whose angle it gives: 2, 3 or 4."""
-        return the_bar("motion.law", self, ("theta",)) or 2
+        return the_bar("motion.law", self, ANGLES) or 2
 
     @property
     def angle(self) -> tuple[float, ...]:

@@ -10,6 +10,7 @@ from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.mobility import default_range, limit_angles, on_smooth_path
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.scene.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
+from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.point import Point
 from fourbar.scene.tolerance import Tolerance
 from fourbar.solution import Array
@@ -82,7 +83,7 @@ class Command(NamedTuple):
     @property
     def commanded(self) -> str:
         """Name of the angle."""
-        return f"theta_{self.bar}"
+        return COMMANDS[self.bar][0]
 
     @property
     def theta_2(self) -> Array:

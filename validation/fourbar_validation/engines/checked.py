@@ -9,7 +9,7 @@ import numpy as np
 
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import NUMBERS
+from fourbar.scene.motion_law import COMMANDS
 from fourbar_validation.compare.answer import Answer, Array, Engine, WitnessError
 from fourbar_validation.compare.rows import in_words, one_line
 
@@ -92,13 +92,15 @@ def _motion(at: Any, command: Command) -> Command:
         raise ValueError("at must have the branch of the command, and speeds where that has")
     n, made = len(command.angle), dict[str, Any]()
     speed, acceleration = (0.0 if x is None else float(np.abs(x).max()) for x in (command.speed, command.acceleration))
-    keys = dict(zip(("angle", "speed", "acceleration"), (f"at.{x}_{command.bar}" for x in NUMBERS), strict=True))
+    keys = dict(zip(("angle", "speed", "acceleration"), COMMANDS[command.bar], strict=True))
     for name, size in {"angle": 1.0, "speed": speed, "acceleration": speed**2 + acceleration}.items():
         commanded, value = getattr(command, name), getattr(at, name)
         if commanded is None:
             continue
-        made[name] = _numbers(keys[name], value, (n,) if np.ndim(value) else ())
+        made[name] = _numbers(f"at.{keys[name]}", value, (n,) if np.ndim(value) else ())
         if not np.abs(made[name] - commanded).max() <= FURTHEST * size:
-            raise ValueError(f"{keys[name]} is too far from the command: it must be within {FURTHEST * size:g} of it")
+            raise ValueError(
+                f"at.{keys[name]} is too far from the command: it must be within {FURTHEST * size:g} of it"
+            )
     same = all(np.array_equal(value, getattr(command, name)) for name, value in made.items())
     return command if same else command._replace(**made, remainder=None)
