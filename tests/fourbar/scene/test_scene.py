@@ -17,8 +17,10 @@ from fourbar.mjcf import mjcf
 from fourbar.scene import Command
 from fourbar.show.animate import page
 from fourbar.solution import Solution
+from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.engines.balls import reference
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.run.judge import judge
 
 U = 2.0**-53
 MODELS = sorted(Path("models").glob("*.toml"))
@@ -242,3 +244,14 @@ def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
             refuse(scene)
     with pytest.raises(InputError, match=r"theta_4'?: is commanded, and theta_2 is not"):
         _ = fourbar.command(scene).theta_2
+
+
+def test_the_harness_asks_who_takes_the_command_and_writes_the_refusal_of_the_others() -> None:
+    scene = replace(LOADED, motion=Motion(theta_4=Sweep(3.9, 4.4, 4), omega_4=2.0, alpha_4=1.0), drive_bar=3)
+    rows = judge("", scene).rows
+    assert not [row for row in rows if row.failed]
+    agreed = {row.quantity for row in rows if row.engine == "free-body" and row.verdict == AGREES}
+    assert {"theta_3", "omega_2", "alpha_2", "A", "F12", "F43", "torque", "closure"} <= agreed
+    refused = {row.engine: row.reason for row in rows if row.verdict == REFUSES}
+    assert "pinocchio-inverse" in refused
+    assert set(refused.values()) == {"it takes a command of theta_2, and here theta_4 is commanded"}
