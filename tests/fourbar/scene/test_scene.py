@@ -9,7 +9,7 @@ import pytest
 
 import fourbar
 from fourbar import Bar, FourBar, Free, FromLimit, Law, Load, Motion, Scene, Sweep, solve, uniform, vary
-from fourbar.effects import Gravity, Viscous
+from fourbar.effects import Gravity, Torsion, Viscous
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
@@ -255,3 +255,16 @@ def test_the_harness_asks_who_takes_the_command_and_writes_the_refusal_of_the_ot
     refused = {row.engine: row.reason for row in rows if row.verdict == REFUSES}
     assert "pinocchio-inverse" in refused
     assert set(refused.values()) == {"it takes a command of theta_2, and here theta_4 is commanded"}
+
+
+@pytest.mark.parametrize("bar", [3, 4])
+def test_springs_count_turns_along_the_commanded_angle(bar: int) -> None:
+    """A drag link, whose bars all turn: where a spring is wound is the same whichever of them is told to."""
+    springs = Torsion.at(**{pin: (0.1, 0.3, 0.0) for pin in ("O2", "A", "B", "O4")})
+    scene = Scene(uniform(0.1, 0.3, 0.25, 0.28), Motion(np.linspace(0.2, 5.2, 26), 1.0), effects=(springs,))
+    forth = solve(scene, "acceleration")
+    for pin, *_ in springs.springs:
+        own = replace(scene, effects=(Torsion.at(**{pin: (0.1, 0.3, 0.0)}),))
+        wanted = solve(own, "force").status
+        assert solve(own, "force", at=of_bar(forth, bar)).status == wanted
+        assert ("wound" in wanted) == (pin in ("O2", "O4"))
