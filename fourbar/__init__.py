@@ -34,7 +34,7 @@ from fourbar.scene.tolerance import Tolerance as Tolerance
 from fourbar.solution import Solution as Solution
 from fourbar.solve import solve as solve
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 if _TYPE_CHECKING:
     from fourbar.effects import Flywheel as Flywheel
