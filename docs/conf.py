@@ -12,5 +12,7 @@ myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3
 html_theme = "furo"
 html_title = f"fourbar {version}"
+html_static_path = ["style"]
+html_css_files = ["narrow.css"]
 html_show_copyright = False
 exclude_patterns = ["ci"]
