@@ -55,6 +55,21 @@ def test_the_examples_of_continuous_integration_use_commands_and_options_that_ex
             assert wanted <= known and wanted, (file.name, name, wanted - known)
 
 
+def test_every_long_part_is_run_in_the_night() -> None:
+    (parts,) = re.findall(r"^LONG := (.*)$", read("Makefile"), re.MULTILINE)
+    (nightly,) = re.findall(r"part: \[(.*)\]", read(".github/workflows/nightly.yml"))
+    assert nightly.split(", ") == parts.split()
+
+
+def test_one_version_stands_everywhere() -> None:
+    for name, line in (
+        ("pyproject.toml", 'version = "{}"'),
+        ("CITATION.cff", "version: {}"),
+        ("CHANGELOG.md", "## {}"),
+    ):
+        assert line.format(fourbar.__version__) in read(name).splitlines(), name
+
+
 @pytest.fixture
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder that looks like a checkout and may be written to."""
