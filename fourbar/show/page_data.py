@@ -14,7 +14,7 @@ from fourbar.files.pictures import data_uri
 from fourbar.files.scene_text import BARS
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, OK, PIN_FORCES
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, require_input
 from fourbar.show.acting import Symbol, acting
 from fourbar.show.duty import energies
 from fourbar.show.plot.style import length_unit
@@ -28,11 +28,12 @@ MAX_ROWS = 1441
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
-SCALARS = (*ANGLES, "condition", *RATES, "torque")
+SCALARS = (*ANGLES, "condition", *RATES, "torque", "drive_force", "stroke")
 
 
 def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
     """Everything the page's script needs: SI units, radians, null where there is no value."""
+    require_input(scene, "a page")
     linkage, motion = scene.linkage, scene.motion
     shown = _through_time(scene) if over_time(scene) else _sweep(scene)
     closes = [theta_3 is not None for theta_3 in shown["branches"][str(motion.branch)]["theta_3"]]
@@ -115,7 +116,8 @@ def _through_time(scene: Scene) -> dict[str, Any]:
     columns = _columns(solution)
     columns["theta_2"] = where.theta_2.tolist()
     if scene.motion.free is not None:
-        del columns["torque"]
+        for name in ("torque", "drive_force"):
+            columns.pop(name, None)
         columns["energy"] = nulled(energies(scene, solution).kinetic)
     duration = float(where.time[-1] - where.time[0])
     rate = _rate(duration)

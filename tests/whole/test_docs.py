@@ -105,7 +105,10 @@ def test_every_command_prints_what_is_shown(
 @pytest.mark.usefixtures("checkout")
 @pytest.mark.parametrize(
     ("name", "count"),
-    [("README.md", 1), *((f"docs/{name}.md", 1) for name in ("theory-motion", "theory-forces", "guide-designer"))],
+    [
+        ("README.md", 1),
+        *((f"docs/{name}.md", 1) for name in ("theory-motion", "theory-forces", "guide-designer", "guide-roboticist")),
+    ],
 )
 def test_the_programs_print_what_is_shown(name: str, count: int) -> None:
     programs, texts = blocks("python", read(name)), blocks("text", read(name))
