@@ -6,7 +6,7 @@ import click
 
 from fourbar import __version__
 from fourbar.cli.evaluate import analyze, classify, extremes, new, tolerance
-from fourbar.cli.export import animate, mjcf, plot, sdf, usd
+from fourbar.cli.export import animate, edit, mjcf, plot, sdf, usd
 from fourbar.errors import run
 
 
@@ -31,7 +31,7 @@ def group(context: click.Context, traceback: bool) -> None:
         click.echo(context.get_help())
 
 
-for command in (classify, new, analyze, tolerance, extremes, mjcf, sdf, usd, plot, animate):
+for command in (classify, new, analyze, tolerance, extremes, mjcf, sdf, usd, plot, animate, edit):
     group.add_command(command)
 
 

@@ -1,5 +1,6 @@
 """The commands that write files: pictures (plot, animate), and models for simulators (mjcf, sdf, usd)."""
 
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ from fourbar.cli.given import (
     units_option,
     waiting,
 )
-from fourbar.errors import InputError
+from fourbar.errors import DependencyError, InputError, installing
 
 if TYPE_CHECKING:
     from fourbar.solution import Conversion
@@ -136,3 +137,26 @@ def usd(scene: Path, out: Path) -> None:
 
     with opened(scene) as described:
         printed_to(written(described), out)
+
+
+@click.command()
+@click.argument("scene", type=FILE, required=False)
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Of this machine; left out: any that is free.")
+@click.option("--exports", type=FILE, metavar="FOLDER", help="For exports and reports; left out: SCENE_exports.")
+@click.option("--no-browser", is_flag=True, help="Print the address only.")
+def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) -> None:
+    """Change a scene in the browser, and see torque and forces follow; without SCENE a new one.
+
+    Ctrl-C ends it, and so do 10 s after the last page has gone.
+    """
+    from fourbar.writing import require_file
+
+    if scene is None:
+        names = (Path(f"linkage{number}.toml") for number in chain([""], count(2)))
+        scene = next(path for path in names if not path.exists())
+    require_file(scene)
+    try:
+        from fourbar.edit.server import edit as opened_there
+    except ModuleNotFoundError as error:
+        raise DependencyError(f"{error.name} is not installed: {installing('edit')}") from None
+    opened_there(scene, exports or scene.with_name(f"{scene.stem}_exports"), port, browse=not no_browser)

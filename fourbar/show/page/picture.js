@@ -12,7 +12,7 @@ const parts = { ground: make(picture, "g", {}), images: make(picture, "g", { id:
 parts.traces = make(picture, "g", { id: "traces" });
 parts.bars = {}; parts.image = {};
 for (const k of [2, 3, 4]) {
-  if (data.pictures[k]) parts.image[k] = make(parts.images, "image", { href: data.pictures[k], preserveAspectRatio: "none", id: `picture-${k}` });
+  parts.image[k] = make(parts.images, "image", { preserveAspectRatio: "none", id: `picture-${k}` });
   parts.bars[k] = make(picture, "line", { class: `bar b${k}`, id: `bar-${k}` });
 }
 parts.forces = make(picture, "g", { id: "arrows" });
@@ -23,7 +23,7 @@ parts.arrow = Object.fromEntries(FORCES.map(name => [name, {
 parts.pins = Object.fromEntries(["O2", "A", "B", "O4"].map(name => [name, make(picture, "circle", { class: "pin", r: 6, id: `pin-${name}` })]));
 parts.centres = make(picture, "g", { id: "centres" });
 parts.centre = {};
-for (const k of [2, 3, 4]) if (data.centres[k]) {
+for (const k of [2, 3, 4]) {
   const arm = make(parts.centres, "line", { class: "arm" }), mark = make(parts.centres, "g", { id: `centre-${k}` });
   make(mark, "circle", { class: "centre-disc", r: 7 });
   make(mark, "path", { class: "centre-fill", d: "M0 0H7A7 7 0 0 0 0 -7ZM0 0H-7A7 7 0 0 0 0 7Z" });
@@ -58,6 +58,7 @@ function barPoint(p, k, r) {
 
 const coupler = p => barPoint(p, 3, data.centres[3] ?? [0.5 * lengths[2], 0]);
 
+let held = false;   // while something is dragged the scale stays
 // Everything the sweep reaches fits into the picture, so that the scale does not change while it moves.
 function fit() {
   view.width = Math.max(280, picture.parentElement.clientWidth);
@@ -78,8 +79,7 @@ function fit() {
     curve.push([broken ? "M" : "L", g]);
     broken = false;
   }
-  const frame = fitted(points, tips, small ? 30 : 58);
-  Object.assign(view, frame);
+  if (!held) Object.assign(view, fitted(points, tips, small ? 30 : 58));
   parts.curve.setAttribute("d", curve.map(([step, g]) => step + toScreen(g).map(v => v.toFixed(2)).join(" ")).join(""));
   parts.traces.replaceChildren();   // in metres: the group carries the scale
   parts.traces.setAttribute("transform", `translate(${view.x} ${view.y}) scale(${view.k} ${-view.k})`);
@@ -207,8 +207,8 @@ function drawLinkage(p, i) {
   for (const k of [2, 3, 4]) {
     const p1 = s[FIRST_PIN[k]], p2 = s[LAST_PIN[k]], drawn = Boolean(p1 && p2);
     parts.bars[k].style.display = drawn ? "" : "none";
-    if (parts.image[k]) parts.image[k].style.display = drawn && show("show-pictures") ? "" : "none";
-    if (parts.centre[k]) for (const element of Object.values(parts.centre[k])) element.style.display = drawn && show("show-centres") ? "" : "none";
+    parts.image[k].style.display = drawn && data.pictures[k] && show("show-pictures") ? "" : "none";
+    for (const element of Object.values(parts.centre[k])) element.style.display = drawn && data.centres[k] && show("show-centres") ? "" : "none";
     if (!drawn) continue;
     set(parts.bars[k], { x1: p1[0], y1: p1[1], x2: p2[0], y2: p2[1] });
     visible(String(k), true);
@@ -217,12 +217,12 @@ function drawLinkage(p, i) {
     let side = (mid[0] - middle[0]) * normal[0] + (mid[1] - middle[1]) * normal[1] >= 0 ? 15 : -15;
     if (data.centres[k] && Math.abs(data.centres[k][1]) * view.k > 10) side = data.centres[k][1] > 0 ? 15 : -15;   // off the bar, G has the other side
     set(parts.label[k], { x: mid[0] + side * normal[0], y: mid[1] + side * normal[1] });
-    if (parts.image[k]) {
+    if (data.pictures[k]) {
       const height = long * (parts.image[k].ratio ?? 0.3), angle = Math.atan2(p2[1] - p1[1], p2[0] - p1[0]) * DEG;
       set(parts.image[k], { x: 0, y: -0.5 * height, width: long, height, transform: `translate(${p1[0]} ${p1[1]}) rotate(${angle})` });
       parts.bars[k].classList.toggle("pictured", show("show-pictures"));
     }
-    if (parts.centre[k]) {
+    if (data.centres[k]) {
       const g = toScreen(barPoint(known, k, data.centres[k]));
       parts.centre[k].mark.setAttribute("transform", `translate(${g[0]} ${g[1]})`);
       set(parts.centre[k].arm, { x1: p1[0], y1: p1[1], x2: g[0], y2: g[1] });
