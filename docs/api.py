@@ -13,16 +13,22 @@ TARGET = Path(__file__).with_suffix(".md")
 HEAD = """\
 # The Python API
 
-Everything that `dir(fourbar)` shows; SI and radians everywhere. `import fourbar` loads numpy alone: what needs
+Everything that `dir(fourbar)` shows; SI and radians everywhere; a description takes texts with units too,
+like `uniform("6 in", ...)`. `import fourbar` loads numpy alone: what needs
 more (files, effects, drawings) is loaded on first use.
 
-`scene.plot(figure="overview", position=..., branches=..., units=...)` draws a figure that a notebook shows and
-`.save("a.pdf")` writes; a scene and a solution as the last line of a cell show themselves.
+`scene.plot()` draws a figure that a notebook shows and `.save("a.pdf")` writes; a scene and every result as the last
+line of a cell show themselves.
 
 *Written by `python docs/api.py` from the docstrings.*
 """
 MEANINGS = {quantity.name: quantity for quantity in QUANTITIES}
-METHODS = {"Solution": ("status", "assembled", "evaluated", "to_csv", "to_pandas"), "Bar": ("moment_of_inertia",)}
+METHODS = {
+    "Solution": ("power", "status", "assembled", "evaluated", "to_csv", "to_pandas"),
+    "Bar": ("moment_of_inertia",),
+    "Scene": ("plot",),
+    "Sensitivity": ("of", "value", "to_pandas"),
+}
 """Methods and properties that are shown with their class."""
 
 

@@ -58,6 +58,8 @@ if _TYPE_CHECKING:
     from fourbar.studies.derivatives import Sensitivity as Sensitivity
     from fourbar.studies.derivatives import sensitivity as sensitivity
     from fourbar.studies.enclosure import extremes as extremes
+    from fourbar.studies.equilibrium import equilibrium as equilibrium
+    from fourbar.studies.ratio import ratio as ratio
     from fourbar.studies.spread import tolerances as tolerances
     from fourbar.studies.study import Study as Study
     from fourbar.studies.study import vary as vary
@@ -70,6 +72,8 @@ _ON_FIRST_USE = {
     **{name: "fourbar.studies.derivatives" for name in ("Sensitivity", "sensitivity")},
     **{name: "fourbar.studies.study" for name in ("Study", "vary")},
     "extremes": "fourbar.studies.enclosure",
+    "equilibrium": "fourbar.studies.equilibrium",
+    "ratio": "fourbar.studies.ratio",
     "tolerances": "fourbar.studies.spread",
     "in_units": "fourbar.show.notebook",
     "units": "fourbar.show.units",
@@ -88,7 +92,42 @@ def _method(module: str, function: str) -> _Any:
 
 setattr(Scene, "_repr_html_", _method("fourbar.show.notebook", "scene_html"))  # noqa: B010 - declared where it is drawn
 setattr(Solution, "_repr_html_", _method("fourbar.show.notebook", "solution_html"))  # noqa: B010
-setattr(Scene, "plot", _method("fourbar.show.plot.figures", "drawn"))  # noqa: B010
+
+
+def _plot(
+    self: Scene,
+    figure: str = "overview",
+    *,
+    position: float | None = None,
+    branches: str = "one",
+    units: _Any = None,
+    dimensions: bool = False,
+) -> _Any:
+    """Draw a figure that a notebook shows, and that `.save("a.pdf")` writes.
+
+    Parameters
+    ----------
+    figure : "overview", "linkage", "coupler", "kinematics", "points", "torque", "forces", "hodograph", "energy",
+        "transmission", "freebody" or "sensitivity".
+    position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
+    branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
+    units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI with the prefix that suits, deg.
+    dimensions : write the lengths of the bars at them.
+
+    Raises
+    ------
+    InputError : unknown figure or choice of branches; a figure of forces without omega_2.
+    NotAssembledError : there is no position to draw.
+    DependencyError : matplotlib is missing.
+    """
+    from fourbar.show.plot.figures import drawn
+
+    given = {} if units is None else {"units": units}
+    return drawn(self, figure, position=position, branches=branches, dimensions=dimensions, **given)
+
+
+_plot.__name__, _plot.__qualname__ = "plot", "Scene.plot"
+setattr(Scene, "plot", _plot)  # noqa: B010
 
 
 def __getattr__(name: str) -> _Any:

@@ -31,15 +31,28 @@ MOST_STEPS = 100_000_000
 """Intervals of any motion or curve."""
 
 
-def require(key: str, value: object, *, positive: bool = False, at_least_zero: bool = False) -> float:
-    """Return the value as a float, or raise an InputError that says what is allowed."""
+def require(key: str, value: object, unit: str = "1", *, positive: bool = False, at_least_zero: bool = False) -> float:
+    """Return the value as a float, or raise an InputError that says what is allowed.
+
+    Parameters
+    ----------
+    unit : of the number; a text like "48 cm" is converted to it. "1": there is none, and no text is read.
+    """
     allowed = "a finite number"
     if positive:
         allowed = "a finite number > 0"
     elif at_least_zero:
         allowed = "a finite number >= 0"
     number = math.nan
-    if not isinstance(value, NO_NUMBERS) and not getattr(value, "shape", ()):
+    if unit != "1" and isinstance(value, str):
+        from fourbar.quantities.units import UnitError, to_si
+
+        try:
+            number = to_si(value, unit)
+        except UnitError as error:
+            like = f'must be {allowed}, in {unit} or with a unit, like "1 {unit}"'
+            raise InputError(key, value, f"{error}; {like}") from None
+    elif not isinstance(value, NO_NUMBERS) and not getattr(value, "shape", ()):
         with suppress(TypeError, ValueError, OverflowError):
             number = float(value)  # type: ignore[arg-type]
     if not math.isfinite(number) or (positive and number <= 0.0) or (at_least_zero and number < 0.0):
@@ -54,8 +67,19 @@ def require_whole(key: str, value: object, among: Container[int], allowed: str) 
     return int(value)
 
 
-def require_numbers(key: str, value: object, allowed: str = "must be finite numbers") -> NDArray[np.float64]:
-    """Return the value as finite floats, shape () or (n,), or raise an InputError that says what is allowed."""
+def require_numbers(
+    key: str, value: object, allowed: str = "must be finite numbers", unit: str = "1"
+) -> NDArray[np.float64]:
+    """Return the value as finite floats, shape () or (n,), or raise an InputError that says what is allowed.
+
+    A text with a unit is converted as by `require`, in a list too.
+    """
+    if unit != "1" and isinstance(value, (str, list, tuple)):
+        value = (
+            require(key, value, unit)
+            if isinstance(value, str)
+            else [require(key, each, unit) if isinstance(each, str) else each for each in value]
+        )
     try:
         array = np.asarray(value)
     except ValueError:  # rows of different lengths
@@ -74,6 +98,8 @@ def require_bar(key: str, value: object) -> int:
 class Bar:
     """A moving bar; massless unless stated otherwise.
 
+    Each number may be a text with a unit instead, like "48 cm".
+
     Parameters
     ----------
     length : distance between its two pins, m, > 0.
@@ -89,19 +115,19 @@ class Bar:
     centre: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        length = require("length", self.length, positive=True)
-        mass = require("mass", self.mass, at_least_zero=True)
+        length = require("length", self.length, "m", positive=True)
+        mass = require("mass", self.mass, "kg", at_least_zero=True)
         set_field = object.__setattr__  # the class is frozen; this is its constructor
         set_field(self, "length", length)
         set_field(self, "mass", mass)
         if self.inertia is not None:
-            set_field(self, "inertia", require("inertia", self.inertia, at_least_zero=True))
+            set_field(self, "inertia", require("inertia", self.inertia, "kg m^2", at_least_zero=True))
         if self.centre is not None:
             try:
                 r, phi = self.centre
             except (TypeError, ValueError):
                 raise InputError("centre", self.centre, "must be a pair (distance, angle)") from None
-            set_field(self, "centre", (require("centre", r), require("centre", phi)))
+            set_field(self, "centre", (require("centre", r, "m"), require("centre", phi, "rad")))
 
     @property
     def moment_of_inertia(self) -> float:
@@ -135,11 +161,11 @@ class FourBar:
     ground_angle: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ground", require("lengths.ground", self.ground, positive=True))
+        object.__setattr__(self, "ground", require("lengths.ground", self.ground, "m", positive=True))
         for name, bar in zip(("input", "coupler", "output"), self.moving, strict=True):
             if not isinstance(bar, Bar):
                 raise InputError(f"bars.{name}", bar, "must be a Bar, like fourbar.Bar(0.1) for a bar of 0.1 m")
-        object.__setattr__(self, "ground_angle", require("lengths.ground_angle", self.ground_angle))
+        object.__setattr__(self, "ground_angle", require("lengths.ground_angle", self.ground_angle, "rad"))
         longest = max(self.lengths)
         if not math.isfinite(4.0 * longest):
             raise InputError("lengths", self.lengths, "must be at most a quarter of the greatest double, 4.5e307 m")
@@ -167,11 +193,22 @@ class FourBar:
         return self.moving[require_bar("bar", number) - 2]
 
 
-def uniform(ground: float, input: float, coupler: float, output: float, *, per_metre: float = 1.0) -> FourBar:
-    """Make a linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m)."""
+def uniform(
+    ground: float | str,
+    input: float | str,
+    coupler: float | str,
+    output: float | str,
+    *,
+    per_metre: float | str = 1.0,
+) -> FourBar:
+    """Make a linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m).
+
+    >>> uniform("6 in", "2 in", "5 in", "4 in").ground
+    0.1524
+    """
     bars: list[Bar] = []
-    density = require("per_metre", per_metre, at_least_zero=True)
+    density = require("per_metre", per_metre, "kg/m", at_least_zero=True)
     for key, length in (("input", input), ("coupler", coupler), ("output", output)):
-        checked = require(f"lengths.{key}", length, positive=True)
+        checked = require(f"lengths.{key}", length, "m", positive=True)
         bars.append(Bar(checked, mass=density * checked))
-    return FourBar(ground, bars[0], bars[1], bars[2])
+    return FourBar(require("lengths.ground", ground, "m", positive=True), bars[0], bars[1], bars[2])

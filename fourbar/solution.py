@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.errors import InputError, expect
 from fourbar.linkage import require
-from fourbar.quantities import NOT_ASSEMBLED, STATUS_NAMES, UNITS, Quantities, is_scalar
+from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, STATUS_NAMES, UNITS, Quantities, is_scalar
+from fourbar.writing import between, data_frame, extent, listed, write_text
 
 Array = NDArray[np.float64]
 
@@ -55,11 +56,31 @@ class Solution(Quantities):
     """Their velocities, m/s."""
     acceleration: dict[str, Array] = field(default_factory=dict, init=False)
     """Their accelerations, m/s^2."""
+    ground: tuple[Any, Any] | None = field(default=None, init=False)
+    """Length and angle of the ground bar, m and rad; of a study (m, 1) each where they vary."""
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached a limit position or change point, s; None: it did not."""
 
     def __len__(self) -> int:
         return len(self.theta_2)
+
+    def __repr__(self) -> str:
+        """Say in ten lines what it holds."""
+        counts = zip(STATUS_NAMES, np.bincount(self.status_code.ravel(), minlength=len(STATUS_NAMES)), strict=True)
+        shown = parts_of({name: values_of(self, name) for name in _quantities(self)}, scalars=("theta_2", "torque"))
+        lines = [
+            f"Solution {self.title!r}: {extent(self.theta_2)}, drive on bar {self.drive_bar}",
+            "status: " + ", ".join(f"{count} {name}" for name, count in counts if count),
+            *(f"{name}: {between(values)} {unit_of(name.strip('|'))}" for name, values in shown.items()),
+        ]
+        return "\n".join([*lines, listed("evaluated", self.evaluated())])
+
+    @property
+    def power(self) -> Array | None:
+        """Of the drive, T_k omega_k, W."""
+        speed: Array | None = getattr(self, f"omega_{self.drive_bar}")
+        with np.errstate(all="ignore"):
+            return None if self.torque is None or speed is None else self.torque * speed
 
     @property
     def assembled(self) -> NDArray[np.bool_]:
@@ -75,19 +96,22 @@ class Solution(Quantities):
         """Names of the quantities that were evaluated, theta_2 first; without the scene's own points."""
         return [name for name in UNITS if getattr(self, name) is not None]
 
-    def to_csv(self, path: str | Path | None = None, *, degrees: bool = False, units: Conversion = SI) -> str | None:
+    def to_csv(
+        self, path: str | Path | None = None, *, degrees: bool = False, units: Conversion = SI, decimal: str = "."
+    ) -> str | None:
         """One line per position, every digit; the text itself, or written to a file, whole or not at all.
 
         Parameters
         ----------
         degrees : theta in deg.
-        units : other units, as `fourbar.units("mm N.mm")` makes them; a heading names a unit that is not SI.
+        units : other units, as `fourbar.units("mm N.mm")` makes them; every heading then names its unit.
+        decimal : "," writes decimal commas, and semicolons between the columns, as many spreadsheets expect.
         """
-        from fourbar.writing import write_text
-
         expect("path", path, str, Path, type(None))
         expect("degrees", degrees, bool)
-        text = csv_text(self, {**require_units(units), **(DEGREES if degrees else SI)})
+        if decimal not in (".", ","):
+            raise InputError("decimal", decimal, 'must be "." or ","')
+        text = csv_text(self, {**require_units(units), **(DEGREES if degrees else SI)}, decimal)
         if path is None:
             return text
         write_text(path, text)
@@ -98,12 +122,25 @@ class Solution(Quantities):
 
         Raises DependencyError where pandas is not installed.
         """
-        try:
-            from pandas import DataFrame
-        except ImportError:
-            raise DependencyError(f"to_pandas needs pandas: {installing('pandas')}") from None
         known = {name: values for name, values in scalars(self, require_units(units)).items() if values is not None}
-        return DataFrame({**leading(self), **known})
+        return data_frame({**leading(self), **known})
+
+
+def parts(name: str, values: Array) -> dict[str, Array]:
+    """Split a quantity into scalars: components, and the magnitude of a pin force."""
+    if is_scalar(name):
+        return {name: values}
+    found = {f"{name}_x": values[..., 0], f"{name}_y": values[..., 1]}
+    return {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **found} if name in PIN_FORCES else found
+
+
+def parts_of(values: Mapping[str, Array | None], scalars: tuple[str, ...]) -> dict[str, Array]:
+    """Of the quantities that have values the scalars named and the magnitudes of the pin forces."""
+    found: dict[str, Array] = {}
+    for name in (*scalars, *PIN_FORCES):
+        if (own := values.get(name)) is not None:
+            found |= {part: array for part, array in parts(name, own).items() if part[-2:] not in ("_x", "_y")}
+    return found
 
 
 def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
@@ -131,17 +168,17 @@ def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
     return json.dumps(document, allow_nan=False) + "\n"
 
 
-def csv_text(solution: Solution, units: Conversion = SI) -> str:
+def csv_text(solution: Solution, units: Conversion = SI, decimal: str = ".") -> str:
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
     size, first = solution.theta_2.size, leading(solution)
     columns = {
         name: [None] * size if values is None else nulled(values) for name, values in scalars(solution, units).items()
     }
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = csv.writer(text, lineterminator="\n", delimiter=";" if decimal == "," else ",")
     writer.writerow([*first, *columns])
     for start, row in zip(zip(*first.values(), strict=True), zip(*columns.values(), strict=True), strict=True):
-        writer.writerow([*start, *("" if cell is None else repr(cell) for cell in row)])
+        writer.writerow([*start, *("" if cell is None else repr(cell).replace(".", decimal) for cell in row)])
     return text.getvalue()
 
 
@@ -161,18 +198,34 @@ def leading(solution: Solution) -> dict[str, list[Any]]:
 def scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
     """Every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated.
 
-    A heading names a unit that is not SI: `F12_x [lbf]`.
+    Of a pin force the magnitude too, and where it is known the time. In other units than SI every heading names its
+    own: `F12_x [lbf]`.
     """
     found: dict[str, Array | None] = {}
     for name in _quantities(solution):
         values, unit = values_of(solution, name, units), unit_of(name)
-        heading = f" [{units[unit][0]}]" if unit in units else ""
+        heading = f" [{unit_in(unit, units)[0]}]" if units and unit != "1" else ""
         if not is_scalar(name):
             for axis, letter in enumerate("xy"):
                 found[f"{name}_{letter}{heading}"] = None if values is None else values[..., axis].ravel()
+            if name in PIN_FORCES:
+                found[f"|{name}|{heading}"] = None if values is None else np.hypot(*values.T).T.ravel()
         else:
             found[name + heading] = None if values is None else values.ravel()
+    if solution.time is None and (time := _time_turned(solution)) is not None:
+        found["time [s]" if units else "time"] = time
     return found
+
+
+def _time_turned(solution: Solution) -> Array | None:
+    """Compute when each position of a sweep at one constant speed is passed, s; None for any other."""
+    if solution.omega_2 is None or solution.alpha_2 is None or solution.theta_2.ndim > 1 or not solution.omega_2.all():
+        return None
+    if np.ptp(solution.omega_2) != 0.0 or solution.alpha_2.any():
+        return None
+    time: Array = solution.theta_2 / solution.omega_2
+    time -= time.min()
+    return time
 
 
 def require_units(units: object) -> Conversion:

@@ -180,6 +180,7 @@ def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[s
     known = {name: array for name, array in result.items() if name in STAGE_OF} if scene.points else result
     solution = Solution(scene.title, scene.drive_bar, code, np.asarray(at.branch), theta_2=at.theta_2, **known)
     solution.points, solution.velocity, solution.acceleration = own[""], own["v_"], own["a_"]
+    solution.ground = (scene.linkage.ground, scene.linkage.ground_angle)
     return solution
 
 

@@ -1,12 +1,20 @@
-"""Files appear whole or not at all: written under a temporary name next to the target, then renamed."""
+"""Files appear whole or not at all: written under a temporary name, then renamed; and what a result says of itself."""
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any
 
-from fourbar.errors import InputError
+import numpy as np
+
+from fourbar.errors import DependencyError, InputError, installing
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 TEMPORARY = ".part"
 """What the name of an unfinished file ends with."""
@@ -66,3 +74,38 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
 def write_text(path: str | Path, text: str) -> None:
     """Write a UTF-8 text file whole, line ends as given."""
     write_bytes(path, text.encode("utf-8"))
+
+
+def data_frame(columns: Mapping[str, Any]) -> "DataFrame":
+    """Make a table of pandas; DependencyError where it is not installed."""
+    try:
+        from pandas import DataFrame
+    except ImportError:
+        raise DependencyError(f"to_pandas needs pandas: {installing('pandas')}") from None
+    return DataFrame(columns)
+
+
+def extent(theta_2: Any) -> str:
+    """Say how many positions there are, of how many linkages."""
+    count = f"{theta_2.shape[-1]} position{'s' if theta_2.shape[-1] != 1 else ''}"
+    return count if theta_2.ndim == 1 else f"{len(theta_2)} linkages, {count} each"
+
+
+def between(values: Any) -> str:
+    """Least and greatest of an array."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return "no value"
+    return f"{known.min():.6g}" if known.min() == known.max() else f"{known.min():.6g} to {known.max():.6g}"
+
+
+def listed(what: str, names: Iterable[str]) -> str:
+    """Names on one line of a representation, as many as fit."""
+    return shorten(f"{what}: {', '.join(names)}", 110, placeholder=" ...")
+
+
+def html_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Make what a notebook shows of a result."""
+    lines = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    heads = "".join(f"<th>{escape(cell)}</th>" for cell in head)
+    return f"<div><b>{escape(title)}</b><table><tr>{heads}</tr>{lines}</table></div>"

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fourbar.cli.given import FILE, lengths_of, opened, or_out_option, printed_to, scene_argument, units_option, waiting
+from fourbar.cli.given import (
+    FILE,
+    is_bare,
+    lengths_of,
+    opened,
+    or_out_option,
+    printed_to,
+    scene_argument,
+    units_option,
+    waiting,
+)
 from fourbar.errors import InputError, NotAssembledError
 
 if TYPE_CHECKING:
@@ -21,24 +31,29 @@ if TYPE_CHECKING:
 def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     """Name a linkage by its bar lengths (ground, input, coupler, output), and say what turns and how far.
 
-    Bare numbers are metres; "30 cm" works too.
+    Four bare numbers are ratios; lengths like 30cm work too.
     """
     from fourbar.linkage import Bar, FourBar
     from fourbar.show.words import type_json, type_lines
 
+    ratios = [is_bare(text) for text in lengths]
+    if any(ratios) and not all(ratios):
+        raise InputError("D A B C", " ".join(lengths), "must be four ratios, or four lengths each with its unit")
     d, a, b, c = lengths_of(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
-    printed_to((type_json(linkage) if as_json else "\n".join(type_lines(linkage))) + "\n", out)
+    unit = "" if all(ratios) else " m"
+    printed_to((type_json(linkage) if as_json else "\n".join(type_lines(linkage, unit))) + "\n", out)
 
 
 @click.command()
 @click.argument("file", type=FILE, required=False)
 @click.option("-o", "--out", type=FILE, metavar="FILE", help="The same, as an option.")
-@click.option("--lengths", nargs=4, required=True, metavar="D A B C", help="Ground, input, coupler, output.")
-def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
+@click.option("--lengths", nargs=4, required=True, metavar="D A B C", help="Ground, input, coupler, output: 300mm ...")
+@click.option("--unit", metavar="UNIT", help="Of bare numbers, like mm.")
+def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str | None) -> None:
     """Write a new scene file with the four lengths, the rest explained in comments.
 
-    Bare numbers are metres; "30 cm" works too.
+    Each length has a unit, like 300mm; or --unit mm is the unit of all.
     """
     from fourbar.files.new import new_scene
     from fourbar.writing import write_text
@@ -49,14 +64,20 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
     assert file is not None
     if file.exists():
         raise InputError("FILE", str(file), "is there already; a new scene needs a new name")
-    write_text(file, new_scene(lengths))
+    bare = [text for text in lengths if is_bare(text)]
+    if bare and unit is None:
+        raise InputError(
+            "--lengths", bare[0], "the unit is missing; write each with its own, like 300mm, or --unit mm once"
+        )
+    write_text(file, new_scene([f"{text} {unit}" if text in bare else text for text in lengths]))
     click.echo(f"wrote {file}; edit it, then: fourbar analyze {file}")
 
 
 @click.command()
 @scene_argument
 @click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
-@click.option("--csv", "as_csv", is_flag=True, help="One line per position, SI, every digit.")
+@click.option("--csv", "as_csv", flag_value=".", help="One line per position, SI, every digit.")
+@click.option("--csv-comma", "as_csv", flag_value=",", help="The same with decimal commas, and semicolons between.")
 @click.option("--degrees/--radians", default=None, help="Angles theta; left out: degrees in the table, else radians.")
 @units_option
 @click.option("--sensitivity", is_flag=True, help="What the quantities depend on: d(quantity)/d(number).")
@@ -66,7 +87,7 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...]) -> None:
 def analyze(
     scene: Path,
     as_json: bool,
-    as_csv: bool,
+    as_csv: str | None,
     degrees: bool | None,
     units: "Conversion",
     sensitivity: bool,
@@ -79,6 +100,7 @@ def analyze(
             raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")
         _sensitivity(scene, as_json, out)
         return
+    from fourbar.show.between import between
     from fourbar.show.duty import motor_entry
     from fourbar.show.tables import printed
     from fourbar.solution import DEGREES, csv_text, json_text
@@ -98,9 +120,10 @@ def analyze(
     if not solution.assembled.any():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions requested")
     if as_json:
-        text = json_text(solution, shown, motor=motor_entry(solution, shown))
+        found = between(described, solution)
+        text = json_text(solution, shown, motor=motor_entry(solution, shown, found and found.solution))
     elif as_csv:
-        text = csv_text(solution, shown)
+        text = csv_text(solution, shown, as_csv)
     else:
         width = None if out or not sys.stdout.isatty() else shutil.get_terminal_size().columns
         text = printed(described, solution, width, shown, every=every)
@@ -128,15 +151,20 @@ def _sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
 @click.option("--samples", type=int, metavar="N", help="Linkages that are tried; left out: 8192.")
 @click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Of the quasi-random samples.")
 @click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
+@units_option
 @click.option("-o", "--out", type=FILE, metavar="PLOT", help="Draw the bands: svg, png or pdf.")
-def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: Path | None) -> None:
+def tolerance(
+    scene: Path, samples: int | None, seed: int, as_json: bool, units: "Conversion", out: Path | None
+) -> None:
     """Show what the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
     from fourbar.show.progress import running
     from fourbar.show.tables import under_heading
+    from fourbar.solution import DEGREES
     from fourbar.studies.spread import SAMPLES, tolerances
 
+    _refuse_units_of_json(as_json, units)
     if out is not None:
         format_of(out)
     with opened(scene) as stated, running("samples are solved") as progress:
@@ -144,30 +172,40 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, out: P
     if (found.without == found.samples).all():
         raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
     if out is not None:
-        draw_tolerances(found, out)
+        draw_tolerances(found, out, units)
     if as_json:
         printed_to(shown.json_text(found), None)
     else:
-        printed_to(under_heading(stated.title, shown.heading(found), shown.table(found)), None)
+        own = {**DEGREES, **units}
+        printed_to(under_heading(stated.title, shown.heading(found, own), shown.table(found, own)), None)
+
+
+def _refuse_units_of_json(as_json: bool, units: "Conversion") -> None:
+    if as_json and units:
+        raise click.UsageError("--json is SI and radians, every digit; --units is of the table")
 
 
 @click.command()
 @scene_argument
 @click.option("--quantity", "quantities", multiple=True, metavar="NAME", help="torque, F12 .. F14, transmission.")
 @click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
+@units_option
 @or_out_option
-def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, out: Path | None) -> None:
+def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: "Conversion", out: Path | None) -> None:
     """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
     from fourbar.show import extremes as shown
     from fourbar.show.progress import running
     from fourbar.show.tables import under_heading
+    from fourbar.solution import DEGREES
     from fourbar.studies.enclosure import NAMES
     from fourbar.studies.enclosure import extremes as proven
 
-    with opened(scene) as stated, running("the boxes are halved"):
+    _refuse_units_of_json(as_json, units)
+    with opened(scene) as stated, running("pieces of the interval are halved"):
         found = proven(stated, quantities or NAMES)
     if as_json:
         text = shown.json_text(stated, found)
     else:
-        text = under_heading(stated.title, shown.heading(stated, found), shown.table(found))
+        own = {**DEGREES, **units}
+        text = under_heading(stated.title, shown.heading(stated, found, own), shown.table(found, own))
     printed_to(text, out)

@@ -1,6 +1,5 @@
 """The commands that write files: pictures (plot, animate), and models for simulators (mjcf, sdf, usd)."""
 
-from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,10 +17,16 @@ from fourbar.cli.given import (
     units_option,
     waiting,
 )
-from fourbar.errors import DependencyError, InputError, installing
+from fourbar.cli.rest import in_place_of_loop
+from fourbar.errors import InputError
 
 if TYPE_CHECKING:
+    from fourbar.mjcf.document import Drive
     from fourbar.solution import Conversion
+
+without_loads_option = click.option(
+    "--without-loads", is_flag=True, help="Leave the loads out: the form has none, your program applies them."
+)
 
 
 @click.command()
@@ -95,8 +100,24 @@ def animate(
     show_default=True,
     help="What loads it: settings that suit it, and where its numbers stand.",
 )
+@click.option("--mimic", is_flag=True, help="Joints that follow the input in place of the loop (see `fourbar ratio`).")
+@click.option(
+    "--drive",
+    type=click.Choice(["flywheel", "motor", "none"]),
+    default="flywheel",
+    show_default=True,
+    help="flywheel keeps omega_2; for a controller of your own: motor, whose ctrl is the drive's couple, or none.",
+)
 @out_option
-def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None, simulator: str, out: Path) -> None:
+def mjcf(
+    scene: Path | None,
+    lengths: tuple[str, ...] | None,
+    omega: str | None,
+    simulator: str,
+    drive: "Drive",
+    mimic: bool,
+    out: Path,
+) -> None:
     """Write a scene, or a linkage of uniform bars, as MJCF that runs on its own in MuJoCo and its kin."""
     from fourbar import mjcf as writer
 
@@ -106,12 +127,14 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
         if omega is not None:
             raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
         with opened(scene) as described:
-            printed_to(writer.mjcf_for(described, simulator), out)
+            text = writer.mjcf_for(described, simulator, drive)
+            printed_to(in_place_of_loop(text, described) if mimic else text, out)
         return
     assert lengths is not None
     speed = {} if omega is None else {"omega": number_of("--omega", omega, "rad/s")}
     made = writer.scene_from_lengths(*lengths_of(lengths), **speed)
-    printed_to(writer.mjcf_for(made, simulator), out)
+    text = writer.mjcf_for(made, simulator, drive)
+    printed_to(in_place_of_loop(text, made) if mimic else text, out)
     for line in writer.defaults_used(made):
         click.echo(line)
 
@@ -119,44 +142,23 @@ def mjcf(scene: Path | None, lengths: tuple[str, ...] | None, omega: str | None,
 @click.command()
 @scene_argument
 @click.option("--for", "reader", type=click.Choice(["gazebo", "drake"]), default="gazebo", show_default=True)
+@without_loads_option
 @out_option
-def sdf(scene: Path, reader: str, out: Path) -> None:
+def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
     """Write a scene as SDF, the loop closed by a fourth joint (Gazebo) or a ball constraint (Drake)."""
     from fourbar.mjcf.sdf import sdf as written
 
     with opened(scene) as described:
-        printed_to(written(described, reader), out)
+        printed_to(written(described, reader, without_loads=without_loads), out)
 
 
 @click.command()
 @scene_argument
+@without_loads_option
 @out_option
-def usd(scene: Path, out: Path) -> None:
+def usd(scene: Path, without_loads: bool, out: Path) -> None:
     """Write a scene as USD text (.usda) for Newton, the loop closed by a fourth revolute joint."""
     from fourbar.mjcf.usd import usd as written
 
     with opened(scene) as described:
-        printed_to(written(described), out)
-
-
-@click.command()
-@click.argument("scene", type=FILE, required=False)
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Of this machine; left out: any that is free.")
-@click.option("--exports", type=FILE, metavar="FOLDER", help="For exports and reports; left out: SCENE_exports.")
-@click.option("--no-browser", is_flag=True, help="Print the address only.")
-def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) -> None:
-    """Change a scene in the browser, and see torque and forces follow; without SCENE a new one.
-
-    Ctrl-C ends it, and so do 10 s after the last page has gone.
-    """
-    from fourbar.writing import require_file
-
-    if scene is None:
-        names = (Path(f"linkage{number}.toml") for number in chain([""], count(2)))
-        scene = next(path for path in names if not path.exists())
-    require_file(scene)
-    try:
-        from fourbar.edit.server import edit as opened_there
-    except ModuleNotFoundError as error:
-        raise DependencyError(f"{error.name} is not installed: {installing('edit')}") from None
-    opened_there(scene, exports or scene.with_name(f"{scene.stem}_exports"), port, browse=not no_browser)
+        printed_to(written(described, without_loads=without_loads), out)

@@ -82,6 +82,15 @@ def lengths_of(texts: tuple[str, ...]) -> list[float]:
     return [number_of(f"length of {name}", text, "m", positive=True) for name, text in zip(names, texts, strict=True)]
 
 
+def is_bare(text: str) -> bool:
+    """Whether a text is a number without a unit."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def number_of(key: str, text: str, unit: str, *, positive: bool = False) -> float:
     """Read a number of the command line: bare in SI, or with a unit."""
     from fourbar.linkage import require
@@ -89,7 +98,7 @@ def number_of(key: str, text: str, unit: str, *, positive: bool = False) -> floa
     try:
         return require(key, float(text), positive=positive)
     except ValueError:
-        from fourbar.files.units import UnitError, to_si
+        from fourbar.quantities.units import UnitError, to_si
 
         try:
             return require(key, to_si(text, unit), positive=positive)
@@ -99,11 +108,9 @@ def number_of(key: str, text: str, unit: str, *, positive: bool = False) -> floa
 
 def angle_of(key: str, text: str) -> float:
     """Read an angle with its unit, rad: a bare number may have been meant in either."""
-    try:
-        float(text)
-    except ValueError:
-        return number_of(key, text, "rad")
-    raise InputError(key, text, f'the unit is missing; did you mean "{text} deg"?')
+    if is_bare(text):
+        raise InputError(key, text, f'the unit is missing; did you mean "{text} deg"?')
+    return number_of(key, text, "rad")
 
 
 def printed_to(text: str, out: Path | None) -> None:

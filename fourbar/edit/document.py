@@ -8,7 +8,7 @@ from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import AoT, InlineTable, Item, Table
+from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
 
 from fourbar.errors import InputError
 from fourbar.files.effects import REGISTRY
@@ -140,12 +140,12 @@ def _like(old: Any, value: Any) -> Any:
     return made
 
 
-def _table(entries: dict[str, Any], *after: Item) -> Table:
+def _table(entries: dict[str, Any], *after: Whitespace) -> Table:
     made = tomlkit.table()
     for key, value in entries.items():
         made[key] = _inline(value)
     for blank in after:
-        made.add(blank)  # type: ignore[arg-type]
+        made.add(blank)
     return made
 
 

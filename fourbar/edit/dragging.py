@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from fourbar.edit.document import Path, SceneDocument
 from fourbar.errors import InputError
-from fourbar.files.units import FRACTION, NUMBER, to_si
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.quantities.units import FRACTION, NUMBER, to_si
 from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve
 
@@ -47,11 +47,9 @@ class Handle(NamedTuple):
 def handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
     """List everything that can be dragged: mass centres, points, loads, and the ends of what acts on a line."""
     found = [
-        Handle(
-            f"mass centre of {BAR_NAMES[n]}", ("bars", BAR_NAMES[n], "centre"), n, 0j, scene.linkage.bar(n).to_centre
-        )
-        for n in MOVING_BARS
-        if scene.linkage.bar(n).mass > 0.0
+        Handle(f"mass centre of {name}", ("bars", name, "centre"), n, 0j, scene.linkage.bar(n).to_centre)
+        for n, name in BAR_NAMES.items()
+        if n in MOVING_BARS and scene.linkage.bar(n).mass > 0.0
     ]
     for point in scene.points:
         path = ("points", point.name, "from_pin")
@@ -59,10 +57,12 @@ def handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
     for n, load in enumerate(scene.loads):
         if load.force is not None:
             foot, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
-            path, force = ("loads", n, "at"), ("loads", n, "force")
-            found.append(Handle(f"load {n + 1}", path, load.bar, foot, cmath.rect(*load.at), turns, force))
-    lines = [(("effects", "springs", n), s) for n, s in enumerate(document.get("effects", {}).get("springs", []))]
-    lines.append((("drive",), document.get("drive", {})))
+            force = ("loads", n, "force")
+            found.append(
+                Handle(f"load {n + 1}", ("loads", n, "at"), load.bar, foot, cmath.rect(*load.at), turns, force)
+            )
+    lines: list[tuple[tuple[str | int, ...], Any]] = [(("drive",), document.get("drive", {}))]
+    lines += [(("effects", "springs", n), s) for n, s in enumerate(document.get("effects", {}).get("springs", []))]
     for path_of, entry in lines:
         for end in ("from", "to"):
             if isinstance(own := entry.get(end), dict):
@@ -114,7 +114,7 @@ def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], given: Dr
             return
         if handle.force is not None and list(handle.force) == given.what:
             arrow = (given.to - foot - own_frame * handle.beyond) / own_frame
-            size, _ = _pair_of(document, handle.force)
+            size = str(plain["loads"][handle.force[1]]["force"][0])
             unit = unit_of(size, "N")
             force = to_si(size, unit) * given.stretch
             angle = cmath.phase(arrow) + (0.0 if force >= 0.0 else math.pi)
@@ -134,11 +134,6 @@ def _drag_pin(document: SceneDocument, given: Dragged, pins: dict[str, complex])
     if given.what == "O4":
         angle, key = cmath.phase(given.to), ("lengths", "ground_angle")
         document.put(key, _angle(document.at(key), angle, given.grain / max(abs(given.to), given.grain)))
-
-
-def _pair_of(document: SceneDocument, path: Path) -> tuple[str, str]:
-    pair = document.at(path)
-    return ("0 m", "0 deg") if pair is None else (str(pair[0]), str(pair[1]))
 
 
 def _put_pair(document: SceneDocument, path: Path, size: float, angle: float, grain: float) -> None:

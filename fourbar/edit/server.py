@@ -20,7 +20,7 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from fourbar.edit.answer import frame
 from fourbar.edit.session import Session
-from fourbar.edit.witness import Check
+from fourbar.edit.witness import HarnessRun
 from fourbar.errors import FourBarError, InputError
 from fourbar.show.animate import page
 
@@ -43,12 +43,12 @@ class Workbench:
 
     def __init__(self, session: Session) -> None:
         self.session, self.ended = session, asyncio.Event()
-        self.pages: set[Line] = set()
-        self.waiting: deque[tuple[Line, dict[str, Any]]] = deque()
+        self.pages: set[PageLine] = set()
+        self.waiting: deque[tuple[PageLine, dict[str, Any]]] = deque()
         self.one = ThreadPoolExecutor(1)  # the session is touched from this thread alone
         self.working: asyncio.Task[None] | None = None
         self.timers: dict[str, asyncio.TimerHandle] = {}
-        self.check = Check(session.exports.folder / "check", self.tell)
+        self.check = HarnessRun(session.exports.folder / "check", self.tell)
 
     def later(self, name: str, seconds: float, what: Any) -> None:
         """Do something after a while, once: asked for again, it waits anew."""
@@ -60,25 +60,25 @@ class Workbench:
         if name in self.timers:
             self.timers.pop(name).cancel()
 
-    def join(self, line: "Line") -> None:
+    def join(self, line: "PageLine") -> None:
         """Welcome a page."""
         self.pages.add(line)
         self.never("gone")
 
-    def leave(self, line: "Line") -> None:
+    def leave(self, line: "PageLine") -> None:
         """Forget a page; some time after the last one the server ends."""
         self.pages.discard(line)
         if not self.pages:
             self.later("gone", GONE, self.ended.set)
 
-    def tell(self, about: dict[str, Any], *, to: "Line | None" = None) -> None:
+    def tell(self, about: dict[str, Any], *, to: "PageLine | None" = None) -> None:
         """Send an answer to one page or to all."""
         data = frame(about)
         for line in [to] if to else list(self.pages):
             with suppress(WebSocketClosedError):
                 line.write_message(data, binary=True)
 
-    def take(self, line: "Line", asked: dict[str, Any]) -> None:
+    def take(self, line: "PageLine", asked: dict[str, Any]) -> None:
         """Put a request in the queue; a later one of the same gesture takes the place of one that waits."""
         if asked.get("do") in ("check", "stop"):
             self.check.start(self.session.now.text) if asked["do"] == "check" else self.check.stop()
@@ -220,7 +220,7 @@ class Report(Guarded):
         self.finish(self.bench.check.report.read_bytes())
 
 
-class Line(WebSocketHandler, Guarded):
+class PageLine(WebSocketHandler, Guarded):
     """The line between a page and the session."""
 
     def prepare(self) -> None:
@@ -259,7 +259,7 @@ class Line(WebSocketHandler, Guarded):
 def application(bench: Workbench, port: int) -> Application:
     """Make the application of a workbench that listens at a port."""
     known = {"bench": bench, "hosts": frozenset(f"{name}:{port}" for name in (LOOPBACK, "localhost"))}
-    routes = {"": Page, "report": Report, "live": Line}
+    routes = {"": Page, "report": Report, "live": PageLine}
     return Application(
         [(rf"/(?P<token>[A-Za-z0-9_-]+)/{place}", handler, known) for place, handler in routes.items()],
         log_function=lambda handler: None,

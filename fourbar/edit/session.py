@@ -35,7 +35,7 @@ NEW = ("300 mm", "100 mm", "250 mm", "220 mm")
 """Ground, input, coupler and output of a new scene."""
 
 
-class State(NamedTuple):
+class SceneState(NamedTuple):
     """A scene file that can be read, and what was read."""
 
     text: str
@@ -101,10 +101,10 @@ class Session:
     def _on_disk(self) -> str | None:
         return _digest(read_bytes(self.path, "scene file", LARGEST_FILE)) if self.path.exists() else None
 
-    def _read(self, text: str) -> State:
+    def _read(self, text: str) -> SceneState:
         if len(text.encode()) > LARGEST_FILE:
             raise InputError("scene file", len(text), f"must not exceed {LARGEST_FILE} bytes")
-        return State(text, loads(text, str(self.path)), tomllib.loads(text))
+        return SceneState(text, loads(text, str(self.path)), tomllib.loads(text))
 
     # ---- what a page asks for ----------------------------------------------------------------
 
@@ -161,7 +161,7 @@ class Session:
         self._step(self._read(self.document.text()), goes_on)
         self.gesture = gesture
 
-    def _step(self, now: State, goes_on: bool) -> None:
+    def _step(self, now: SceneState, goes_on: bool) -> None:
         if goes_on:
             self.texts = [*self.texts[: self.place], now.text]
         elif now.text != self.now.text:

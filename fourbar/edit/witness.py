@@ -32,7 +32,7 @@ def harness() -> list[str]:
     raise DependencyError(f"the harness with MuJoCo and Pinocchio is not installed: {installing('validation')}")
 
 
-class Check:
+class HarnessRun:
     """One run of the harness at a time, with its progress."""
 
     def __init__(self, folder: Path, tell: Callable[[dict[str, Any]], None]) -> None:
@@ -70,13 +70,12 @@ class Check:
             self.report.unlink(missing_ok=True)
             scene = self.folder / "scene.toml"
             write_text(scene, text)
-            own = {"start_new_session": True} if os.name == "posix" else {}
             self.process = await asyncio.create_subprocess_exec(
                 *(*command, "run", str(scene.absolute()), "--out", str(self.folder.absolute())),
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 cwd=CHECKOUT if command[-1] == "validation" else None,
-                **own,
+                start_new_session=True,  # so that it ends with all that it starts
             )
             assert self.process.stdout is not None
             reading = asyncio.create_task(self._read(self.process.stdout, lines))

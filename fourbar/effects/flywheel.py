@@ -23,7 +23,7 @@ class Flywheel(Effect):
     key: ClassVar[str] = "flywheel"
 
     def __post_init__(self) -> None:
-        inertia = require("effects.flywheel.inertia", self.inertia, at_least_zero=True)
+        inertia = require("effects.flywheel.inertia", self.inertia, "kg m^2", at_least_zero=True)
         bar = require_whole("effects.flywheel.bar", self.bar, (2, 4), "must be 2 or 4, a bar on a fixed pin")
         object.__setattr__(self, "inertia", inertia)
         object.__setattr__(self, "bar", bar)

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import AT_LEAST_ZERO, checked
+from fourbar.effects.pins import checked
 from fourbar.formulas.arithmetic import anywhere
 from fourbar.formulas.motion import State
 
@@ -23,8 +23,7 @@ class Friction(Effect):
     dry: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        rows = checked("effects.friction", self.torques, value=AT_LEAST_ZERO)
-        object.__setattr__(self, "torques", rows)
+        object.__setattr__(self, "torques", checked("friction", self.torques))
 
     @classmethod
     def at(cls, **torques: float) -> "Friction":

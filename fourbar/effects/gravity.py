@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
+from fourbar.effects.numbers import OF_EFFECT
 from fourbar.formulas.arithmetic import anywhere, polar, vector
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, require
@@ -23,8 +24,8 @@ class Gravity(Effect):
     key: ClassVar[str] = "gravity"
 
     def __post_init__(self) -> None:
-        for name in ("magnitude", "angle"):
-            object.__setattr__(self, name, require("effects.gravity", getattr(self, name)))
+        for name, (unit, _) in OF_EFFECT["gravity"].items():
+            object.__setattr__(self, name, require("effects.gravity", getattr(self, name), unit))
 
     @property
     def field(self) -> Any:

@@ -36,7 +36,7 @@ class Table:
 
     def __post_init__(self) -> None:
         key = "loads.table"
-        angles = tuple(require_numbers(f"{key}.theta_2", self.theta_2).ravel().tolist())
+        angles = tuple(require_numbers(f"{key}.theta_2", self.theta_2, unit="rad").ravel().tolist())
         factors = tuple(require_numbers(f"{key}.factor", self.factor).ravel().tolist())
         if len(angles) < 2 or len(angles) != len(factors):
             raise InputError(key, (len(angles), len(factors)), "needs two or more angles and as many factors")
@@ -115,8 +115,9 @@ class Load(Effect):
             expect(f"loads.{name}", pair, tuple, list)
             if len(pair) != 2:
                 raise InputError(f"loads.{name}", pair, "must be a pair (size, angle)")
-            set_field(self, name, tuple(require(f"loads.{name}", number) for number in pair))
-        set_field(self, "moment", require("loads.moment", self.moment))
+            units = ("N" if name == "force" else "m", "rad")
+            set_field(self, name, tuple(require(f"loads.{name}", *each) for each in zip(pair, units, strict=True)))
+        set_field(self, "moment", require("loads.moment", self.moment, "N m"))
 
     def act(self, actions: Actions, state: State) -> None:
         """F at its point, and the couple."""

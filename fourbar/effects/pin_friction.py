@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.cones import NONE, ONE, solve_sliding
 from fourbar.effects.effect import Effect, SolvedFriction
-from fourbar.effects.pins import AT_LEAST_ZERO, checked, rows_of
+from fourbar.effects.pins import checked, rows_of
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import anywhere
 from fourbar.formulas.pin_forces import PinForces
@@ -32,10 +32,9 @@ class PinFriction(Effect):
     dry: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        key = "effects.pin_friction"
-        rows = checked(key, self.pins, coefficient=AT_LEAST_ZERO, radius=AT_LEAST_ZERO)
+        rows = checked("pin_friction", self.pins)
         if not rows:
-            raise InputError(key, {}, "must name at least one pin")
+            raise InputError("effects.pin_friction", {}, "must name at least one pin")
         object.__setattr__(self, "pins", rows)
 
     @classmethod

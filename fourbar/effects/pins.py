@@ -3,12 +3,20 @@
 from collections.abc import Mapping
 from typing import Any
 
+from fourbar.effects.numbers import AT_LEAST_ZERO, OF_EFFECT, POSITIVE
 from fourbar.errors import InputError, expect
 from fourbar.linkage import PINS, require
 
-AT_LEAST_ZERO: dict[str, bool] = {"at_least_zero": True}
-POSITIVE: dict[str, bool] = {"positive": True}
-ANY: dict[str, bool] = {}
+
+def required(key: str, value: object, number: tuple[str, str]) -> float:
+    """Return a number of an effect as a float, or raise an InputError.
+
+    Parameters
+    ----------
+    number : its unit and bound, as of `OF_EFFECT`.
+    """
+    unit, bound = number
+    return require(key, value, unit, positive=bound == POSITIVE, at_least_zero=bound == AT_LEAST_ZERO)
 
 
 def rows_of(values: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -16,17 +24,17 @@ def rows_of(values: Mapping[str, Any]) -> tuple[Any, ...]:
     return tuple((pin, *(value if isinstance(value, (tuple, list)) else (value,))) for pin, value in values.items())
 
 
-def checked(key: str, rows: object, **limits: dict[str, bool]) -> tuple[Any, ...]:
-    """Return the rows in the order of the pins, each number a float within its limits, or raise InputError."""
+def checked(effect: str, rows: object) -> tuple[Any, ...]:
+    """Return the rows of an effect in the order of the pins, each number within its bound, or raise InputError."""
+    key, numbers = f"effects.{effect}", OF_EFFECT[effect]
     expect(key, rows, tuple, list)
     found: dict[str, tuple[Any, ...]] = {}
     for row in rows:  # type: ignore[attr-defined]
-        if not isinstance(row, (tuple, list)) or len(row) != 1 + len(limits) or not isinstance(row[0], str):
-            raise InputError(key, row, f"must be (pin, {', '.join(limits)})")
-        pin, *numbers = row
+        if not isinstance(row, (tuple, list)) or len(row) != 1 + len(numbers) or not isinstance(row[0], str):
+            raise InputError(key, row, f"must be (pin, {', '.join(name or 'value' for name in numbers)})")
+        pin, *values = row
         if pin not in PINS or pin in found:
             raise InputError(f"{key}.{pin}", row[1:], f"the pins are {', '.join(PINS)}, each once")
-        names = [f"{key}.{pin}.{name}" if len(limits) > 1 else f"{key}.{pin}" for name in limits]
-        checks = zip(names, numbers, limits.values(), strict=True)
-        found[pin] = (pin, *(require(name, number, **limit) for name, number, limit in checks))
+        given = zip(numbers.items(), values, strict=True)
+        found[pin] = (pin, *(required(f"{key}.{pin}.{name}".rstrip("."), value, of) for (name, of), value in given))
     return tuple(found[pin] for pin in PINS if pin in found)

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import ANY, AT_LEAST_ZERO, POSITIVE
+from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING
+from fourbar.effects.pins import required
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import anywhere, polar
 from fourbar.formulas.motion import State
@@ -36,12 +37,15 @@ class SpringEnd(NamedTuple):
 class Spring:
     """A spring that pulls its two points together with preload + stiffness (distance - length), N.
 
+    Where that is negative it pushes them apart: a compression spring is shorter than `length`, a gas spring has a
+    negative preload. With stiffness 0 the force is constant.
+
     Parameters
     ----------
     start, end : points on two different bars.
-    stiffness : N/m, > 0.
+    stiffness : N/m, >= 0.
     length : distance at which it pulls with the preload alone, m, >= 0.
-    preload : N.
+    preload : N, > 0 pulls, < 0 pushes.
     """
 
     start: SpringEnd
@@ -55,13 +59,43 @@ class Spring:
             if not isinstance(point, SpringEnd):
                 raise InputError(f"effects.springs.{key}", point, "must be a fourbar.effects.SpringEnd")
             bar = require_whole(f"effects.springs.{key}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
-            place = (require(f"effects.springs.{key}.at", number) for number in point[1:])
+            numbers = zip(point[1:], ("m", "rad"), strict=True)
+            place = (require(f"effects.springs.{key}.at", *number) for number in numbers)
             object.__setattr__(self, {"from": "start", "to": "end"}[key], SpringEnd(bar, *place))
         if self.start.bar == self.end.bar:
             raise InputError("effects.springs.to.bar", self.end.bar, "must be another bar than that of `from`")
-        for name, limit in (("stiffness", POSITIVE), ("length", AT_LEAST_ZERO), ("preload", ANY)):
-            number = require(f"effects.springs.{name}", getattr(self, name), **limit)
-            object.__setattr__(self, name, number)
+        for name, of in OF_EFFECT["springs"].items():
+            object.__setattr__(self, name, required(f"effects.springs.{name}", getattr(self, name), of))
+
+    @classmethod
+    def gas(
+        cls,
+        start: SpringEnd,
+        end: SpringEnd,
+        extended: float,
+        stroke: float,
+        extended_force: float,
+        compressed_force: float | None = None,
+    ) -> "Spring":
+        """Make a gas spring, which pushes its two points apart with a force that grows evenly over the stroke.
+
+        It has no end stops: beyond the stroke the force goes on along the same line.
+
+        Parameters
+        ----------
+        extended : distance of its ends at no stroke, m.
+        stroke : by which it can be shortened, m, less than `extended`.
+        extended_force : at no stroke, N, >= 0.
+        compressed_force : at full stroke, N, no less; left out: the same.
+        """
+        key, last = "effects.springs.gas", extended_force if compressed_force is None else compressed_force
+        given = zip(OF_GAS_SPRING.items(), (extended, stroke, extended_force, last), strict=True)
+        extended, stroke, first, last = (required(f"{key}.{name}", value, of) for (name, of), value in given)
+        if stroke >= extended:
+            raise InputError(f"{key}.stroke", stroke, f"must be less than the extended length, {extended:.6g} m")
+        if last < first:
+            raise InputError(f"{key}.compressed_force", last, f"must be no less than the extended_force, {first:.6g} N")
+        return cls(start, end, (last - first) / stroke, extended, -first)
 
     @property
     def slack(self) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import ANY, POSITIVE, checked, rows_of
+from fourbar.effects.pins import checked, rows_of
 from fourbar.errors import expect
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
@@ -40,8 +40,7 @@ class Torsion(Effect):
 
     def __post_init__(self) -> None:
         expect("effects.torsion.turns", self.turns, type(None))
-        rows = checked("effects.torsion", self.springs, stiffness=POSITIVE, rest=ANY, preload=ANY)
-        object.__setattr__(self, "springs", rows)
+        object.__setattr__(self, "springs", checked("torsion", self.springs))
 
     @classmethod
     def at(cls, **springs: tuple[float, float, float]) -> "Torsion":

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import AT_LEAST_ZERO, checked
+from fourbar.effects.pins import checked
 from fourbar.formulas.motion import State
 
 
@@ -17,8 +17,7 @@ class Viscous(Effect):
     key: ClassVar[str] = "viscous"
 
     def __post_init__(self) -> None:
-        rows = checked("effects.viscous", self.coefficients, value=AT_LEAST_ZERO)
-        object.__setattr__(self, "coefficients", rows)
+        object.__setattr__(self, "coefficients", checked("viscous", self.coefficients))
 
     @classmethod
     def at(cls, **coefficients: float) -> "Viscous":

@@ -3,11 +3,11 @@
 An effect is imported when a file names it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fourbar import effects as kinds
-from fourbar.effects.numbers import AT_LEAST_ZERO, OF_EFFECT, ROWS
+from fourbar.effects.numbers import AT_LEAST_ZERO, OF_EFFECT, OF_GAS_SPRING, POSITIVE, ROWS
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader, polar, quantity
 from fourbar.linkage import PINS
@@ -20,22 +20,41 @@ FIELD, INERTIA = OF_EFFECT["gravity"]["magnitude"][0], OF_EFFECT["flywheel"]["in
 
 
 def _read_springs(value: object, read: Reader) -> "Springs":
-    """Preload 0 where it is left out."""
+    """Read springs, whose preload is 0 where it is left out, and gas springs."""
     key, numbers = "effects.springs", OF_EFFECT["springs"]
     if not isinstance(value, list) or not 1 <= len(value) <= MOST_SPRINGS:
         raise read.refuse(key, value, f"must be a list of 1 to {MOST_SPRINGS} springs")
     springs = []
     for index, entry in enumerate(value):
         own = f"{key}[{index}]"
-        given = read.table(own, entry, ("from", "to", *numbers))
-        texts = {"preload": "0 N", **given}
-        stated = [read.quantity(f"{own}.{name}", texts.get(name), unit) for name, (unit, _) in numbers.items()]
+        given = read.table(own, entry, ("from", "to", *numbers, "gas"))
         start, end = (_read_point(read, f"{own}.{name}", given.get(name)) for name in ("from", "to"))
+        if gas := "gas" in given:
+            read.table(own, entry, ("from", "to", "gas"))
+            words = read.table(f"{own}.gas", given["gas"], OF_GAS_SPRING)
+            words = {"compressed_force": words.get("extended_force"), **words}
+            stated = _stated(read, f"{own}.gas", words, OF_GAS_SPRING)
+        else:
+            stated = _stated(read, own, {"preload": "0 N", **given}, numbers)
         try:
-            springs.append(kinds.Spring(start, end, *stated))
+            springs.append(kinds.Spring.gas(start, end, *stated) if gas else kinds.Spring(start, end, *stated))
         except InputError as error:  # which knows of one spring alone
             raise read.refuse(error.key.replace(key, own), error.value, error.allowed) from None
     return kinds.Springs(tuple(springs))
+
+
+def _stated(read: Reader, key: str, given: Mapping[str, object], numbers: Mapping[str, tuple[str, str]]) -> list[float]:
+    """Read each of some numbers within its bound."""
+    return [
+        read.quantity(
+            f"{key}.{name}".rstrip("."),
+            given.get(name),
+            unit,
+            positive=bound == POSITIVE,
+            at_least_zero=bound == AT_LEAST_ZERO,
+        )
+        for name, (unit, bound) in numbers.items()
+    ]
 
 
 def _read_point(read: Reader, key: str, value: object) -> "SpringEnd":
@@ -82,11 +101,7 @@ def _per_pin(key: str, kind: str, example: str, **left_out: str) -> EffectFormat
         for pin, entry in read.table(f"effects.{key}", value, PINS).items():
             own = f"effects.{key}.{pin}"
             texts = {"": entry} if "" in numbers else {**left_out, **read.table(own, entry, numbers)}
-            stated = [
-                read.quantity(f"{own}.{name}".rstrip("."), texts.get(name), unit, at_least_zero=bound == AT_LEAST_ZERO)
-                for name, (unit, bound) in numbers.items()
-            ]
-            rows.append((pin, *stated))
+            rows.append((pin, *_stated(read, own, texts, numbers)))
         effect: Effect = getattr(kinds, kind)(tuple(rows))
         return effect
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from fourbar.errors import InputError
-from fourbar.files.units import UnitError, to_si
+from fourbar.quantities.units import UnitError, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
 LONGEST_SHOWN = 60

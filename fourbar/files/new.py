@@ -8,17 +8,12 @@ from fourbar.linkage import BAR_NAMES, Bar, FourBar
 
 
 def new_scene(lengths: tuple[str, ...] | list[str]) -> str:
-    """Write a scene file for four lengths (ground, input, coupler, output), each as it was given.
+    """Write a scene file for four lengths (ground, input, coupler, output), each with its unit, as it was given.
 
-    Bare numbers are metres. Raises InputError for what is no length, and for bars that cannot close.
+    Raises InputError for what is no length, and for bars that cannot close.
     """
     read = Reader("--lengths")
-    given = []
-    for name, text in zip(BAR_NAMES.values(), lengths, strict=True):
-        try:
-            given.append((name, f"{float(text)!r} m"))
-        except ValueError:
-            given.append((name, " ".join(text.split())))
+    given = [(name, " ".join(text.split())) for name, text in zip(BAR_NAMES.values(), lengths, strict=True)]
     d, a, b, c = (read.quantity(name, text, "m", positive=True) for name, text in given)
     FourBar(d, Bar(a), Bar(b), Bar(c))
     lines = "\n".join(f'{name} = "{text}"' for name, text in given)

@@ -74,6 +74,8 @@ def loads(text: str, name: str = "scene") -> Scene:
         raise (error if error.file else error.in_file(shown)) from None
 
 
+UNQUOTED = re.compile(r"[=,\[{]\s*([+-]?\.?[0-9][0-9.]*\s*[A-Za-z°µ][^\",#\]}]*)")
+"""9 in, where "9 in" is meant."""
 PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
@@ -87,7 +89,10 @@ def _unreadable(text: str, reason: str, shown: str) -> InputError:
     start = max(0, column - 1 - LONGEST_LINE // 2)
     value = lines[line - 1][start : start + LONGEST_LINE].strip()
     why = " ".join(reason[: found.start()].split())[:120]
-    return InputError(f"line {line}, column {column}", value, f"no TOML: {why}", shown)
+    for bare in UNQUOTED.finditer(lines[line - 1]):
+        if bare.start(1) < column <= bare.end(1) + 1:
+            why = f'a number with a unit stands in quotes, like "{bare[1].strip()[:LONGEST_LINE]}"'
+    return InputError(f"line {line}, column {column}", value, f"cannot be read as TOML: {why}", shown)
 
 
 def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:

@@ -5,6 +5,7 @@ from fourbar.mjcf.defaults import scene_from_lengths as scene_from_lengths
 from fourbar.mjcf.document import flywheel as flywheel
 from fourbar.mjcf.document import mjcf as mjcf
 from fourbar.mjcf.document import run_through as run_through
+from fourbar.mjcf.mimic import with_mimic as with_mimic
 from fourbar.mjcf.settings import RECIPE as RECIPE
 from fourbar.mjcf.settings import Settings as Settings
 from fourbar.mjcf.settings import WindowMotion as WindowMotion

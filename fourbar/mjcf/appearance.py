@@ -14,6 +14,11 @@ MARGIN = 1.15
 """Width and height of the picture over those of the linkage."""
 
 
+def rounded(*numbers: float) -> str:
+    """Numbers that nothing is computed from, in six digits."""
+    return " ".join(f"{number:.6g}" for number in numbers)
+
+
 class CameraView(NamedTuple):
     """What the camera sees: the box in which pins A and B move."""
 
@@ -41,7 +46,7 @@ def frame(linkage: FourBar) -> CameraView:
 def add_appearance(root: ET.Element, linkage: FourBar) -> None:
     """Extent and free camera of the viewer, light, background."""
     seen = frame(linkage)
-    ET.SubElement(root, "statistic", extent=repr(seen.distance / 1.5), center=f"{seen.x!r} {seen.y!r} 0")
+    ET.SubElement(root, "statistic", extent=rounded(seen.distance / 1.5), center=rounded(seen.x, seen.y, 0))
     visual = ET.SubElement(root, "visual")
     # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks straight down on the plane
     ET.SubElement(visual, "global", azimuth="90", elevation="-90", fovy=f"{FOVY:g}", offwidth="1280", offheight="960")
@@ -54,7 +59,7 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
 def add_camera(world: ET.Element, linkage: FourBar) -> None:
     """Add the camera `plane`, and a light at the same place."""
     seen = frame(linkage)
-    place = f"{seen.x!r} {seen.y!r} {seen.distance!r}"
+    place = rounded(seen.x, seen.y, seen.distance)
     shining = {"diffuse": ".2 .2 .2", "specular": ".1 .1 .1"}  # with the headlight 1
     shining |= {"directional": "true", "castshadow": "false"}
     ET.SubElement(world, "light", shining, name="light", pos=place, dir="0 0 -1")

@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from fourbar.errors import LimitError
-from fourbar.linkage import MOVING_BARS
+from fourbar.linkage import FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.document import Start, at_start
 from fourbar.mjcf.model import carriable
+from fourbar.mjcf.notes import NOTES
 from fourbar.scene import Scene
 
 PARENT = {2: 1, 3: 2, 4: 1}
@@ -31,19 +32,25 @@ class Assembly(NamedTuple):
     """By pin what its joint holds."""
 
 
-def assemble(scene: Scene, start: Start | None, form: str, at_pins: Mapping[str, tuple[str, str]]) -> Assembly:
+def assemble(
+    scene: Scene, start: Start | None, form: str, at_pins: Mapping[str, tuple[str, str]], *, without_loads: bool = False
+) -> Assembly:
     """Evaluate the linkage in the state given, or in that of `at_start`.
 
     Parameters
     ----------
     form : the file's, for errors.
     at_pins : the effects that its joints hold: the name there, and the field of the effect that lists it by pin.
+    without_loads : leave the loads out, instead of refusing them.
 
     Raises LimitError for a load, a motion law or an effect without a counterpart there, InputError for a bar without
     mass or inertia, NotAssembledError where the linkage closes at none of the scene's positions.
     """
-    if scene.motion.law is not None or scene.loads:
-        raise LimitError(f"a motion law and a load have no counterpart in {form}; apply them in the simulator")
+    if scene.motion.law is not None:
+        raise LimitError(f"a motion law has no counterpart in {form}; apply it in the simulator")
+    if scene.loads and not without_loads:
+        on = ", ".join(sorted({f"bar {load.bar}" for load in scene.loads}))
+        raise LimitError(f"loads (here on {on}) have no counterpart in {form}; --without-loads leaves them out")
     linkage = scene.linkage
     carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
@@ -66,3 +73,12 @@ def assemble(scene: Scene, start: Start | None, form: str, at_pins: Mapping[str,
     foot[4] = cmath.rect(linkage.ground, linkage.ground_angle)
     turn, numbers = {1: 0.0, 2: theta_2, 3: theta_3, 4: theta_4}, (theta_2, theta_3, theta_4, *speeds)
     return Assembly(turn, foot, numbers, inertia, gravity, dynamics)
+
+
+def comment(scene: Scene, form: str, reader: str, assembly: Assembly, at_B: str = "") -> str:
+    """Say in what state the file stands, and where its reader's numbers are."""
+    notes, bar = NOTES["assembled"], scene.drive_bar
+    joint = f", joint {FIRST_PIN[bar]}" if bar != 3 else ""
+    lines = [notes["opens"].strip().format(*map(repr, assembly.numbers), form=form, at_B=at_B)]
+    lines += [notes["drive"].format(bar=bar, joint=joint), *([notes["without_loads"]] if scene.loads else [])]
+    return "\n".join([*lines, notes[reader].strip()])

@@ -3,7 +3,7 @@
 import math
 
 from fourbar.formulas.mobility import default_range
-from fourbar.linkage import FourBar, uniform
+from fourbar.linkage import BAR_NAMES, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 
@@ -21,10 +21,12 @@ def scene_from_lengths(ground: float, input: float, coupler: float, output: floa
 
 
 def defaults_used(scene: Scene) -> list[str]:
-    """List the defaults of `scene_from_lengths`, one line each."""
+    """List the lengths that `scene_from_lengths` was given and its defaults, one line each."""
     theta_2 = scene.motion.theta_2
     assert isinstance(theta_2, float)
     return [
+        "lengths in m: "
+        + ", ".join(f"{n} {x!r}" for n, x in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)),
         f"bars: uniform and slender, {PER_METRE:g} kg/m",
         "branch: open",
         f"omega_2: {scene.motion.omega_2!r} rad/s, alpha_2: 0",

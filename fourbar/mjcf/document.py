@@ -2,19 +2,19 @@
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from fourbar.errors import InputError, LimitError, NotAssembledError
-from fourbar.formulas.mobility import default_range
+from fourbar.formulas.mobility import change_points, default_range
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.effects import row, unwound
-from fourbar.mjcf.model import Model, carriable, constant, servo, text
+from fourbar.mjcf.model import Model, carriable, constant, motor, servo, text
 from fourbar.mjcf.notes import NOTES
-from fourbar.mjcf.settings import RECIPE, Settings, WindowMotion, fitted_pad
+from fourbar.mjcf.settings import FULL_TURN, RECIPE, Settings, WindowMotion, fitted_pad
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Array
@@ -25,29 +25,34 @@ AT_REST = 1.0
 SETTLING = 2.0
 """Time constant with which the drive starts the input from rest, in timesteps: the crank lags by so many, for good."""
 RELEASED_STEPS = 6280
-"""Of a free motion, in the time in which weights and loads would turn the linkage once."""
+"""Without a flywheel, in the time in which weights and loads would turn the linkage once."""
 RELEASED_CLOSURE = 2.0
 """Time constant of the closure of a released linkage, in timesteps: measured, 2 takes the least energy out of it."""
-READING: str = NOTES["numbers"]["mujoco"]
+Drive = Literal["flywheel", "motor", "none"]
+"""What turns the linkage: a flywheel that keeps omega_2 or alpha_2; a motor on the driven bar whose control is its
+couple; nothing. A free motion has none."""
 
 
 def mjcf(
     scene: Scene,
     settings: Settings = RECIPE,
-    reading: str = READING,
+    reader: str = "mujoco",
     *,
     keyframe: bool = True,
     start: "Start | None" = None,
+    drive: Drive = "flywheel",
 ) -> str:
     """Write the MJCF text of a scene: it runs on its own in MuJoCo.
 
     Parameters
     ----------
     settings : of MuJoCo; the default ones carry every linkage above MuJoCo's floor of mass.
-    reading : the comment that says where torque and pin force are read.
+    reader : one of `SIMULATORS`: the comments say where torque and pin force are read there.
     keyframe : False leaves it out, and with it the assembled pose and the servo that starts it from rest; then
         `settings.timestep` must be given and no position is computed.
     start : the assembled state to open with; None: that of `at_start`.
+    drive : "flywheel" keeps the input at omega_2; "motor" leaves the driven bar to a controller, "none" likewise
+        without an actuator: then nothing is added to the linkage's inertia.
 
     Raises
     ------
@@ -58,9 +63,10 @@ def mjcf(
     if scene.motion.law is not None:
         raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
     carriable(scene.linkage)
-    free = scene.motion.free is not None
-    if free:
-        settings = _released(scene, settings)
+    if scene.motion.free is not None:
+        drive = "none"
+    if drive != "flywheel":
+        settings = _without_flywheel(scene, settings)
     start = (start or at_start(scene)) if keyframe else None
     if start is not None:
         timestep = start.run.timestep(settings)
@@ -75,27 +81,43 @@ def mjcf(
         row(term).add(term, model)
     armature = flywheel(scene, settings)
     root = ET.Element("mujoco", model=plain(scene.title) or "four-bar")
-    root.append(ET.Comment(f" {NOTES['mjcf']['released' if free else 'driven']} "))
-    root.append(ET.Comment(f" {reading} "))
+    for line in _comments(scene, drive, reader):
+        root.append(ET.Comment(f" {line} "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     model.add_option(root)
     add_appearance(root, scene.linkage)
-    drive = constant(armature * scene.motion.alpha_2)
+    actuator = motor(scene.drive_bar) if drive == "motor" else constant(armature * scene.motion.alpha_2)
     if start is not None:
         start = start._replace(qpos=unwound(scene, start.qpos))
         model.rest = start.qpos
-        if scene.motion.alpha_2 == 0.0 and not free:
-            drive = servo(armature / (SETTLING * timestep), start.qvel[0])
+        if scene.motion.alpha_2 == 0.0 and drive == "flywheel":
+            actuator = servo(armature / (SETTLING * timestep), start.qvel[0])
     model.add_bodies(root, armature)
     model.add_load_sites(root)
     model.add_closure(root)
     model.add_tendons(root)
-    model.add_actuators(root, drive)
+    model.add_actuators(root, actuator)
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
         ET.SubElement(frame, "key", name="start", qpos=text(*start.qpos), qvel=text(*start.qvel))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
+    """Say how the file starts and where its numbers stand, a line each."""
+    notes, numbers, bar = NOTES["mjcf"], NOTES["numbers"][reader], scene.drive_bar
+    kinds: list[str] = [drive]
+    if scene.motion.free is not None:
+        kinds = ["released"]
+    elif drive == "flywheel":
+        kinds = ["accelerated" if scene.motion.alpha_2 else "driven"]
+        kinds += [] if _span(scene.linkage) >= FULL_TURN and not change_points(scene.linkage) else ["limits"]
+        kinds += ["elsewhere"] if bar != 2 else []
+    lines: list[str] = [notes[kind].format(bar=bar) for kind in ("opens", *kinds)]
+    lines += numbers["instant"] + (numbers["driven"] if drive == "flywheel" else []) + numbers["pins"]
+    lines += [notes["loads"]] if reader == "mujoco" and scene.loads else []
+    return [*lines, *numbers["after"]]
 
 
 def flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
@@ -104,7 +126,7 @@ def flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
     L is the longest arm at which anything acts, and the work is what each load and effect says of itself;
     in a revolution it is then a small part of the flywheel's energy. q is the greater of omega_2^2 and |alpha_2|.
     """
-    return settings.flywheel * (_inertia(scene.linkage) + _work(scene))
+    return float(f"{settings.flywheel * (_inertia(scene.linkage) + _work(scene)):.3g}")
 
 
 def load_ratio(scene: Scene) -> float:
@@ -113,11 +135,13 @@ def load_ratio(scene: Scene) -> float:
     return _work(scene) / inertia if inertia else math.inf
 
 
-def _released(scene: Scene, settings: Settings) -> Settings:
-    """Without a flywheel, and with a timestep by what moves the linkage."""
+def _without_flywheel(scene: Scene, settings: Settings) -> Settings:
+    """Choose the timestep by what moves the linkage, and for a free motion a closure that takes little energy out."""
     quickest = math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + load_ratio(scene) * _quickness(scene)) or AT_REST
-    timestep = settings.timestep or math.tau / (RELEASED_STEPS * quickest)
-    return replace(settings, flywheel=0.0, pad=None, time_constant_steps=RELEASED_CLOSURE, timestep=timestep)
+    settings = replace(settings, flywheel=0.0, timestep=settings.timestep or math.tau / (RELEASED_STEPS * quickest))
+    if scene.motion.free is None:
+        return settings
+    return replace(settings, pad=None, time_constant_steps=RELEASED_CLOSURE)
 
 
 def _pad(scene: Scene) -> float:

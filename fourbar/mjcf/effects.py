@@ -111,7 +111,9 @@ MJCF_OF: dict[str, MjcfForm] = {
     "flywheel": MjcfForm(_flywheel),
     "load": MjcfForm(_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
 }
-"""By the key of an effect; MJCF has no counterpart of what is not here (friction that depends on the pin forces)."""
+"""By the key of an effect."""
+NO_MJCF = {"pin_friction"}
+"""Effects of which MJCF has no counterpart: here friction that depends on the pin forces."""
 
 
 def row(effect: "Effect") -> MjcfForm:

@@ -7,9 +7,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from fourbar.errors import InputError, LimitError
+from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
-from fourbar.mjcf.appearance import add_camera
+from fourbar.mjcf.appearance import add_camera, rounded
 from fourbar.mjcf.settings import Settings
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ THICKNESS = 0.02
 
 def text(*numbers: float) -> str:
     """Numbers so that they read back bit for bit."""
-    return " ".join(repr(float(number)) for number in numbers)
+    return " ".join(repr(float(number)).removesuffix(".0") for number in numbers)
 
 
 def _body(root: ET.Element, bar: int) -> ET.Element:
@@ -41,14 +41,22 @@ def _body(root: ET.Element, bar: int) -> ET.Element:
     return body
 
 
-def constant(force: float) -> tuple[float, float, float]:
-    """Make the drive a motor: bias of an actuator that ignores its control."""
-    return (force, 0.0, 0.0)
+UNCONTROLLED = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
 
 
-def servo(gain: float, omega: float) -> tuple[float, float, float]:
+def constant(force: float) -> dict[str, str]:
+    """Make the drive a motor on pin O2 that ignores its control; none where the force is 0."""
+    return {**UNCONTROLLED, "joint": "O2", "biasprm": text(force, 0.0, 0.0)} if force else {}
+
+
+def servo(gain: float, omega: float) -> dict[str, str]:
     """Make the drive a speed servo, gain (omega - speed): without a control it turns at omega, and there it is idle."""
-    return (gain * omega, 0.0, -gain)
+    return {**UNCONTROLLED, "joint": "O2", "biasprm": text(gain * omega, 0.0, -gain)}
+
+
+def motor(bar: int) -> dict[str, str]:
+    """Make the drive a motor whose control is the couple of ground on a bar, N m."""
+    return {"joint": FIRST_PIN[bar]} if bar != 3 else {"site": "B3", "gear": "0 0 0 0 0 1"}
 
 
 A_MILLIONTH = 1e-6
@@ -137,7 +145,7 @@ class Model:
         ground = ET.SubElement(world, "body", name="ground")
         ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
-        ET.SubElement(ground, "site", name="O2", pos="0 0 0", size=text(self.radius))
+        ET.SubElement(ground, "site", name="O2", pos="0 0 0", size=rounded(self.radius))
         self._add_site(ground, "O4", *self.O4)
         crank = self._add_bar(ground, 2, (0.0, 0.0), armature=flywheel)
         self._add_bar(crank, 3, (self.linkage.input.length, 0.0))
@@ -177,7 +185,7 @@ class Model:
         return body
 
     def _add_site(self, body: ET.Element, name: str, x: float, y: float = 0.0) -> None:
-        ET.SubElement(body, "site", name=name, pos=text(x, y, 0.0), size=text(self.radius))
+        ET.SubElement(body, "site", name=name, pos=text(x, y, 0.0), size=rounded(self.radius))
 
     def _add_capsule(self, body: ET.Element, number: int, length: float, z: float) -> None:
         """Add a bar's shape: for the eye only, without mass and without contact."""
@@ -186,9 +194,9 @@ class Model:
         shape = {
             "name": BAR_NAMES[number],
             "type": "capsule",
-            "size": text(self.radius, length / 2.0),
-            "pos": text(cos * length / 2.0, sin * length / 2.0, z),
-            "zaxis": text(cos, sin, 0.0),
+            "size": rounded(self.radius, length / 2.0),
+            "pos": rounded(cos * length / 2.0, sin * length / 2.0, z),
+            "zaxis": rounded(cos, sin, 0.0),
             "rgba": COLOURS[number],
         }
         ET.SubElement(body, "geom", shape, mass="0", contype="0", conaffinity="0")
@@ -211,12 +219,11 @@ class Model:
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
         for index, spring in enumerate(self.springs, 1):
-            rest = -spring.slack / spring.stiffness
-            if rest < 0.0:
-                raise LimitError("a spring that pulls at every length has no counterpart in MJCF")
             name = f"spring_{index}"
-            attributes = {"stiffness": text(spring.stiffness), "springlength": text(rest)}
-            tendon = ET.SubElement(tendons, "spatial", {"name": name, **attributes})
+            tendon = ET.SubElement(tendons, "spatial", name=name)
+            if _is_slack_somewhere(spring):
+                tendon.set("stiffness", text(spring.stiffness))
+                tendon.set("springlength", text(-spring.slack / spring.stiffness))
             for end, point in (("start", spring.start), ("end", spring.end)):
                 ET.SubElement(tendon, "site", site=f"{name}_{end}")
                 x, y = point.in_bar.real, point.in_bar.imag
@@ -235,14 +242,17 @@ class Model:
                 y += load.at[0] * math.sin(load.at[1])
             self._add_site(_body(root, load.bar), f"load_{index}", x, y)
 
-    def add_actuators(self, root: ET.Element, drive: tuple[float, float, float]) -> None:
-        """Actuators without a control: the drive (force, per angle, per speed) on pin O2, and the loads."""
-        if not any(drive) and not self.loads:
+    def add_actuators(self, root: ET.Element, drive: dict[str, str]) -> None:
+        """Actuators: the drive by its attributes, without any there is none; loads and some springs, uncontrolled."""
+        springs = {f"spring_{i}": s for i, s in enumerate(self.springs, 1) if not _is_slack_somewhere(s)}
+        if not drive and not self.loads and not springs:
             return
         actuators = ET.SubElement(root, "actuator")
-        uncontrolled = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
-        if any(drive):
-            ET.SubElement(actuators, "general", uncontrolled, name="drive", joint="O2", biasprm=text(*drive))
+        if drive:
+            ET.SubElement(actuators, "general", drive, name="drive")
+        for name, spring in springs.items():
+            tension = text(-spring.slack, 0.0 - spring.stiffness, 0.0)
+            ET.SubElement(actuators, "general", UNCONTROLLED, name=name, tendon=name, biasprm=tension)
         for index, load in enumerate(self.loads, 1):
             fx = fy = 0.0
             couple = load.moment
@@ -254,4 +264,9 @@ class Model:
             if load.frame == "world":
                 placed["refsite"] = "O2"
             gear = text(fx, fy, 0.0, 0.0, 0.0, couple)
-            ET.SubElement(actuators, "general", {**uncontrolled, **placed}, gear=gear, biasprm="1 0 0")
+            ET.SubElement(actuators, "general", {**UNCONTROLLED, **placed}, gear=gear, biasprm="1 0 0")
+
+
+def _is_slack_somewhere(spring: "Spring") -> bool:
+    """Whether a tendon has a rest length for it; any other, a constant force say, is an actuator on the tendon."""
+    return spring.stiffness > 0.0 and spring.slack <= 0.0

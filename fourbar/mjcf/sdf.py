@@ -4,10 +4,9 @@ from xml.etree import ElementTree as ET
 
 from fourbar.errors import LimitError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.assembly import PARENT, assemble
+from fourbar.mjcf.assembly import PARENT, assemble, comment
 from fourbar.mjcf.document import Start, plain
 from fourbar.mjcf.model import text
-from fourbar.mjcf.notes import NOTES
 from fourbar.scene import Scene
 
 DAMPING = {"viscous": ("damping", "coefficients")}
@@ -17,13 +16,14 @@ DRAKE = "http://drake.mit.edu"
 """Namespace of the elements that only Drake reads."""
 
 
-def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str:
+def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None, *, without_loads: bool = False) -> str:
     """Write the SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
 
     Parameters
     ----------
     reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
     start : the assembled state to stand in; None: that of `at_start`.
+    without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
 
     Raises
     ------
@@ -34,15 +34,16 @@ def sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None) -> str
     Source: sdformat.org/spec, and Drake's documentation of its parser.
     """
     linkage = scene.linkage
-    turn, foot, numbers, inertia, gravity, dynamics = assemble(scene, start, f"SDF for {reader}", AT_JOINTS[reader])
+    form = f"SDF for {reader}"
+    assembled = assemble(scene, start, form, AT_JOINTS[reader], without_loads=without_loads)
+    turn, foot, numbers, inertia, gravity, dynamics = assembled
     if reader == "drake" and "B" in dynamics:
         raise LimitError("Drake's ball constraint at pin B has no damping")
     omega_2, at_A, omega_4 = numbers[3:]
     root = ET.Element("sdf", {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})})
     at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
-    notes = NOTES["sdf"]
-    comment = notes["comment"].format(*map(repr, numbers), at_B, *notes[reader].values())
-    root.append(ET.Comment(f" {comment} "))
+    for line in comment(scene, "SDF", reader, assembled, at_B).splitlines():
+        root.append(ET.Comment(f" {line} "))
     world = ET.SubElement(root, "world", name="four_bar")
     ET.SubElement(world, "gravity").text = text(*gravity, 0.0)
     model = ET.SubElement(world, "model", name=plain(scene.title) or "four-bar")

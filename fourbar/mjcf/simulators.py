@@ -1,12 +1,11 @@
-"""MJCF for each simulator that reads it: what carries the loop best there, and where its numbers stand."""
+"""MJCF for each simulator that reads it, with what carries the loop best there."""
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import get_args
 
 from fourbar.errors import InputError
-from fourbar.mjcf.document import READING, mjcf
-from fourbar.mjcf.notes import NOTES
-from fourbar.mjcf.settings import RECIPE, Settings
+from fourbar.mjcf.document import Drive, mjcf
+from fourbar.mjcf.settings import RECIPE
 from fourbar.scene import Scene
 
 SINGLE = replace(RECIPE, flywheel=1e3, pad=None)
@@ -16,30 +15,23 @@ FAST = replace(RECIPE, time_constant_steps=2.0)
 """For a closure whose acceleration lacks a term: the quicker it yields, the sooner its error makes up for that."""
 
 
-class Simulator(NamedTuple):
-    """One reader of the file."""
-
-    settings: Settings
-    note: str
-    """Which numbers hold T2 and the pin force at B, of which instant, and what is known to go wrong."""
+SIMULATORS = {"mujoco": RECIPE, "warp": SINGLE, "mjx": FAST, "genesis": RECIPE, "newton": SINGLE}
+"""Who reads the file, and the settings that carry the loop best there."""
+OWN_MOTORS = ("genesis", "newton")
+"""Who puts couples on joints itself, and does not take them from the controls of a file."""
 
 
-SIMULATORS = {
-    "mujoco": Simulator(RECIPE, f"{READING} {NOTES['numbers']['mujoco_before_3_7']}"),
-    "warp": Simulator(SINGLE, NOTES["numbers"]["warp"]),
-    "mjx": Simulator(FAST, NOTES["numbers"]["mjx"]),
-    "genesis": Simulator(RECIPE, NOTES["numbers"]["genesis"]),
-    "newton": Simulator(SINGLE, NOTES["numbers"]["newton"]),
-}
-
-
-def mjcf_for(scene: Scene, simulator: str = "mujoco") -> str:
-    """Write the MJCF text of a scene for one simulator, its comment naming where torque and pin force are read.
+def mjcf_for(scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel") -> str:
+    """Write the MJCF text of a scene for one simulator, its comments naming where torque and pin force are read.
 
     Raises
     ------
-    InputError : no such simulator; else as `mjcf`.
+    InputError : no such simulator, or a motor for one that does not take it; else as `mjcf`.
     """
     if simulator not in SIMULATORS:
         raise InputError("simulator", simulator, f"must be one of {', '.join(SIMULATORS)}")
-    return mjcf(scene, *SIMULATORS[simulator])
+    if drive not in get_args(Drive):
+        raise InputError("drive", drive, f"must be one of {', '.join(get_args(Drive))}")
+    if drive == "motor" and simulator in OWN_MOTORS:
+        raise InputError("drive", drive, f"is read by mujoco, warp and mjx; for {simulator} take none")
+    return mjcf(scene, SIMULATORS[simulator], simulator, drive=drive)

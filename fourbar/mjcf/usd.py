@@ -4,18 +4,18 @@ import json
 import math
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.assembly import PARENT, assemble
+from fourbar.mjcf.assembly import PARENT, assemble, comment
 from fourbar.mjcf.document import Start, plain
-from fourbar.mjcf.notes import NOTES
 from fourbar.scene import Scene
 
 
-def usd(scene: Scene, start: Start | None = None) -> str:
+def usd(scene: Scene, start: Start | None = None, *, without_loads: bool = False) -> str:
     """Write the USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
 
     Parameters
     ----------
     start : the assembled state to stand in; None: that of `at_start`.
+    without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
 
     Raises
     ------
@@ -26,7 +26,8 @@ def usd(scene: Scene, start: Start | None = None) -> str:
     Source: openusd.org, UsdPhysics.
     """
     linkage = scene.linkage
-    turn, foot, numbers, inertia, (x, y), _ = assemble(scene, start, "USD", {})
+    assembled = assemble(scene, start, "USD", {}, without_loads=without_loads)
+    turn, foot, _, inertia, (x, y), _ = assembled
     pull = math.hypot(x, y)
     bodies = []
     for number in MOVING_BARS:
@@ -65,9 +66,10 @@ def usd(scene: Scene, start: Start | None = None) -> str:
     }}
 """
         )
+    notes = json.dumps(comment(scene, "USD", "newton", assembled))
     return f"""#usda 1.0
 (
-    doc = {json.dumps(NOTES["usd"]["comment"].format(*map(repr, numbers)), ensure_ascii=False)}
+    doc = {notes}
     defaultPrim = "four_bar"
     metersPerUnit = 1
     kilogramsPerUnit = 1

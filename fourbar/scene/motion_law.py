@@ -42,8 +42,8 @@ class Law:
         if self.ends not in ENDS:
             raise InputError(f"{key}.ends", self.ends, "must be one of " + ", ".join(ENDS))
         time, theta_2 = (
-            tuple(require_numbers(f"{key}.{name}", getattr(self, name)).ravel().tolist())
-            for name in ("time", "theta_2")
+            tuple(require_numbers(f"{key}.{name}", getattr(self, name), unit=unit).ravel().tolist())
+            for name, unit in (("time", "s"), ("theta_2", "rad"))
         )
         if len(time) != len(theta_2) or not LEAST[self.ends] <= len(time) <= MOST_POINTS:
             allowed = f"needs {LEAST[self.ends]} to {MOST_POINTS} times and as many angles"

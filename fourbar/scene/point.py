@@ -40,7 +40,7 @@ class Point:
             r, phi = self.from_pin
         except (TypeError, ValueError):
             raise InputError(f"{self.key}.from_pin", self.from_pin, "must be a pair (distance, angle)") from None
-        ends = tuple(require(f"{self.key}.from_pin", number) for number in (r, phi))
+        ends = tuple(require(f"{self.key}.from_pin", number, unit) for number, unit in ((r, "m"), (phi, "rad")))
         object.__setattr__(self, "from_pin", ends)
 
     @property

@@ -1,6 +1,6 @@
 """A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages requested."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,7 +21,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A linkage and everything that is stated about it; `effects` and `loads` hold only what acts."""
+    """A linkage and everything that is stated about it; two that state the same are equal.
+
+    Parameters
+    ----------
+    linkage : bars and ground, as `uniform` or `FourBar` make them.
+    motion : what the input does: angles, speed, branch.
+    drive_bar : 2, 3 or 4, on which the drive's torque acts.
+    loads : forces and couples, `Load`.
+    effects : `Gravity`, `Viscous`, `Friction`, ...: only what acts, each kind once.
+    title, source : words.
+    pictures : of bars, as a scene file names them.
+    points : points of bars whose paths are wanted, `Point`.
+    tolerances : of numbers by their keys in a scene file, `Tolerance`.
+    """
 
     linkage: FourBar
     motion: Motion = field(default_factory=Motion)
@@ -55,6 +68,14 @@ class Scene:
             raise InputError("points", names, "each point has a name of its own")
         if len({picture.bar for picture in self.pictures}) < len(self.pictures):
             raise InputError("pictures", [picture.bar for picture in self.pictures], "a bar has one picture")
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Scene):
+            return NotImplemented
+        return all(getattr(self, each.name) == getattr(other, each.name) for each in fields(self))
+
+    def __hash__(self) -> int:
+        return hash((self.title, self.drive_bar, self.motion))
 
     @property
     def counts_turns(self) -> bool:

@@ -11,6 +11,9 @@ from fourbar.effects.numbers import ROWS
 from fourbar.linkage import FIRST_PIN
 from fourbar.scene import Scene
 
+NO_SYMBOL: set[str] = set()
+"""Effects that no picture shows."""
+
 
 class Symbol(NamedTuple):
     """One thing that acts."""

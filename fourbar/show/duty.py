@@ -1,5 +1,6 @@
 """What frame and pins bear over a motion and what the drive delivers, to choose bearings and a motor; its energy."""
 
+import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,13 +10,13 @@ from fourbar.errors import DependencyError, InputError, expect, installing
 from fourbar.evaluation.case import state_at
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, PIN_FORCE, FourBar
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Command, Scene
 from fourbar.solution import Array, Conversion, Solution, unit_in
 
 
 class BearingLoad(NamedTuple):
-    """Load of one pin over the positions of a solution."""
+    """Load of one pin over the positions of a solution; of a study each number is an array (m,)."""
 
     largest: float
     """N."""
@@ -34,54 +35,72 @@ def _evaluated(solution: Solution, name: str) -> Array:
 
 
 def shaking_force(solution: Solution) -> Array:
-    """Force of the bars on the frame through its pins, F21 + F41 = -(F12 + F14), N, (n, 2).
+    """Force of the bars on the frame through its pins, F21 + F41 = -(F12 + F14), N, (n, 2), of a study (m, n, 2).
 
     A spring with one end on the ground pulls there besides.
     """
     return -(_evaluated(solution, "F12") + _evaluated(solution, "F14"))
 
 
-def shaking_moment(linkage: FourBar, solution: Solution) -> Array:
-    """Moment of the bars and of the drive on the frame about O2, -T - O4 x F14, N m, (n,).
+def shaking_moment(solution: Solution) -> Array:
+    """Moment of the bars and of the drive on the frame about O2, -T - O4 x F14, N m, (n,), of a study (m, n).
 
     Couples that effects exert between the bars and ground (pin damping or friction at O2, O4)
     are not part of it.
     """
-    expect("linkage", linkage, FourBar)
     F14, torque = _evaluated(solution, "F14"), _evaluated(solution, "torque")
-    x, y = linkage.ground * np.cos(linkage.ground_angle), linkage.ground * np.sin(linkage.ground_angle)
-    return np.asarray(-torque - (x * F14[:, 1] - y * F14[:, 0]))
+    assert solution.ground is not None
+    length, angle = solution.ground
+    return np.asarray(-torque - length * (np.cos(angle) * F14[..., 1] - np.sin(angle) * F14[..., 0]))
 
 
-def drive_power(solution: Solution) -> Array:
-    """T_k omega_k, W, (n,)."""
-    return np.asarray(_evaluated(solution, "torque") * _evaluated(solution, f"omega_{solution.drive_bar}"))
+def once_round(solution: Solution) -> Any:
+    """Whether a sweep goes over whole turns: its last position then repeats the first; of a study (m,)."""
+    if solution.theta_2.shape[-1] == 1:
+        return np.zeros(solution.theta_2.shape[:-1], dtype=bool)
+    turns = np.abs(solution.theta_2[..., -1] - solution.theta_2[..., 0]) / (2.0 * np.pi)
+    return (turns > 0.5) & np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
 
 
-def once_round(solution: Solution) -> slice:
-    """All positions, but of a sweep over whole turns not the last one, which repeats the first."""
-    turns = abs(solution.theta_2[-1] - solution.theta_2[0]) / (2.0 * np.pi)
-    closed = len(solution) > 1 and turns > 0.5 and np.isclose(turns, round(turns), rtol=1e-12, atol=0.0)
-    return slice(None, -1 if closed else None)
+def _counted(solution: Solution, values: Array) -> Array:
+    """Values at each position once: NaN at the end of whole turns."""
+    last = np.arange(values.shape[-1]) == values.shape[-1] - 1
+    return np.where(once_round(solution)[..., None] & last, np.nan, values)
+
+
+def _plain(value: Any) -> Any:
+    """Return a number, or of a study an array (m,)."""
+    return float(value) if np.ndim(value) == 0 else value
+
+
+def _of_known(reduce: Any, values: Array) -> Any:
+    """Reduce over the positions that have a value; NaN where none has."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of a member without any
+        return _plain(reduce(values, axis=-1))
 
 
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
-    """Largest and root mean square load of pin "O2", "A", "B" or "O4", and where; NaN positions are left out."""
+    """Largest and root mean square load of pin "O2", "A", "B" or "O4", and where; of a study arrays (m,).
+
+    Positions without a value are left out.
+    """
     if not isinstance(pin, str) or pin not in PIN_FORCE:
         raise InputError("pin", pin, "the pins are " + ", ".join(PIN_FORCE))
-    loads = np.hypot(*_evaluated(solution, PIN_FORCE[pin]).T)
-    one = once_round(solution)
-    load, theta_2 = loads[one], solution.theta_2[one]
+    force = _evaluated(solution, PIN_FORCE[pin])
+    load = _counted(solution, np.hypot(force[..., 0], force[..., 1]))
     known = np.isfinite(load)
-    if not known.any():
-        return BearingLoad(float("nan"), float("nan"), float("nan"))
-    load, theta_2 = load[known], theta_2[known]
-    worst = int(np.argmax(load))
-    return BearingLoad(float(load[worst]), _rms(load), float(theta_2[worst]))
+    worst = np.argmax(np.where(known, load, -1.0), axis=-1)[..., None]
+    where = np.where(known.any(axis=-1), np.take_along_axis(solution.theta_2, worst, axis=-1)[..., 0], np.nan)
+    load = np.where(known, load, np.nan)
+    return BearingLoad(_peak(load), _rms(load), _plain(where))
 
 
 class MotorDuty(NamedTuple):
-    """Peak and root mean square over the positions (a closed sweep counts its two equal ends once), and the energy."""
+    """Peak and root mean square over the positions (a closed sweep counts its two equal ends once), and the energy.
+
+    Of a study each is an array (m,).
+    """
 
     peak_torque: float
     """Largest size, N m."""
@@ -107,7 +126,7 @@ DUTY_UNITS = {
 }
 
 
-def motor_duty(solution: Solution) -> MotorDuty | None:
+def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty | None:
     """Peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
 
     E = integral of P dt, dt = d theta_2/omega_2 in a sweep; E_in of the positive part of P, E_out of the negative.
@@ -117,24 +136,24 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
 
     Parameters
     ----------
-    solution : (n,) positions of a sweep or of a motion law, to the stage "force".
+    solution : positions of a sweep or of a motion law, to the stage "force".
+    located : the same with the positions of the peaks among its own, of which the peaks are taken.
     """
     expect("solution", solution, Solution)
     if solution.torque is None or not np.isfinite(solution.torque).any():
         return None
-    power = drive_power(solution)
-    speed: Array = getattr(solution, f"omega_{solution.drive_bar}")
-    one = once_round(solution)
+    power = _evaluated(solution, "power")
+    closed, peak = once_round(solution), solution if located is None else located
     energy_in, energy_out = _energy(solution, power)
     return MotorDuty(
-        _peak(solution.torque),
-        _rms(solution.torque[one]),
-        _peak(speed),
-        _peak(power),
-        _rms(power[one]),
+        _peak(_evaluated(peak, "torque")),
+        _rms(_counted(solution, solution.torque)),
+        _peak(_evaluated(peak, f"omega_{solution.drive_bar}")),
+        _peak(_evaluated(peak, "power")),
+        _rms(_counted(solution, power)),
         energy_in,
         energy_out,
-        one.stop is not None,
+        bool(closed) if np.ndim(closed) == 0 else closed,
     )
 
 
@@ -144,27 +163,29 @@ def _energy(solution: Solution, power: Array) -> tuple[float | None, float | Non
     if solution.time is not None:
         spans = np.diff(solution.time)
     elif omega_2 is not None and np.all(omega_2 != 0.0):
-        spans = np.abs(np.diff(solution.theta_2) / omega_2[:-1])
+        spans = np.abs(np.diff(solution.theta_2) / np.broadcast_to(omega_2, power.shape)[..., :-1])
     else:
         return None, None
-    parts = [0.5 * spans * (part[:-1] + part[1:]) for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0))]
+    parts = [
+        0.5 * spans * (part[..., :-1] + part[..., 1:]) for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0))
+    ]
     if not np.isfinite(parts[0]).any():
         return None, None
-    energy_in, energy_out = (float(np.nansum(part)) for part in parts)
+    energy_in, energy_out = (_plain(np.nansum(part, axis=-1)) for part in parts)
     return energy_in, energy_out
 
 
 def _peak(values: Array) -> float:
-    return float(np.nanmax(np.abs(values)))
+    return _of_known(np.nanmax, np.abs(values))  # type: ignore[no-any-return]
 
 
 def _rms(values: Array) -> float:
-    return float(np.sqrt(np.nanmean(np.square(values))))
+    return _plain(np.sqrt(_of_known(np.nanmean, np.square(values))))  # type: ignore[no-any-return]
 
 
-def motor_entry(solution: Solution, units: Conversion) -> dict[str, Any] | None:
-    """Write the duty and the loads of the pins as the JSON has them, in the units of the output."""
-    duty = motor_duty(solution)
+def motor_entry(solution: Solution, units: Conversion, located: Solution | None = None) -> dict[str, Any] | None:
+    """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
+    duty = motor_duty(solution, located)
     if duty is None:
         return None
     entry: dict[str, Any] = {"closed": duty.closed}
@@ -173,8 +194,9 @@ def motor_entry(solution: Solution, units: Conversion) -> dict[str, Any] | None:
         entry[name] = None if number is None else number * unit_in(unit, units)[1]
     force, angle = unit_in("N", units)[1], unit_in("rad", units)[1]
     loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
+    peaks = loads if located is None else {pin: bearing_load(located, pin) for pin in PIN_FORCE}
     entry["pins"] = {
-        pin: {"peak": load.largest * force, "rms": load.rms * force, "theta_2": load.where * angle}
+        pin: {"peak": peaks[pin].largest * force, "rms": load.rms * force, "theta_2": peaks[pin].where * angle}
         for pin, load in loads.items()
     }
     entry["units"] = {name: unit_in(unit, units)[0] for name, unit in DUTY_UNITS.items()}

@@ -1,11 +1,11 @@
 """What `fourbar extremes` prints: each enclosure with its angle, and over what it holds."""
 
 import json
-import math
 from typing import TYPE_CHECKING, Any
 
 from fourbar.scene import Scene
-from fourbar.show.tables import plain_table
+from fourbar.show.tables import plain_table, value
+from fourbar.solution import DEGREES, Conversion, unit_in, unit_of
 from fourbar.studies.enclosure import PROVEN, Extremes
 
 if TYPE_CHECKING:
@@ -14,44 +14,42 @@ if TYPE_CHECKING:
 SCHEMA = "fourbar-extremes/1"
 
 
-def heading(scene: Scene, found: Extremes) -> list[str]:
+def heading(scene: Scene, found: Extremes, units: Conversion = DEGREES) -> list[str]:
     """Write the lines above the table."""
-    parts = " and ".join(f"{math.degrees(low):.6g} to {math.degrees(high):.6g}" for low, high in found.parts)
-    lines = [f"proven over theta_2 = {parts} deg, in {found.boxes} boxes of ball arithmetic"]
+    unit, factor = unit_in("rad", units)
+    parts = " and ".join(f"{low * factor:.6g} to {high * factor:.6g}" for low, high in found.parts)
+    lines = [f"guaranteed over theta_2 = {parts} {unit}, by interval arithmetic in {found.boxes} pieces of it"]
     if found.distance:
         lines.append(
-            f"nearer than {math.degrees(found.distance):g} deg to a limit of the input, or to a pole of the torque, "
-            "nothing is proven: there the loads grow without end"
+            f"left out: theta_2 within {value(found.distance, 'rad', units)} of a limit of the input or of a pole of "
+            "the torque, where the loads grow without bound"
         )
     if found.nominal is None:
-        lines.append(f"each extreme lies between its two numbers, as a rule {PROVEN:g} of the largest load apart")
+        lines.append(
+            f"each extreme lies between the two numbers given, which differ by about {PROVEN:g} of the largest load"
+        )
     else:
         lines.append(
-            f"for every linkage within the {len(scene.tolerances)} tolerances (three sigma of a normal one): the outer "
-            "number is proven, the inner one is reached by a linkage that was found"
+            f"for every linkage within the {len(scene.tolerances)} tolerances (within three sigma where one is normal):"
+            " none goes beyond the outer number, the inner number is that of a linkage that was tried; over-estimate: "
+            "how many times as far from the nominal extreme the outer number lies as the inner one"
         )
     return lines
 
 
-def table(found: Extremes) -> "Table":
+def table(found: Extremes, units: Conversion = DEGREES) -> "Table":
     """Two rows for each quantity."""
-    rows = []
+    rows, (angle_unit, of_angle) = [], unit_in("rad", units)
     for name in found.least:
-        unit, factor = _unit(name)
+        unit, factor = unit_in("rad" if name == "transmission" else unit_of(name.strip("|")), units)
         for word, sign, extreme in (("least", -1, found.least[name]), ("greatest", 1, found.greatest[name])):
             ends = (f"{factor * extreme.low:.11g}", f"{factor * extreme.high:.11g}")
-            rows.append([name, unit, word, *ends, f"{math.degrees(extreme.theta_2):.6f}"])
+            rows.append([name, unit, word, *ends, f"{of_angle * extreme.theta_2:.6f}"])
             if found.nominal is not None:
                 over = found.over_estimate(name, sign)
                 rows[-1].append("-" if over is None else f"{over:.3g} times")
-    heads = ("", "unit", "", "from", "to", "theta_2 (deg)", *(["over-estimate"] if found.nominal else []))
+    heads = ("", "unit", "", "from", "to", f"theta_2 ({angle_unit})", *(["over-estimate"] if found.nominal else []))
     return plain_table(heads, rows, left=("", "unit", "over-estimate"))
-
-
-def _unit(name: str) -> tuple[str, float]:
-    if name == "transmission":
-        return "deg", 180.0 / math.pi
-    return ("N m", 1.0) if name == "torque" else ("N", 1.0)
 
 
 def json_text(scene: Scene, found: Extremes) -> str:

@@ -16,7 +16,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar.show.acting import Symbol, acting
-from fourbar.show.duty import drive_power, energies
+from fourbar.show.duty import energies
 from fourbar.show.plot.style import length_unit
 from fourbar.show.plot.view import over_time, sweep_command
 from fourbar.show.tolerances import embedded_tolerances
@@ -28,7 +28,7 @@ MAX_ROWS = 1441
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
-SCALARS = (*ANGLES, "condition", *RATES, "torque", "torque_error")
+SCALARS = (*ANGLES, "condition", *RATES, "torque", "torque_error", "power")
 
 
 def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
@@ -197,8 +197,6 @@ def _columns(solution: Solution) -> dict[str, Any]:
         if values is not None:
             columns[name] = values
     columns["transmission"] = np.arcsin(solution.condition)
-    if solution.torque is not None:
-        columns["power"] = drive_power(solution)
     return columns
 
 

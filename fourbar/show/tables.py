@@ -12,6 +12,7 @@ from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
+from fourbar.show.between import Between, between
 from fourbar.show.duty import bearing_load, motor_duty
 from fourbar.solution import DEGREES, Array, Conversion, Solution, unit_in, unit_of
 
@@ -117,24 +118,39 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
         )
     if scene.motion.omega_2 is None and solution.torque is None and _acting(scene):
         lines.append(f"positions only, since omega_2 is left out; {STATIC}")
+    found = between(scene, solution)
+    if found is not None and found.reversals:
+        where = ", ".join(f"{value(theta_2, 'rad', units)} ({pin})" for theta_2, pin in found.reversals)
+        lines.append(f"dry friction reverses, and the pin forces jump, at theta_2 = {where}")
     if scene.motion.free is None and solution.torque is not None and np.isfinite(solution.torque).any():
-        worst = int(np.nanargmax(np.abs(solution.torque)))
-        where = value(solution.theta_2[worst], "rad", units)
-        lines.append(f"largest torque {value(solution.torque[worst], 'N m', units)} at theta_2 = {where}")
+        peak = solution if found is None else found.solution
+        assert peak.torque is not None
+        worst = int(np.nanargmax(np.abs(peak.torque)))
+        where = value(peak.theta_2[worst], "rad", units)
+        most = f"largest torque{_among(solution, found, 'torque')}"
+        lines.append(f"{most} {value(peak.torque[worst], 'N m', units)} at theta_2 = {where}")
         lines += _warning(scene, solution, units)
-        lines += _motor(solution, units)
+        lines += _motor(solution, units, found)
     if solution.F12 is not None and np.isfinite(solution.F12).any():
         loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
-        peaks = {pin: (value(load.largest, "N", units), value(load.where, "rad", units)) for pin, load in loads.items()}
-        parts = [f"{pin} {largest} at {where}" for pin, (largest, where) in peaks.items()]
+        peaks = loads if found is None else {pin: bearing_load(found.solution, pin) for pin in PIN_FORCE}
+        parts = [f"{pin} {value(x.largest, 'N', units)} at {value(x.where, 'rad', units)}" for pin, x in peaks.items()]
         rms = [f"{pin} {value(load.rms, 'N', units)}" for pin, load in loads.items()]
-        lines += ["largest pin loads: " + ", ".join(parts), "RMS pin loads: " + ", ".join(rms)]
+        most = f"largest pin loads{_among(solution, found, *PIN_FORCES)}"
+        lines += [f"{most}: " + ", ".join(parts), "RMS pin loads: " + ", ".join(rms)]
     return lines
 
 
-def _motor(solution: Solution, units: Conversion) -> list[str]:
+def _among(solution: Solution, found: Between | None, *names: str) -> str:
+    """Say that a largest value is that of the positions alone, where between them there may be a larger one."""
+    if len(solution) == 1 or (found is not None and not found.growing.intersection(names)):
+        return ""
+    return " of these positions"
+
+
+def _motor(solution: Solution, units: Conversion, found: Between | None) -> list[str]:
     """Write what the drive delivers, for the choice of a motor."""
-    duty = motor_duty(solution)
+    duty = motor_duty(solution, None if found is None else found.solution)
     if duty is None or len(solution) == 1:
         return []
     lines = [
@@ -191,7 +207,8 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
     """List the columns of the table, most wanted first: heading with unit -> cells."""
     shown: dict[str, list[str]] = {}
 
-    def add(name: str, unit: str, values: Array) -> None:
+    def add(name: str, unit: str, values: Array | None) -> None:
+        assert values is not None
         label, factor = unit_in(unit, units)
         shown[f"{name}\n{label}"] = _cells(values * factor, ".4f" if unit == "rad" else ".6g")
 
@@ -201,8 +218,7 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
     if solution.torque is not None:
         if solution.time is None:  # released, it has no drive: its torque is rounding
             add(f"T{solution.drive_bar}", "N m", solution.torque)
-            if solution.torque_error is not None:
-                shown["digits\nof T"] = _digits(solution.torque, solution.torque_error)
+            add("power", "W", solution.power)
         for name in PIN_FORCES:
             add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
     moving = {"": solution.points, "v_": solution.velocity, "a_": solution.acceleration}
@@ -215,6 +231,8 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
         if getattr(solution, name) is not None:
             add(name, UNITS[name], getattr(solution, name))
     shown["sin mu\n"] = _cells(solution.sin_mu)
+    if solution.time is None and solution.torque is not None and solution.torque_error is not None:
+        shown["digits\nof T"] = _digits(solution.torque, solution.torque_error)
     return shown
 
 

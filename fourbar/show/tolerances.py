@@ -2,6 +2,7 @@
 
 import json
 import math
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,15 +11,18 @@ import numpy as np
 from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.scene import Scene
+from fourbar.show.progress import running
 from fourbar.show.tables import plain_table
-from fourbar.solution import Array, nulled
-from fourbar.studies.spread import BAND, Spread, Tolerances, tolerances
+from fourbar.solution import DEGREES, Array, Conversion, nulled, unit_in
+from fourbar.studies.spread import BAND, PARTED, Spread, Tolerances, tolerances
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 PAGE_SAMPLES = 2048
 """Samples behind the bands of a page: seconds, and a percentile to a fiftieth of the deviation."""
+MOST_RUNS = 5
+"""Intervals of theta_2 that one line names."""
 SCHEMA = "fourbar-tolerance/1"
 
 
@@ -31,15 +35,16 @@ def shown_parts(found: Tolerances) -> list[str]:
 
 def part_unit(part: str) -> str:
     """Of a quantity, a magnitude, or a component of a point, which may be called v or a."""
-    return UNITS.get(part.strip("|"), "m")
+    unit: str = UNITS.get(part.strip("|"), "m")
+    return unit
 
 
-def heading(found: Tolerances) -> list[str]:
+def heading(found: Tolerances, units: Conversion = DEGREES) -> list[str]:
     """Write the lines above the table."""
     lines = [
-        *counted(found),
-        "each quantity where its first-order worst case is largest; sigma is the standard",
-        "deviation of the samples; the variance there comes from",
+        *counted(found, units),
+        "each quantity at the position where its first-order worst case (worst) is largest; sigma is the standard",
+        "deviation of the samples; the variance there is due to",
     ]
     for part in shown_parts(found):
         if (at := worst_position(found.spreads[part])) is not None and (most := _most(found, found.spreads[part], at)):
@@ -47,16 +52,16 @@ def heading(found: Tolerances) -> list[str]:
     return lines
 
 
-def counted(found: Tolerances) -> list[str]:
+def counted(found: Tolerances, units: Conversion = DEGREES) -> list[str]:
     """Say what was tried, what of it has no answer, and where first order and samples part."""
     n = len(found.theta_2)
     count = f"{len(found.scene.tolerances)} tolerance" + ("s" if len(found.scene.tolerances) > 1 else "")
     lines = [f"{count}, {found.samples} samples (seed {found.seed}), {n} positions"]
     if found.invalid:
-        lines.append(f"{_share(found.invalid, found)} have a number that no scene takes")
+        lines.append(f"{_share(found.invalid, found)} have an impossible dimension, such as a length below 0")
     if found.apart:
         lines.append(f"{_share(found.apart, found)} do not assemble at some position at which the nominal linkage does")
-    lines += [line for part in shown_parts(found) if (line := parted(found, part))]
+    lines += [line for part in shown_parts(found) if (line := parted(found, part, units))]
     return lines
 
 
@@ -64,16 +69,19 @@ def _share(count: int, found: Tolerances) -> str:
     return f"{count} of {found.samples} samples ({100.0 * count / found.samples:.3g} %)"
 
 
-def parted(found: Tolerances, part: str) -> str:
-    """Return the word where first order and samples part; empty where they do not."""
+def parted(found: Tolerances, part: str, units: Conversion = DEGREES) -> str:
+    """Say where first order and samples differ; empty where they do not."""
     spread = found.spreads[part]
     where = np.flatnonzero(spread.parted)
     if not where.size:
         return ""
-    first, last = (math.degrees(found.theta_2[index]) for index in (where[0], where[-1]))
+    unit, factor = unit_in("rad", units)
+    runs = np.split(where, np.flatnonzero(np.diff(where) > 1) + 1)
+    ends = [" to ".join(f"{factor * found.theta_2[i]:.6g}" for i in dict.fromkeys((run[0], run[-1]))) for run in runs]
+    places = ", ".join(ends[:MOST_RUNS]) + (", ..." if len(ends) > MOST_RUNS else "")
     return (
-        f"{part}: first order and samples part at {where.size} of {len(found.theta_2)} positions, from theta_2 = "
-        f"{first:.6g} to {last:.6g} deg: trust the samples there"
+        f"{part}: the samples spread by more than {100.0 * PARTED:g} % more or less than first order says at "
+        f"{where.size} of {len(found.theta_2)} positions (theta_2 = {places} {unit}): trust the samples there"
     )
 
 
@@ -82,19 +90,21 @@ def worst_position(spread: Spread) -> int | None:
     return int(np.nanargmax(spread.worst)) if np.isfinite(spread.worst).any() else None
 
 
-def table(found: Tolerances) -> "Table":
+def table(found: Tolerances, units: Conversion = DEGREES) -> "Table":
     """One row for each quantity."""
-    heads = ("", "\nunit", "theta_2\ndeg", "\nnominal", "\nsigma", f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %")
+    angle_unit, of_angle = unit_in("rad", units)
+    heads = ("", "\nunit", f"theta_2\n{angle_unit}", "\nnominal", "\nsigma", f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %")
     rows = []
     for part in shown_parts(found):
         spread = found.spreads[part]
         if (at := worst_position(spread)) is None:
             continue
         columns = (spread.nominal, spread.deviation, spread.low, spread.high, spread.least, spread.greatest)
-        numbers = [f"{column[at]:.6g}" for column in columns]
-        numbers[1] = f"{spread.deviation[at]:.3g}"
-        angle = f"{math.degrees(found.theta_2[at]):.6g}"
-        rows.append([part, part_unit(part), angle, *numbers, f"{spread.worst[at]:.3g}"])
+        unit, factor = unit_in(part_unit(part), units)
+        numbers = [f"{factor * column[at]:.6g}" for column in columns]
+        numbers[1] = f"{factor * spread.deviation[at]:.3g}"
+        angle = f"{of_angle * found.theta_2[at]:.6g}"
+        rows.append([part, unit, angle, *numbers, f"{factor * spread.worst[at]:.3g}"])
     return plain_table((*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0)
 
 
@@ -113,8 +123,10 @@ def embedded_tolerances(scene: Scene, theta_2: list[float]) -> dict[str, Any]:
     A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so.
     """
     positions = scene if scene.motion.law else replace(scene, motion=replace(scene.motion, theta_2=np.array(theta_2)))
+    shown = nullcontext() if scene.motion.free is not None else running("the samples of the tolerances are solved")
     try:
-        found = tolerances(positions, PAGE_SAMPLES)
+        with shown as progress:
+            found = tolerances(positions, PAGE_SAMPLES, progress=progress)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
     at = np.linspace(0, len(found.theta_2) - 1, len(theta_2)).round().astype(int)  # a law is thinned as in `page_data`

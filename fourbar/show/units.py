@@ -1,27 +1,26 @@
 """The units in which results are shown: a list such as "mm N N.mm deg", or "imperial"."""
 
 from fourbar.errors import InputError
-from fourbar.files.units import factor_to, to_si
+from fourbar.quantities.units import factor_to, to_si
 from fourbar.solution import SI, Conversion
 
 ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
-PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm"}
+PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp"}
 STATED = ("m", "N", "N m", "kg", "rad", "rad/s", "rad/s^2", "m/s", "m/s^2", "W")
 """The SI units for which another one can be stated, each of a dimension of its own."""
 DERIVED = {
     "m/s": ("m", "{}/s"),
     "m/s^2": ("m", "{}/s^2"),
     "J": ("N m", "{}"),
-    "W": ("N m", "{}/s"),
 }
-"""Not stated, these follow another one: energy and power the unit of torque, speeds that of length."""
+"""Not stated, these follow another one: energy the unit of torque, speeds that of length."""
 
 
 def units(text: str) -> Conversion:
-    """Read the units of a list, or of "SI" or "imperial" (in, lbf, lbf in, lb, deg, rpm).
+    """Read the units of a list, or of "SI" or "imperial" (in, lbf, lbf in, lb, deg, rpm, hp).
 
     A product is joined by dots ("N.mm"). What the list leaves out stays SI, but for speeds and accelerations of
-    points, which follow the length, and energy and power, which follow the torque.
+    points, which follow the length, and the energy, which follows the torque.
 
     Raises InputError for what is no unit of a result, and for two of one dimension.
     """

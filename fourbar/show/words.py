@@ -14,13 +14,13 @@ from fourbar.scene.motion import BRANCH_NAMES
 BRANCHES = {**BRANCH_NAMES, 0: "both"}
 
 
-def type_lines(linkage: FourBar) -> Iterator[str]:
+def type_lines(linkage: FourBar, unit: str = " m") -> Iterator[str]:
     """Write the type of a linkage, the condition that decides it, what turns, and `mobility_lines`."""
     found = classify(linkage)
     relation = "<" if found.surplus > 0.0 else ">" if found.surplus < 0.0 else "="
     outer = min(linkage.lengths) + max(linkage.lengths)
     yield found.name
-    yield f"s + l = {outer:.6g} m {relation} p + q = {sum(linkage.lengths) - outer:.6g} m"
+    yield f"s + l = {outer:.6g}{unit} {relation} p + q = {sum(linkage.lengths) - outer:.6g}{unit}"
     yield "bars that turn fully: " + (", ".join(BAR_NAMES[number] for number in found.turning) or "none")
     if found.barker is not None:  # a structure does not move
         yield from mobility_lines(linkage)

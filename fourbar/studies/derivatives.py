@@ -2,7 +2,7 @@
 
 from collections.abc import KeysView
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,18 @@ from fourbar.formulas.arithmetic import polar
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Position, parallel_pairs, with_parallel_pairs
 from fourbar.linkage import PIN_FORCE
-from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
+from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
-from fourbar.solution import Array, Solution, values_of
+from fourbar.solution import Array, Solution, parts, values_of
 from fourbar.solve import solve
 from fourbar.studies.keys import THETA_2, SceneNumber, at_place, entries, placed
 from fourbar.studies.sloped import Sloped, slopes, values
+from fourbar.writing import between, data_frame, html_table, listed
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 AT_ONCE = 512
 """Positions: each number is then as many rows as the scene has numbers, and stays in the cache."""
@@ -51,22 +55,76 @@ class Sensitivity:
     """By quantity, (p, n) or (p, n, 2)."""
 
     def of(self, quantity: str, key: str) -> Array:
-        """d(quantity)/d(key), (n,) or (n, 2).
+        """d(quantity)/d(key), (n,) or (n, 2); of a component F12_x or of a magnitude |F12| (n,).
 
         Raises InputError for a quantity or a key that is not known here.
         """
-        for name, known in ((quantity, self.by), (key, self.keys)):
-            if not isinstance(name, str) or name not in known:
-                raise InputError("sensitivity", name, "is not known here; known: " + ", ".join(known))
-        found: Array = self.by[quantity][list(self.keys).index(key)]
-        return found
+        whole = self._whole(quantity)
+        if not isinstance(key, str) or key not in self.keys:
+            raise InputError("sensitivity", key, "is not known here; known: " + ", ".join(self.keys))
+        found: Array = self.by[whole][list(self.keys).index(key)]
+        if quantity == whole:
+            return found
+        if quantity.startswith("|"):
+            value = self.value(whole)
+            with np.errstate(all="ignore"):
+                return np.asarray((found * value).sum(axis=-1) / np.hypot(*value.T))
+        return found[:, "xy".index(quantity[-1])]
 
     def value(self, quantity: str) -> Array:
-        """Return the quantity itself, (n,) or (n, 2); InputError as `of`."""
-        if not isinstance(quantity, str) or quantity not in self.by:
-            raise InputError("sensitivity", quantity, "is not known here; known: " + ", ".join(self.by))
-        found: Array = values_of(self.solution, quantity)
-        return found
+        """Return the quantity itself, or a component or magnitude of it; InputError as `of`."""
+        whole = self._whole(quantity)
+        found: Array = values_of(self.solution, whole)
+        return found if quantity == whole else parts(whole, found)[quantity]
+
+    def to_pandas(self) -> "DataFrame":
+        """One row for each number and position: its key, theta_2, status, and d(quantity)/d(key), SI and rad.
+
+        Raises DependencyError where pandas is not installed.
+        """
+        n = len(self.status)
+        slopes_of = {part: array for name, rows in self.by.items() for part, array in parts(name, rows).items()}
+        columns = {part: rows.ravel() for part, rows in slopes_of.items() if not part.startswith("|")}
+        size = {f"|{name}|": np.ravel([self.of(f"|{name}|", key) for key in self.keys]) for name in PIN_FORCES
+                if name in self.by}  # fmt: skip
+        first = {"key": np.repeat(list(self.keys), n), "theta_2": np.tile(self.solution.theta_2, len(self.keys)),
+                 "status": self.status * len(self.keys)}  # fmt: skip
+        return data_frame(first | columns | size)
+
+    def _whole(self, quantity: str) -> str:
+        """Return the quantity of which one is asked, or a component or the magnitude; InputError for any other."""
+        if isinstance(quantity, str):
+            for name in (quantity, quantity.strip("|"), quantity[:-2]):
+                if name in self.by and (name == quantity or quantity in parts(name, self.by[name])):
+                    return name
+        raise InputError("sensitivity", quantity, "is not known here; known: " + ", ".join(self.by))
+
+    def _rows(self) -> list[tuple[str, str, str]]:
+        """By quantity the numbers that change it most, by 1 % of themselves, angles by 1 deg, and that change."""
+        rows = []
+        names = [*(name for name in ("torque", "theta_3", "theta_4") if name in self.by), *PIN_FORCES]
+        for part in [f"|{name}|" if name in PIN_FORCES else name for name in names if name in self.by]:
+            changes = {}
+            for (key, entry), number in zip(self.keys.items(), self.numbers, strict=True):
+                own = np.abs(self.of(part, key))
+                step = np.radians(1.0) if entry.unit == "rad" else 0.01 * abs(number)
+                changes[key] = step * np.max(own[np.isfinite(own)], initial=0.0)
+            most = sorted((key for key in changes if changes[key] > 0.0), key=lambda key: -changes[key])[:3]
+            rows.append((part, between(self.value(part)), ", ".join(f"{key} {changes[key]:.3g}" for key in most)))
+        return rows
+
+    def _title(self) -> str:
+        counts = ", ".join(f"{self.status.count(word)} {word}" for word in dict.fromkeys(self.status))
+        return f"Sensitivity {self.scene.title!r}: by {len(self.keys)} numbers at {counts}"
+
+    def __repr__(self) -> str:
+        """Say in ten lines what it holds."""
+        rows = [f"{part}, {value}: changes most with {most or 'nothing'}" for part, value, most in self._rows()]
+        return "\n".join([self._title(), *rows, listed("quantities", self.by)])
+
+    def _repr_html_(self) -> str:
+        return html_table(self._title(), ("", "value", "changes most by 1 % of a number, of an angle by 1 deg, with"),
+                          self._rows())  # fmt: skip
 
 
 def sensitivity(scene: Scene) -> Sensitivity:

@@ -37,7 +37,9 @@ def require(scene: Scene) -> None:
         raise InputError("lengths", scene.linkage.lengths, "has a change point, towards which forces have no bound")
     for term in (*scene.loads, *scene.effects):
         if term.key not in KNOWN or getattr(term, "table", None) is not None:
-            raise InputError(f"effects.{term.key}", term.key, "is not evaluated in balls; allowed: " + ", ".join(KNOWN))
+            key = "loads" if term.key == "load" else f"effects.{term.key}"
+            allowed = "gravity, viscous, springs, flywheel and loads without a table"
+            raise InputError(key, term.key, f"its extremes cannot be guaranteed; those with {allowed} can")
 
 
 def interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:

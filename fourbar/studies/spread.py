@@ -2,19 +2,23 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, expect, installing
-from fourbar.quantities import ANGLES, NOT_ASSEMBLED, PIN_FORCES, is_scalar
+from fourbar.quantities import ANGLES, NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Scene, command
-from fourbar.solution import Array, values_of
+from fourbar.solution import Array, parts, values_of
 from fourbar.solve import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import LEFT_OUT, THETA_2, at_place, entries, left_out, refusal
 from fourbar.studies.study import Study, vary
+from fourbar.writing import between, data_frame, extent, html_table, listed
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 SAMPLES = 8192
 MOST_SAMPLES = 10_000_000
@@ -77,6 +81,44 @@ class Tolerances:
     invalid: int
     """Members with a number that no scene takes (a length below zero)."""
 
+    def to_pandas(self) -> "DataFrame":
+        """One row for each quantity and position, SI and rad; the shares of the variance as columns "share of KEY".
+
+        Raises DependencyError where pandas is not installed.
+        """
+        first = {"quantity": np.repeat(list(self.spreads), len(self.theta_2)),
+                 "theta_2": np.tile(self.theta_2, len(self.spreads))}  # fmt: skip
+        names = [name for name in Spread._fields if name != "shares"]
+        columns = {name: np.ravel([getattr(spread, name) for spread in self.spreads.values()]) for name in names}
+        shares = {f"share of {tolerance.key}": np.ravel([spread.shares[k] for spread in self.spreads.values()])
+                  for k, tolerance in enumerate(self.scene.tolerances)}  # fmt: skip
+        return data_frame(first | columns | shares)
+
+    def _title(self) -> str:
+        tried = f"{self.samples} samples (seed {self.seed}), {self.apart} of them do not assemble somewhere"
+        return f"Tolerances {self.scene.title!r}: {extent(self.theta_2)}, {tried}"
+
+    def _rows(self) -> list[tuple[str, str, str, str]]:
+        """By quantity its nominal values, and the largest standard deviation and worst case."""
+        shown = [name for name in ("torque", "theta_3", "theta_4", *(f"|{name}|" for name in PIN_FORCES))
+                 if name in self.spreads]  # fmt: skip
+        rows = []
+        for name in shown:
+            spread = self.spreads[name]
+            largest = (np.max(x[np.isfinite(x)], initial=0.0) for x in (spread.deviation, spread.worst))
+            rows.append((name, between(spread.nominal), *(f"{x:.3g}" for x in largest)))
+        return rows  # type: ignore[return-value]
+
+    def __repr__(self) -> str:
+        """Say in ten lines what it holds."""
+        rows = [
+            f"{name}, {value}: sigma up to {sigma}, worst case {worst}" for name, value, sigma, worst in self._rows()
+        ]
+        return "\n".join([self._title(), *rows, listed("quantities", self.spreads)])
+
+    def _repr_html_(self) -> str:
+        return html_table(self._title(), ("", "nominal", "largest sigma", "largest worst case"), self._rows())
+
 
 def tolerances(
     scene: Scene, samples: int = SAMPLES, seed: int = 0, *, progress: Callable[[float], None] | None = None
@@ -105,11 +147,13 @@ def tolerances(
         raise InputError("seed", seed, "must be a whole number, 0 or more")
     if not scene.tolerances:
         raise InputError("tolerances", None, 'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"')
+    if progress is not None:
+        progress(0.0)
     found, study = sensitivity(scene), _members(scene, samples, seed)
     n = len(found.solution)
     names = list(found.by)
-    values = {name: _parts(name, found.value(name)) for name in names}
-    spreads = {part: _of_first_order(found, name, part) for name, own in values.items() for part in own}
+    values = {name: parts(name, found.value(name)) for name in names}
+    spreads = {part: _of_first_order(found, part) for name, own in values.items() for part in own}
     without, gone = np.zeros(n, dtype=np.intp), np.zeros(len(study), dtype=bool)
     nominal_closes = found.solution.status_code != NOT_ASSEMBLED
     for columns, extra in _columns(study, scene, samples, nominal_closes):
@@ -124,7 +168,7 @@ def tolerances(
             if name in ANGLES:  # each member counts its turns from its own first position
                 turns = np.rint((number - values[name][name][columns]) / (2 * np.pi))
                 number = number - 2 * np.pi * turns
-            for part, sampled in _parts(name, number).items():
+            for part, sampled in parts(name, number).items():
                 _fill(spreads[part], columns, sampled)
         if progress is not None:
             progress(columns.stop / n)
@@ -170,27 +214,13 @@ def _piece(value: Any, index: NDArray[np.intp]) -> Any:
     return value[:, index] if np.ndim(value) == 2 and value.shape[1] > 1 else value
 
 
-def _parts(name: str, value: Any) -> dict[str, Array]:
-    """Split a quantity into scalars: components, and the magnitude of a pin force."""
-    if is_scalar(name):
-        return {name: value}
-    found = {f"{name}_x": value[..., 0], f"{name}_y": value[..., 1]}
-    return {f"|{name}|": np.hypot(value[..., 0], value[..., 1]), **found} if name in PIN_FORCES else found
-
-
-def _of_first_order(found: Sensitivity, name: str, part: str) -> Spread:
+def _of_first_order(found: Sensitivity, part: str) -> Spread:
     """Compute the nominal and the first-order figures of a part of a quantity; the samples' are still to come."""
-    value, scene = found.value(name), found.scene
-    slopes = np.array([found.of(name, tolerance.key) for tolerance in scene.tolerances])
-    if part.startswith("|"):
-        with np.errstate(all="ignore"):
-            slopes = (slopes * value).sum(axis=-1) / np.hypot(*value.T)
-    elif slopes.ndim == 3:
-        slopes = slopes[..., "xy".index(part[-1])]
+    scene, nominal = found.scene, found.value(part)
+    slopes = np.array([found.of(part, tolerance.key) for tolerance in scene.tolerances])
     deviations, reaches = (
         np.array([getattr(tolerance, of) for tolerance in scene.tolerances])[:, None] for of in ("deviation", "reach")
     )
-    nominal = _parts(name, value)[part]
     deviation, low, high, least, greatest = (np.full(nominal.shape, np.nan) for _ in range(5))
     worst = np.asarray(np.abs(slopes * reaches).sum(axis=0))
     return Spread(nominal, deviation, low, high, least, greatest, worst, (slopes * deviations) ** 2)

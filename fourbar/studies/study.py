@@ -19,6 +19,7 @@ from fourbar.scene.motion import FromLimit
 from fourbar.solution import Array, Solution, unwrap
 from fourbar.solve import arrays, requested, solved
 from fourbar.studies.keys import THETA_2, entries, placed, refusal, with_numbers
+from fourbar.writing import extent, listed
 
 if TYPE_CHECKING:
     from fourbar.effects import Effect
@@ -43,6 +44,10 @@ class Study:
 
     def __len__(self) -> int:
         return len(self.invalid)
+
+    def __repr__(self) -> str:
+        """Say what varies."""
+        return f"Study {self.scene.title!r}: {extent(self.at.theta_2)}\n" + listed("varied", self.values)
 
     def solved(
         self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0, compiled: bool | None = None
@@ -74,7 +79,13 @@ class Study:
         code[self.invalid] = INVALID
         for array in result.values():
             array[self.invalid] = np.nan
-        return solved(self.scene, at, code, result)
+        solution, linkage = solved(self.scene, at, code, result), self.scene.linkage
+        length, angle = (self.values.get(f"lengths.{name}") for name in ("ground", "ground_angle"))
+        solution.ground = (
+            linkage.ground if length is None else length[:, None],
+            linkage.ground_angle if angle is None else angle[:, None],
+        )
+        return solution
 
     def _command(self, rows: slice, columns: slice) -> Command:
         """List some positions of some members, one after the other, (k,)."""

@@ -3,9 +3,11 @@
 import itertools
 import json
 import math
+import pydoc
 import re
 import runpy
 from collections.abc import Callable, Iterator
+from dataclasses import fields, replace
 from decimal import Decimal
 from functools import partial
 from pathlib import Path
@@ -79,7 +81,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         return fourbar.solve(given[0], given[1], at=given[2], side=given[3], compiled=given[4])
 
     only_linkage = ("change_points", "circuits", "classify", "time_ratio", "transmission_extremes")
-    of_solution = ("motor_duty", "shaking_force")
+    of_solution = ("motor_duty", "shaking_force", "shaking_moment")
     of_scene = ("command", "dump", "sensitivity")
     return {
         **{name: (getattr(fourbar, name), (link,)) for name in only_linkage},
@@ -94,7 +96,6 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         "instant_centres": (fourbar.instant_centres, (link, np.array([1.0]), 1)),
         "point_coefficients": (fourbar.point_coefficients, (link, np.array([1.0]), 1, 3, 0.1j)),
         "bearing_load": (fourbar.bearing_load, (solution, "A")),
-        "shaking_moment": (fourbar.shaking_moment, (link, solution)),
         "in_units": (fourbar.in_units, (scene, "mm")),
         "units": (fourbar.units, ("mm",)),
         "uniform": (lambda *x: fourbar.uniform(*x[:4], per_metre=x[4]), (0.3, 0.1, 0.25, 0.22, 1.0)),
@@ -102,6 +103,8 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         "save": (fourbar.save, (scene, "a.toml")),
         "vary": (fourbar.vary, (scene, {"lengths.input": [0.1]})),
         "vary, a value": (lambda x: fourbar.solve(fourbar.vary(scene, {"lengths.input": x})), (0.1,)),
+        "equilibrium": (fourbar.equilibrium, (scene,)),
+        "ratio": (fourbar.ratio, (scene, 1)),
         "extremes": (fourbar.extremes, (scene, ("torque",))),
         "tolerances": (
             lambda *x: fourbar.tolerances(fourbar.Scene(link, scene.motion, tolerances=x[0]), samples=x[1], seed=x[2]),
@@ -237,6 +240,32 @@ def test_a_scene_draws_itself(tmp_path: Path) -> None:
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
     with pytest.raises(fourbar.InputError, match="must be one of"):
         crank_rocker().plot("pie")  # type: ignore[attr-defined]
+
+
+def test_help_says_the_parameters() -> None:
+    shown = pydoc.render_doc(crank_rocker().plot, renderer=pydoc.plaintext)  # type: ignore[attr-defined]
+    assert all(f"{name} :" in shown for name in ("figure", "position", "branches", "units", "dimensions"))
+    shown = pydoc.render_doc(fourbar.Scene, renderer=pydoc.plaintext)
+    for each in fields(fourbar.Scene):
+        assert re.search(rf"^ \|  .*\b{each.name}\b.* : ", shown, re.MULTILINE), each.name
+
+
+def test_scenes_compare_by_value(tmp_path: Path) -> None:
+    scene = crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]), 10.0))
+    same = crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]), 10.0))
+    assert scene == same and hash(scene) == hash(same) and scene != "scene"
+    for other in (
+        crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.3]), 10.0)),
+        crank_rocker(motion=fourbar.Motion(0.1, 10.0)),
+        crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]), 10.0, branch=-1)),
+        replace(scene, loads=scene.loads[:1]),
+        replace(scene, drive_bar=4),
+        replace(scene, title="another"),
+    ):
+        assert scene != other
+    file = DOCS.parent / "models" / "thesis.toml"
+    save(fourbar.load(file), tmp_path / "a.toml")
+    assert fourbar.load(file) == fourbar.load(tmp_path / "a.toml")
 
 
 def test_loads_without_a_speed_are_pointed_to_the_static_torque(

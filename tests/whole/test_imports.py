@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "mujoco", "pinocchio", "flint", "mpmath", "tornado", "tomlkit")
+HEAVY = "pint click rich jinja2 matplotlib scipy mujoco pinocchio flint mpmath tornado tomlkit".split()
 ENGINES = {name: name.removeprefix("py") for name in ("mujoco", "pinocchio", "exudyn", "opensim", "pydrake")}
 PACKAGES = {"fourbar": ROOT / "fourbar", "fourbar_validation": ROOT / "validation" / "fourbar_validation"}
 LAYERS = {
     "fourbar": (
-        "errors quantities",
+        "errors",
+        "quantities",
         "linkage writing",
         "formulas",
         "solution",

@@ -14,7 +14,7 @@ SOURCES = {"fourbar": ROOT / "fourbar", "validation": ROOT / "validation" / "fou
 """Folder of tests, and folder of the modules that it mirrors."""
 JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
-    "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given; fourbar/show: progress tables words",
+    "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given rest; fourbar/show: progress tables words",
     "whole/test_exits.py": "fourbar: errors writing; validation: cli; validation/report: terminal; "
     "validation/lab/stress: mutants",
     "whole/test_kills.py": "validation/run: pool run selection store; validation/scenes: suites",
@@ -23,10 +23,14 @@ JUDGED_BY = {
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: actions cones effect flywheel friction gravity load "
     "numbers pin_friction pins torsion viscous",
-    "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text units",
+    "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
+    "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve holding zeros; fourbar/show: equilibrium; "
+    "fourbar/formulas: closed_curve",
+    "fourbar/studies/test_ratio.py": "fourbar/show: ratio; fourbar/mjcf: mimic",
+    "validation/lab/test_mimic.py": "validation/engines/mujoco: mimic",
     "fourbar/formulas/test_mobility.py": "fourbar/formulas: circuits linkage_type",
-    "fourbar/test_solve.py": "fourbar: linkage quantities solution; "
+    "fourbar/test_solve.py": "fourbar: linkage solution; "
     "fourbar/scene: motion scene; fourbar/evaluation: blocks case stages withheld",
     "fourbar/evaluation/test_compiled.py": "fourbar/evaluation: compiled_case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion_law; fourbar/studies: keys",
@@ -34,12 +38,12 @@ JUDGED_BY = {
     "fourbar/studies/test_derivatives.py": "fourbar/show: influence",
     "fourbar/studies/test_enclosure.py": "fourbar/studies: interval; fourbar/show: extremes",
     # parts of one document or picture
-    "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: defaults document effects model notes settings",
+    "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: defaults document effects model settings",
     "fourbar/mjcf/test_simulators.py": "fourbar/mjcf: assembly sdf usd",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_notebook.py": "fourbar/files: new; fourbar/show: drawing",
     "fourbar/show/test_page.py": "fourbar/show: page_data tolerances",
-    "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody hodograph labels linkage "
+    "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody hodograph labels linkage mechanism "
     "studies style symbols transmission view",
     "validation/engines/mujoco/test_picture.py": "fourbar/mjcf: appearance",
     # a comparison is tested by witnesses with given answers

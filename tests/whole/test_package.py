@@ -177,7 +177,7 @@ def installed_works(python: str, package: Path, folder: Path, constraints: list[
         return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
     assert run("--version").stdout == f"fourbar, version {PROJECT['project']['version']}\n"
-    assert run("new", "a.toml", "--lengths", "300mm", "10 cm", "0.25", "22cm").returncode == 0
+    assert run("new", "a.toml", "--lengths", "300mm", "10 cm", "0.25m", "22cm").returncode == 0
     table = run("analyze", "a.toml", "--units", "imperial")
     assert table.returncode == 0 and "361 positions: 361 ok" in table.stdout, table.stderr
     page = run("animate", "a.toml", "-o", "a.html")

@@ -1,8 +1,25 @@
 // ---- what acts: springs, loads, drive, flywheel, gravity, and rings around pins --------------------
 parts.acting = make(picture, "g", { id: "acting" });
 picture.insertBefore(parts.acting, parts.forces);
+parts.under = make(picture, "g", { id: "under" });   // springs, and what sits in the pins: it hides no bar
+picture.insertBefore(parts.under, parts.bars[2]);
 const COILS = 7, OPENING = 250 / DEG, RINGS = { viscous: 1.5, friction: 1.8, pin_friction: 1.8, flywheel: 4 };
 const sizeOf = () => view.width < 480 ? 7 : 9;   // of a symbol, px
+
+// Of a symbol at a pin: smaller where a bar there is short.
+function smallAt(p, pin) {
+  const ring = ["O2", "A", "B", "O4"], n = ring.indexOf(pin), S = sizeOf();
+  const shortest = Math.min(...[1, 3].map(step => p[ring[(n + step) % 4]]).map(([x, y]) => Math.hypot(x - p[pin][0], y - p[pin][1])));
+  return Math.min(S, Math.max(0.5 * S, 0.12 * view.k * shortest));
+}
+
+// Points off their bar are joined to it, from pin to point to pin, as a plate.
+function drawPlate(p, bar, point) {
+  const [a, c] = bar > 1 ? [p[FIRST_PIN[bar]], p[LAST_PIN[bar]]] : [p.O2, p.O4], [b, q] = [[c[0] - a[0], c[1] - a[1]], [point[0] - a[0], point[1] - a[1]]];
+  const square = b[0] * b[0] + b[1] * b[1], along = (q[0] * b[0] + q[1] * b[1]) / square, across = (b[0] * q[1] - b[1] * q[0]) / square;
+  if (Math.abs(across) < 1e-3 && along > -1e-3 && along < 1.001) return;
+  make(parts.under, "path", { class: `plate b${bar}`, d: pathOf([a, point, c].map(toScreen)) });
+}
 
 // A point in the frame of a bar, 1 to 4.
 function framed(p, bar, z) {
@@ -33,17 +50,25 @@ function headed(points, kind, group = parts.acting) {   // a line with an arrow 
   make(group, "path", { class: `act-head act-${kind}`, d: `M${x + 7 * a} ${y + 7 * b}L${x - 4 * b} ${y + 4 * a}L${x + 4 * b} ${y - 4 * a}Z` });
 }
 
-function named(text, x, y) {
-  make(parts.acting, "text", { class: "act-name", x: Math.min(view.width - 20, Math.max(20, x)), y: Math.min(view.height - 8, Math.max(10, y)) }).textContent = text;
+function named(text, x, y, group = parts.acting) {
+  const free = freeSpot(Math.min(view.width - 20, Math.max(20, x)), Math.min(view.height - 11, Math.max(11, y)), text.length);
+  if (free) make(group, "text", { class: "act-name", x: free[0], y: free[1] }).textContent = text;
 }
 
 function drawActing(p, i) {
   parts.acting.replaceChildren();
-  if (!p || !byId("show-acting").checked) return;
-  const S = sizeOf(), torque = valuesAt(i).torque;
+  parts.under.replaceChildren();
+  if (!p) return;
+  for (const point of data.points) drawPlate(p, point.bar, framed(p, point.bar, point.at));
+  for (const k of [2, 3, 4]) if (data.centres[k] && byId("show-centres").checked) drawPlate(p, k, barPoint(p, k, data.centres[k]));
+  if (!byId("show-acting").checked) return;
+  const torque = valuesAt(i).torque;
   for (const one of data.acting) {
     const factor = one.factor === null ? 1 : edited ? 0 : one.factor[i];
     if (factor === 0) continue;
+    const S = one.pin ? smallAt(p, one.pin) : one.kind === "moment" ? smallAt(p, FIRST_PIN[one.bar]) : sizeOf();
+    if (["force", "moment", "spring"].includes(one.kind)) drawPlate(p, one.bar, forceFoot(p, one));
+    if (one.end) drawPlate(p, one.end[0], framed(p, ...one.end));
     if (one.kind === "gravity") {
       const size = Math.hypot(...one.vector), [x, y] = [one.vector[0] / size, -one.vector[1] / size], at = [view.width - 34, 34];
       headed([[at[0] - 12 * x, at[1] - 12 * y], [at[0] + 12 * x, at[1] + 12 * y]], "gravity");
@@ -51,8 +76,8 @@ function drawActing(p, i) {
     } else if (one.kind === "spring") {
       const a = toScreen(framed(p, one.bar, one.at)), b = toScreen(framed(p, ...one.end)), along = [b[0] - a[0], b[1] - a[1]], long = Math.hypot(...along) || 1;
       const on = (share, out) => [a[0] + share * along[0] - out * along[1] / long, a[1] + share * along[1] + out * along[0] / long];
-      const teeth = Array.from({ length: COILS }, (_, n) => on(0.15 + 0.7 * (n + 0.5) / COILS, (n % 2 ? -0.8 : 0.8) * S));
-      make(parts.acting, "path", { class: "act act-spring", d: pathOf([a, on(0.15, 0), ...teeth, on(0.85, 0), b]) });
+      const teeth = Array.from({ length: COILS }, (_, n) => on(0.15 + 0.7 * (n + 0.5) / COILS, (n % 2 ? -0.6 : 0.6) * S));
+      make(parts.under, "path", { class: "act act-spring", d: pathOf([a, on(0.15, 0), ...teeth, on(0.85, 0), b]) });
       for (const [x, y] of [a, b]) make(parts.acting, "circle", { class: "act-head act-spring", cx: x, cy: y, r: 3 });
     } else if (one.kind === "force") {
       const foot = forceFoot(p, one), angle = one.turns ? { 2: p.theta2, 3: p.theta3, 4: p.theta4 }[one.bar] : 0;
@@ -68,10 +93,10 @@ function drawActing(p, i) {
       if (turn) named(one.name, at[0], at[1] - turn * (radius + 9));
     } else if (one.kind === "torsion") {
       const at = toScreen(p[one.pin]);
-      make(parts.acting, "path", { class: "act act-spring", d: pathOf(Array.from({ length: 80 }, (_, n) => ring(at, S * (0.6 + 1.5 * n / 79), n / 79 * 2.5 * TURN, 0, 2)[0])) });
+      make(parts.under, "path", { class: "act act-spring", d: pathOf(Array.from({ length: 80 }, (_, n) => ring(at, S * (0.6 + 1.5 * n / 79), n / 79 * 2.5 * TURN, 0, 2)[0])) });
     } else {
       const at = toScreen(p[one.pin]);
-      make(parts.acting, "circle", { class: `act act-${one.kind === "flywheel" ? "flywheel" : "pin"}`, cx: at[0], cy: at[1], r: RINGS[one.kind] * S });
+      make(parts.under, "circle", { class: `act act-${one.kind === "flywheel" ? "flywheel" : "pin"}`, cx: at[0], cy: at[1], r: RINGS[one.kind] * S });
     }
   }
 }
@@ -101,6 +126,6 @@ function drawPoints(p) {
   for (const point of data.points) {
     const [x, y] = toScreen(framed(p, point.bar, point.at));
     make(parts.points, "path", { class: "own-point", d: `M${x - 5} ${y}L${x} ${y - 5}L${x + 5} ${y}L${x} ${y + 5}Z` });
-    if (byId("show-labels").checked) make(parts.points, "text", { class: "act-name", x: x + 12, y: y - 9 }).textContent = point.name;
+    if (byId("show-labels").checked) named(point.name, x + 12, y - 9, parts.points);
   }
 }

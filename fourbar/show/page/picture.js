@@ -24,15 +24,16 @@ parts.pins = Object.fromEntries(["O2", "A", "B", "O4"].map(name => [name, make(p
 parts.centres = make(picture, "g", { id: "centres" });
 parts.centre = {};
 for (const k of [2, 3, 4]) {
-  const arm = make(parts.centres, "line", { class: "arm" }), mark = make(parts.centres, "g", { id: `centre-${k}` });
+  const mark = parts.centre[k] = make(parts.centres, "g", { id: `centre-${k}` });
   make(mark, "circle", { class: "centre-disc", r: 7 });
   make(mark, "path", { class: "centre-fill", d: "M0 0H7A7 7 0 0 0 0 -7ZM0 0H-7A7 7 0 0 0 0 7Z" });
-  parts.centre[k] = { arm, mark };
 }
 parts.labels = make(picture, "g", { id: "labels" });
 parts.label = {};
 for (const name of ["O2", "A", "B", "O4", "1", "2", "3", "4", "G2", "G3", "G4", ...FORCES]) {
   const element = make(parts.labels, "text", { class: "label" + (FORCES.includes(name) ? ` f-${name}` : "") });
+  const own = /^G?([234])$/.exec(name);
+  if (own) element.style.fill = `var(--bar${own[1]})`;
   element.append(name[0]);
   if (name.length > 1) {
     const index = make(element, "tspan", { dy: 4, "font-size": 10 });
@@ -204,11 +205,12 @@ function drawLinkage(p, i) {
     visible("1", true);
     set(parts.label["1"], { x: 0.5 * (s.O2[0] + s.O4[0]), y: 0.5 * (s.O2[1] + s.O4[1]) + 14 });
   }
+  barLines = [2, 3, 4].map(k => [s[FIRST_PIN[k]], s[LAST_PIN[k]]]).filter(([p1, p2]) => p1 && p2);
   for (const k of [2, 3, 4]) {
     const p1 = s[FIRST_PIN[k]], p2 = s[LAST_PIN[k]], drawn = Boolean(p1 && p2);
     parts.bars[k].style.display = drawn ? "" : "none";
     parts.image[k].style.display = drawn && data.pictures[k] && show("show-pictures") ? "" : "none";
-    for (const element of Object.values(parts.centre[k])) element.style.display = drawn && data.centres[k] && show("show-centres") ? "" : "none";
+    parts.centre[k].style.display = drawn && data.centres[k] && show("show-centres") ? "" : "none";
     if (!drawn) continue;
     set(parts.bars[k], { x1: p1[0], y1: p1[1], x2: p2[0], y2: p2[1] });
     visible(String(k), true);
@@ -224,8 +226,7 @@ function drawLinkage(p, i) {
     }
     if (data.centres[k]) {
       const g = toScreen(barPoint(known, k, data.centres[k]));
-      parts.centre[k].mark.setAttribute("transform", `translate(${g[0]} ${g[1]})`);
-      set(parts.centre[k].arm, { x1: p1[0], y1: p1[1], x2: g[0], y2: g[1] });
+      parts.centre[k].setAttribute("transform", `translate(${g[0]} ${g[1]})`);
       visible(`G${k}`, show("show-centres"));
       set(parts.label[`G${k}`], { x: g[0] - 1.2 * side * normal[0], y: g[1] - 1.2 * side * normal[1] });
     }
@@ -251,25 +252,34 @@ function drawLinkage(p, i) {
     set(parts.label[name], { x: tip[0] + 15 * ux, y: tip[1] + 13 * uy });
   }
   separateLabels();
-  drawActing(p, i);
   drawPoints(p);
+  drawActing(p, i);
   drawMotion(p, i);
 }
 
 // Labels that would cover each other move aside, the less important one first; one without a free spot is left out.
+let kept = [], barLines = [];   // x, y and width of those that stand; ends of the bars drawn
+function freeSpot(x, y, letters) {
+  const wide = 6 + 6 * letters, free = SHIFTS.map(([dx, dy]) => [x + dx, y + dy]).filter(([u, v]) =>
+    u > 10 && v > 10 && u < view.width - 10 && v < view.height - 10
+    && kept.every(([s, t, w]) => Math.abs(u - s) > 0.5 * (wide + w) || Math.abs(v - t) > 15));
+  const offBars = ([u, v]) => [-1, 0, 1].every(side => barLines.every(ends => awayFrom(ends, u + side * (0.5 * wide - 3), v) > 9));
+  const spot = free.find(offBars) ?? free[0];
+  if (spot) kept.push([...spot, wide]);
+  return spot;
+}
+function awayFrom([p, q], u, v) {   // of a point from a line between two others
+  const [x, y] = [q[0] - p[0], q[1] - p[1]], share = Math.max(0, Math.min(1, ((u - p[0]) * x + (v - p[1]) * y) / (x * x + y * y || 1)));
+  return Math.hypot(u - p[0] - share * x, v - p[1] - share * y);
+}
 function separateLabels() {
-  const kept = [];
+  kept = [];
   for (const name of ["O2", "A", "B", "O4", ...FORCES, "1", "2", "3", "4", "G2", "G3", "G4"]) {
     const label = parts.label[name];
     if (label.style.display === "none") continue;
-    const x = Number(label.getAttribute("x")), y = Number(label.getAttribute("y")), wide = 6 + 6 * (label.childElementCount ? name.length : label.textContent.length);
-    const free = SHIFTS.map(([dx, dy]) => [x + dx, y + dy]).find(([u, v]) =>
-      u > 10 && v > 10 && u < view.width - 10 && v < view.height - 10
-      && kept.every(([s, t, w]) => Math.abs(u - s) > 0.5 * (wide + w) || Math.abs(v - t) > 15));
-    if (!free) { label.style.display = "none"; continue; }
-    set(label, { x: free[0], y: free[1] });
-    kept.push([...free, wide]);
+    const free = freeSpot(Number(label.getAttribute("x")), Number(label.getAttribute("y")), label.childElementCount ? name.length : label.textContent.length);
+    if (free) set(label, { x: free[0], y: free[1] });
+    else label.style.display = "none";
   }
 }
-const SHIFTS = [[0, 0], [0, -15], [0, 15], [17, 0], [-17, 0], [17, -15], [-17, -15], [17, 15], [-17, 15]];
-
+const SHIFTS = [[0, 0], ...[1, 2].flatMap(n => [[0, -15 * n], [0, 15 * n], [17 * n, 0], [-17 * n, 0], [17 * n, -15 * n], [-17 * n, -15 * n], [17 * n, 15 * n], [-17 * n, 15 * n]])];

@@ -2,9 +2,10 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import cycle
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from fourbar.show.plot.style import (
     unit_for,
 )
 from fourbar.show.plot.view import View, point_vectors
-from fourbar.solution import Array
+from fourbar.solution import Array, Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -192,23 +193,30 @@ draw_speeds = partial(_of_points, letter="v", unit="m/s", title="Speeds of point
 draw_point_accelerations = partial(_of_points, letter="a", unit="m/s^2", title="Accelerations of points")
 
 
-def draw_torque(axes: "Axes", view: View) -> None:
-    """Draw the driving torque, with its poles."""
-    over = bases(axes, view)
-    torque, bar = view.sweep.torque, view.scene.drive_bar
-    assert torque is not None
-    torques = [other.sweep.torque for other in view.alike if other.sweep.torque is not None]
-    limit = limit_of(torques)
-    factor, unit = unit_for(limit or largest(*torques), "N m", view.units)
-    where = poles(view)
-    axes.plot(broken(over, where), factor * broken(torque, where), color=INK, label=f"$T_{bar}$")
+def _of_drive(
+    axes: "Axes", view: View, of: Callable[[Solution], Array], letter: str, unit: str, title: str, what: str
+) -> None:
+    """Draw a quantity of the drive, with the poles of its torque."""
+    over, bar, where = bases(axes, view), view.scene.drive_bar, poles(view)
+    values, everywhere = of(view.sweep), [of(other.sweep) for other in view.alike]
+    limit = limit_of(everywhere)
+    factor, shown_unit = unit_for(limit or largest(*everywhere), unit, view.units)
+    axes.plot(broken(over, where), factor * broken(values, where), color=INK, label=f"${letter}_{bar}$")
     for index in where:
         axes.axvline(0.5 * float(over[index] + over[index + 1]), color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
     if where.size:
         note(view, f"Dotted: poles of the torque on bar {bar} ({POLE_REASON[bar]}).")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
-    axes.set(ylabel=f"$T_{bar}$ ({unit})", title=f"Driving torque on bar {bar}")
-    clip(axes, view, {f"T{'₂₃₄'[bar - 2]}": torque}, limit, "Torque", "N m")
+    axes.set(ylabel=f"${letter}_{bar}$ ({shown_unit})", title=f"{title} bar {bar}")
+    clip(axes, view, {f"{letter}{'₂₃₄'[bar - 2]}": values}, limit, what, unit)
+
+
+draw_torque = partial(
+    _of_drive, of=attrgetter("torque"), letter="T", unit="N m", title="Driving torque on", what="Torque"
+)
+draw_power = partial(
+    _of_drive, of=attrgetter("power"), letter="P", unit="W", title="Power of the drive on", what="Power"
+)
 
 
 def force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:

@@ -4,13 +4,14 @@ import math
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.scene import Scene
+from fourbar.show.between import between
 from fourbar.show.plot import curves, freebody, hodograph, linkage, studies
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import CAPTION, FORCE_COLOURS, TITLE, format_of, matplotlib_style, plain, rendered, save
@@ -22,7 +23,6 @@ from fourbar.solution import SI, Conversion, require_units
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
-    from matplotlib.projections.polar import PolarAxes
 
 BRANCHES = ("one", "both")
 Painter = Callable[["SubFigure", View, Labels], None]
@@ -35,20 +35,25 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
         curves.draw_angles(panels["angles"], shown)
         draw_transmission(panels["mu"], shown)
         return
+    free = shown.scene.motion.free is not None
     panels = figure.subplot_mosaic(
-        [["linkage", "angles", "torque"], ["linkage", "omega", "forces"], ["polar", "alpha", "mu"]],
+        [
+            ["linkage", "angles", "torque"],
+            ["linkage", "omega", "forces"],
+            ["linkage" if free else "power", "alpha", "mu"],
+        ],
         width_ratios=[1.15, 1.0, 1.0],
-        per_subplot_kw={"polar": {"projection": "polar"}},
     )
     linkage.draw_linkage(panels["linkage"], shown, labels)
     curves.draw_angles(panels["angles"], shown)
     curves.draw_velocities(panels["omega"], shown)
     curves.draw_accelerations(panels["alpha"], shown)
-    # what drives: the torque, or in a free motion the work of loads and effects
-    (curves.draw_torque if shown.scene.motion.free is None else curves.draw_energy)(panels["torque"], shown)
+    # what drives: torque and power, or in a free motion the work of loads and effects
+    (curves.draw_energy if free else curves.draw_torque)(panels["torque"], shown)
+    if not free:
+        curves.draw_power(panels["power"], shown)
     curves.draw_forces(panels["forces"], shown)
     draw_transmission(panels["mu"], shown)
-    hodograph.draw_hodograph(cast("PolarAxes", panels["polar"]), shown)
 
 
 def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
@@ -144,23 +149,7 @@ def drawn(
     units: Conversion = SI,
     dimensions: bool = False,
 ) -> Drawing:
-    """Draw a figure of a scene for a notebook (`scene.plot()`).
-
-    Parameters
-    ----------
-    figure : one of `FIGURES`: "overview", "linkage", "coupler", "kinematics", "points", "torque",
-        "forces", "hodograph", "energy", "transmission", "freebody", "sensitivity".
-    position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
-    branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
-    units : in which numbers are drawn; left out: SI with the prefix that suits. Angles are in degrees.
-    dimensions : write the lengths of the bars at them.
-
-    Raises
-    ------
-    InputError : unknown figure or choice of branches; a figure of forces without omega_2.
-    NotAssembledError : there is no position to draw.
-    DependencyError : matplotlib is missing.
-    """
+    """Draw a figure of a scene for a notebook: `Scene.plot`, which says the parameters."""
     painter, size = _painter(scene, figure, branches)
     require_units(units)
     position = None if position is None else require("position", position)
@@ -172,7 +161,18 @@ def drawn(
         for shown in views:
             shown.units, shown.dimensions = units, dimensions
             shown.others = [other for other in views if other is not shown]
+            _look_between(shown)
         return Drawing(_composed(painter, size, views))
+
+
+def _look_between(shown: View) -> None:
+    """Add what stands between the positions of the sweep: jumps are drawn where they are, peaks to their height."""
+    if (found := between(shown.scene, shown.sweep)) is None:
+        return
+    shown.sweep = found.solution
+    if found.reversals:
+        where = ", ".join(f"{math.degrees(theta_2):.4g}° ({pin})" for theta_2, pin in found.reversals)
+        shown.notes.append(f"Dry friction reverses, and the pin forces jump, at θ₂ = {where}.".replace("-", "−"))
 
 
 def draw(

@@ -13,7 +13,7 @@ from fourbar.effects.actions import bodies
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.linkage import mass_centre, pin_name
+from fourbar.show.plot.mechanism import mass_centre, pin_name, plate
 from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, HEADED, INK, MUTED, OPEN, force_name, quantity, unit_for
 from fourbar.show.plot.symbols import components, place_of
 from fourbar.show.plot.view import Recorder, View, one
@@ -145,6 +145,7 @@ def _draw_one(
         if size < SHOWN * biggest:
             short.append(f"{_words(arrow.text)} = {quantity(size, 'N', view.units)}")
             continue
+        plate(axes, bar, (0.0j, arrow.at, along), labels)
         foot, tip = components(arrow.at), components(arrow.at + scale * arrow.force)
         look = {**HEADED, "color": arrow.colour, "mutation_scale": 9, "ls": "--" if arrow.dashed else "-"}
         axes.annotate("", xy=tip, xytext=foot, arrowprops=look, zorder=5, annotation_clip=False)
@@ -154,9 +155,9 @@ def _draw_one(
         note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
     centre = view.scene.linkage.bar(bar)
     if centre.mass > 0.0:
-        x, y = components(one(centre.to_centre * view.state().direction(bar)))
-        axes.plot([0.0, x], [0.0, y], color=BAR_COLOURS[bar], lw=0.8, ls=":", zorder=1)
-        labels.keep_off(axes, (0.0, 0.0), (x, y))
+        G = one(centre.to_centre * view.state().direction(bar))
+        x, y = components(G)
+        plate(axes, bar, (0.0j, G, along), labels)
         mass_centre(axes, (x, y), 6.0)
         labels.add(Label(axes, f"$G_{bar}$", (x, y), middle, MUTED, 8.0, 3.0))
     reach = _reach(view, bar, arrows, scale)
@@ -172,7 +173,7 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
     """One line each."""
     lines = []
     for each in couples:
-        size = quantity(each.moment, "N m", view.units)
+        size = quantity(abs(each.moment), "N m", view.units)
         lines.append(f"{'↺' if each.moment > 0.0 else '↻'} {each.text} = {size}")
     axes.set_axis_off()
     look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45, "color": INK if lines else MUTED}

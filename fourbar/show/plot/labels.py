@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,12 +12,15 @@ from fourbar.show.plot.style import INK
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
-REACH = (7.0, 11.0, 16.0, 23.0, 32.0)
+REACH = (7.0, 11.0, 16.0, 23.0, 32.0, 44.0)
 """Distances from the point to the label's edge that are tried, typographic points."""
 DIRECTIONS = 16
+LED = 15.0
+"""A label further away than this is led to its point by a thin line, typographic points."""
 
 
 @dataclass(slots=True)
@@ -52,15 +55,31 @@ class Labels:
         """
         self.lines.append((axes, list(points), width))
 
+    def beside(self) -> "list[Annotation]":
+        """Write every label at once, each outwards from its point: what moves is not searched a free spot for."""
+        written = []
+        for label in self.wanted:
+            dx, dy = (p - q for p, q in zip(label.at, label.shun, strict=True))
+            away = max(math.hypot(dx, dy), 1e-300)
+            side = "center" if abs(dx) < 0.5 * away else "left" if dx > 0.0 else "right"
+            text = label.axes.annotate(
+                label.text, label.at, (8.0 * dx / away, 11.0 * dy / away), textcoords="offset points", ha=side,
+                va="center", size=label.size, color=label.colour, zorder=9, annotation_clip=False,
+            )  # fmt: skip
+            written.append(text)
+        return written
+
     def settle(self, figure: "Figure") -> None:
         """Place every label once the layout is final: the first free spot, nearest first."""
+        from matplotlib.axes import Axes
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
         figure.draw_without_rendering()
         figure.set_layout_engine(None)  # labels must not move what they were measured against
         per_point = figure.dpi / 72.0
-        taken: list[tuple[Axes, Box]] = []
+        texts = [(axes, text) for axes in figure.findobj(Axes) for text in axes.texts if text.get_text()]
+        taken: list[tuple[Axes, Box]] = [(axes, text.get_window_extent(renderer).extents) for axes, text in texts]
         samples: dict[int, list[np.ndarray]] = {}
         for axes, points, width in self.lines:
             own = _sampled(axes.transData.transform(points), per_point)
@@ -79,7 +98,12 @@ class Labels:
             boxes = [box for owner, box in taken if owner is axes]
             centre = _spot((x, y), away, half, dots, boxes, per_point, label.dots_clear, _inside(axes))
             taken.append((axes, (centre[0] - half[0], centre[1] - half[1], centre[0] + half[0], centre[1] + half[1])))
-            text.set_position(tuple(axes.transData.inverted().transform(centre)))
+            to_data = axes.transData.inverted().transform
+            text.set_position(tuple(to_data(centre)))
+            edge = np.clip((x, y), *np.reshape(taken[-1][1], (2, 2)))
+            if math.dist(edge, (x, y)) > (LED + label.dots_clear) * per_point:
+                look: dict[str, Any] = {"scalex": False, "scaley": False}  # what was measured stays
+                axes.plot(*zip(label.at, to_data(edge), strict=True), color=label.colour, lw=0.5, zorder=8.5, **look)
 
 
 def _inside(axes: "Axes") -> Box:

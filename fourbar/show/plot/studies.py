@@ -25,7 +25,7 @@ from fourbar.show.plot.style import (
 )
 from fourbar.show.plot.view import View
 from fourbar.show.tolerances import part_unit, parted, shown_parts
-from fourbar.solution import unit_of
+from fourbar.solution import SI, Conversion, unit_of
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.spread import BAND, Tolerances
 
@@ -42,11 +42,13 @@ OFF_SCALE = 98.0
 """Percentile of the half widths beyond which an axis is not stretched: towards a limit they grow without end."""
 MOST_NUMBERS = 12
 """Of a scene's numbers, those that matter most: more are thin bars that nobody reads."""
+BELOW = 30.0
+"""Space that numbers and name of an axis take, typographic points."""
 MOST_PANELS = 6
 """Torque, the four pin forces, and a point."""
 
 
-def draw_tolerances(found: Tolerances, path: str | Path) -> None:
+def draw_tolerances(found: Tolerances, path: str | Path, units: Conversion = SI) -> None:
     """Draw the deviations from the nominal with their bands into a file, whole or not at all.
 
     Raises InputError for another ending than of svg, png, pdf, or a single position; DependencyError without
@@ -64,7 +66,7 @@ def draw_tolerances(found: Tolerances, path: str | Path) -> None:
         figure = Figure(figsize=(2.95 * columns, 5.6), layout="constrained")
         panels = figure.subplots(2, columns, squeeze=False).ravel()
         for axes, part in zip(panels, parts, strict=False):
-            _band(axes, found, part)
+            _band(axes, found, part, units)
         for axes in panels[len(parts) + 1 :]:
             axes.set_axis_off()
         _shares(panels[len(parts)], found, parts[0])
@@ -87,14 +89,14 @@ def _over(axes: "Axes", found: Tolerances) -> Any:
     return degrees
 
 
-def _band(axes: "Axes", found: Tolerances, part: str) -> None:
+def _band(axes: "Axes", found: Tolerances, part: str, units: Conversion) -> None:
     spread, over = found.spreads[part], _over(axes, found)
     ends = [spread.low, spread.high, spread.least, spread.greatest]
     away = [end - spread.nominal for end in ends]
     sizes = np.abs(np.concatenate([*away, spread.worst]))
     sizes = sizes[np.isfinite(sizes)]
     most = 1.1 * float(np.percentile(sizes, OFF_SCALE)) if sizes.size else 0.0
-    factor, unit = unit_for(most, part_unit(part))
+    factor, unit = unit_for(most, part_unit(part), units)
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
     axes.fill_between(over, factor * away[0], factor * away[1], color=colour, alpha=0.35, lw=0.0)
     for line in away[2:]:
@@ -108,6 +110,8 @@ def _band(axes: "Axes", found: Tolerances, part: str) -> None:
 
 
 def _shares(axes: "Axes", found: Tolerances, part: str) -> None:
+    from matplotlib.transforms import offset_copy
+
     spread, over = found.spreads[part], _over(axes, found)
     with np.errstate(all="ignore"):
         shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
@@ -119,7 +123,10 @@ def _shares(axes: "Axes", found: Tolerances, part: str) -> None:
         names = [*names[:MOST_SHARES], "the others"]
     axes.stackplot(over, rows, colors=SHADES[: len(rows)], labels=names, lw=0.0)
     axes.set(ylim=(0.0, 100.0), ylabel="share of the variance (%)", title=f"{part}: from which dimension")
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.28), ncols=1, fontsize=6.5)
+    below = offset_copy(
+        axes.transAxes, axes.get_figure(root=True), y=-BELOW, units="points"
+    )  # of the axis and its name
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), bbox_transform=below, borderaxespad=0.0, fontsize=6.5)
 
 
 def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fourbar.linkage import FourBar
+from fourbar.linkage import FIRST_PIN, FourBar
 from fourbar.show.acting import Symbol
 from fourbar.show.plot.curves import limit_of
 from fourbar.show.plot.style import HEADED, INK, MUTED, largest
@@ -30,6 +30,10 @@ COLOURS = {
 LENGTHS = {"force": 7.0, "moment": 2.6, "drive": 3.2, "flywheel": 4.0, "torsion": 2.2}
 """Length of an arrow and radii, in sizes of a support; other rings around pins have RING."""
 RING = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
+NAMED_AT = {"viscous": -0.4, "friction": 0.4, "pin_friction": 0.9, "flywheel": -1.0, "torsion": 0.0}
+"""Where around a ring its name stands, rad: several at one pin do not meet."""
+SMALLEST, SHARE = 0.5, 0.12
+"""A symbol at a pin is as large as this share of the shortest bar there lets it be, and no smaller than half."""
 ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
 LONGEST = 7.0
 """Of an arrow, in sizes of a support: the largest of the sweep, or where values diverge all that are as large."""
@@ -52,9 +56,25 @@ class Place(NamedTuple):
     torque: float
     """N m; NaN where there is none."""
 
+    def small(self, pin: str, size: float) -> float:
+        """Shrink the size of what stands around a pin where a bar there is short: it would hide the bar."""
+        ring = list(self.pins)  # in the order of the loop
+        at = ring.index(pin)
+        beside = [self.pins[ring[(at + step) % len(ring)]] for step in (-1, 1)]
+        shortest = min(abs(other - self.pins[pin]) for other in beside)
+        return min(size, max(SMALLEST * size, SHARE * shortest))
+
     def point(self, bar: int, z: complex) -> complex:
         """Place a point given in the frame of a bar."""
         return self.foot[bar] + self.factor * z * self.u[bar]
+
+    def tail(self, symbol: Symbol) -> complex:
+        """Place the foot of a load's arrow."""
+        return self.point(symbol.bar, symbol.at) + self.factor * symbol.beyond * self.direction(symbol)
+
+    def direction(self, symbol: Symbol) -> complex:
+        """Return the axes in which a load's force is stated."""
+        return self.u[symbol.bar] if symbol.turns else 1.0
 
 
 @dataclass(slots=True)
@@ -90,7 +110,7 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
     elif symbol.kind == "spring":
         assert symbol.end is not None
         start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
-        _line(axes, drawn, _zigzag(start, end, 0.8 * size), colour, 1.1)
+        _line(axes, drawn, _zigzag(start, end, 0.6 * size), colour, 1.0)
         drawn.artists += axes.plot([start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=8)
     elif symbol.kind == "force":
         _force(axes, symbol, place, size, drawn)
@@ -101,18 +121,17 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
             centre = 0.5 * (place.pins["A"] + place.pins["B"]) if symbol.bar == 3 else place.pins[symbol.pin]
             turn = 1.0 if math.isnan(place.torque) else float(np.sign(place.torque))
             drawn.text = f"$T_{symbol.bar}$"
+        size = place.small(symbol.pin or FIRST_PIN[symbol.bar], size)
         _turn(axes, centre, LENGTHS[symbol.kind] * size, turn, colour, drawn)
     else:
-        centre = place.pins[symbol.pin]
-        if symbol.kind == "torsion":
-            radii = size * np.linspace(0.6, LENGTHS["torsion"], 90)
-            points = centre + radii * np.exp(1j * np.linspace(0.0, 2.5 * math.tau, 90))
-        else:
-            points = centre + size * (RING.get(symbol.kind) or LENGTHS["flywheel"]) * np.exp(
-                1j * np.linspace(0.0, math.tau, 60)
-            )
-        _line(axes, drawn, points, colour, 2.2 if symbol.kind == "flywheel" else 1.2)
-        drawn.label = components(points[-1])
+        centre, size = place.pins[symbol.pin], place.small(symbol.pin, size)
+        radius = size * (RING.get(symbol.kind) or LENGTHS[symbol.kind])
+        spiral = symbol.kind == "torsion"
+        turned = np.linspace(0.0, (2.5 if spiral else 1.0) * math.tau, 90)
+        radii = np.linspace(0.3 * radius, radius, 90) if spiral else radius
+        _line(axes, drawn, centre + radii * np.exp(1j * turned), colour, 2.2 if symbol.kind == "flywheel" else 1.2)
+        drawn.away = cmath.rect(1.0, NAMED_AT[symbol.kind])
+        drawn.label = components(centre + radius * drawn.away)
     return drawn
 
 
@@ -123,7 +142,7 @@ def components(z: complex) -> Point:
 
 def _line(axes: "Axes", drawn: DrawnSymbol, points: Any, colour: str, width: float) -> None:
     x, y = np.real(points), np.imag(points)
-    drawn.artists += axes.plot(x, y, color=colour, lw=width, zorder=5)
+    drawn.artists += axes.plot(x, y, color=colour, lw=width, zorder=3.5)  # over supports, under the bars
     drawn.lines.append([(float(a), float(b)) for a, b in zip(x, y, strict=True)])
 
 
@@ -137,12 +156,10 @@ def _arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: DrawnS
 
 
 def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: DrawnSymbol) -> None:
-    u = place.u[symbol.bar] if symbol.turns else 1.0
-    tail = place.point(symbol.bar, symbol.at) + place.factor * symbol.beyond * u
-    sign = symbol.sign(place.theta_2)
+    tail, sign = place.tail(symbol), symbol.sign(place.theta_2)
     if sign == 0.0:
         return
-    tip = tail + sign * LENGTHS["force"] * size * u * symbol.vector / abs(symbol.vector)
+    tip = tail + sign * LENGTHS["force"] * size * place.direction(symbol) * symbol.vector / abs(symbol.vector)
     _arrow(axes, tail, tip, COLOURS["force"], drawn)
     drawn.label, drawn.away = components(tip), (tip - tail) / abs(tip - tail)
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 RECOMMENDED = 40.0
 """Smallest transmission angle that is usually recommended, deg (R. L. Norton, Design of Machinery)."""
+CENTRE = "dead centre: bars 2, 3 in line"
 REMARK = 0.34
 """Part that a remark takes along an axis, as a part of its length."""
 
@@ -65,7 +66,7 @@ def _marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
             if view.sweep.branch[np.argmin(np.abs(degrees - t))] == found.branch:
                 centres.append(t)
                 heights.append(math.degrees(math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))))
-    marked = [(limits, [0.0] * len(limits), "s", "limit"), (centres, heights, "D", "dead centre")]
+    marked = [(limits, [0.0] * len(limits), "s", "limit: bars 3, 4 in line"), (centres, heights, "D", CENTRE)]
     return [entry for entry in marked if entry[0]]
 
 

@@ -56,6 +56,23 @@ def test_a_spring_is_the_slope_of_its_energy() -> None:
     assert torque == pytest.approx(potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0)
 
 
+def test_the_work_that_compresses_a_gas_spring_is_that_of_its_two_forces() -> None:
+    """Pushed in by s it has taken F1 s + (F2 - F1) s^2/(2 stroke), F1 and F2 its forces at no and at full stroke."""
+    extended, stroke, first, last = 0.5, 0.3, 40.0, 70.0
+
+    def energy(s: fourbar.Solution) -> np.ndarray:
+        ground = 0.2 * np.exp(1j * (scene.linkage.ground_angle + 2.0))
+        pushed = extended - np.abs(s.B @ [1, 1j] - ground)
+        return first * pushed + (last - first) / (2.0 * stroke) * pushed**2
+
+    ends = SpringEnd(1, 0.2, 2.0), SpringEnd(4, 0.22, 0.0)
+    scene = alone(Springs((Spring.gas(*ends, extended, stroke, first, last),)))
+    torque = solve(scene).torque
+    assert torque is not None and np.abs(torque).max() > 1.0
+    assert torque == pytest.approx(potential_torque(scene, energy), abs=SECOND_ORDER * 10, rel=0)
+    assert Spring.gas(*ends, extended, stroke, first) == Spring(*ends, 0.0, extended, -first)
+
+
 def test_a_spring_without_free_length_has_a_force_where_its_points_meet() -> None:
     """Force k times the distance vector: zero, not NaN, where both ends lie on pin A."""
     ends = SpringEnd(2, 0.1, 0.0), SpringEnd(3, 0.0, 0.0)
@@ -286,6 +303,9 @@ def test_each_position_of_a_law_is_that_motion_alone() -> None:
         assert solve(crank_rocker(motion=here)).torque[0] == pytest.approx(whole.torque[i], rel=1e-13)  # type: ignore[index]
 
 
+HERE = SpringEnd(2, 0.1, 0.0), SpringEnd(4, 0.2, 0.0)
+
+
 @pytest.mark.parametrize(
     ("make", "key"),
     [
@@ -294,6 +314,9 @@ def test_each_position_of_a_law_is_that_motion_alone() -> None:
         (lambda: Motion(1.0, law=Law((0.0, 1.0), (0.0, 1.0), 5, "rest")), "motion.law"),
         (lambda: Flywheel(1.0, 3), "effects.flywheel.bar"),
         (lambda: Spring(SpringEnd(2, 0.1, 0.0), SpringEnd(2, 0.2, 0.0), 1.0), "effects.springs.to.bar"),
+        (lambda: Spring.gas(*HERE, 0.3, 0.3, 1.0), "effects.springs.gas.stroke"),
+        (lambda: Spring.gas(*HERE, 0.3, 0.1, 2.0, 1.0), "effects.springs.gas.compressed_force"),
+        (lambda: Spring.gas(*HERE, 0.3, 0.1, -2.0), "effects.springs.gas.extended_force"),
         (lambda: Torsion.at(A=(0.0, 1.0, 0.0)), "effects.torsion.A.stiffness"),
         (lambda: PinFriction.at(C=(0.1, 0.1)), "effects.pin_friction.C"),
         (lambda: PinFriction.at(A=(-0.1, 0.1)), "effects.pin_friction.A.coefficient"),

@@ -12,9 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fourbar
+from fourbar.effects import SpringEnd
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
-from fourbar.files.units import UnitError, to_si
+from fourbar.quantities.units import UnitError, to_si
 
 MODELS = sorted((Path(__file__).parents[3] / "models").glob("*.toml"))
 LENGTHS = '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\ncoupler = "0.25 m"\noutput = "0.22 m"\n'
@@ -170,12 +171,15 @@ frame = "bar"
 [effects]
 viscous = { O2 = "0.01 N m s/rad", B = "1 N m s/rad" }
 friction = { A = "5 N cm" }
-"""
+springs = [{ from = { bar = 1 }, to = { bar = 4, at = ["20 cm", "0 deg"] }, gas = { extended = "50 cm", stroke = "20 cm", extended_force = "400 N", compressed_force = "520 N" } }]
+"""  # noqa: E501
     )
     scene = loads(text)
     assert scene.motion.free == fourbar.Free(5.0, 500) and scene.motion.through == "follow"
     assert scene.loads == (fourbar.Load(3, (2.0, math.pi / 2), (0.01, 0.0), frame="bar"),)
-    assert scene.effects == (fourbar.Viscous.at(O2=0.01, B=1.0), fourbar.Friction.at(A=0.05))
+    gas = fourbar.Spring.gas(SpringEnd(1, 0.0, 0.0), SpringEnd(4, 0.2, 0.0), 0.5, 0.2, 400.0, 520.0)
+    springs = fourbar.Springs((gas,))
+    assert scene.effects == (fourbar.Viscous.at(O2=0.01, B=1.0), fourbar.Friction.at(A=0.05), springs)
     assert facts(loads(dump(scene))) == facts(scene)
 
 

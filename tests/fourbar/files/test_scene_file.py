@@ -39,6 +39,10 @@ SPRINGS = """springs = [
     {{ from = {{ bar = 1 }}, to = {{ bar = {1} }}, stiffness = "1 N/m", length = "{0}" }},
 ]
 viscous ="""
+GAS = """springs = [
+    {{ from = {{ bar = 1 }}, to = {{ bar = 4 }}, gas = {{ extended = "50 cm", {0}extended_force = "9 N" }} }},
+]
+viscous ="""
 LONGEST_LINE = 700
 """Characters of an error: a few lines of a terminal, whatever was given."""
 PATIENCE = 5.0
@@ -65,6 +69,8 @@ MISTAKES = [
     ("Hz is no angular speed", '"10 rad/s"', '"10 Hz"', ["motion.omega_2", "10 Hz", "rad/s"]),
     ("damping without an angle", '"0.01 N m s/rad"', '"0.01 N m s"', ["effects.viscous.O2", "N m s/rad"]),
     ("temperature", '"0.2 kg"', '"20 degC"', ["bars.input.mass", "20 degC"]),
+    ("inches without quotes", '"0.1 m"', "9 in", ["line 4, column", 'in quotes, like "9 in"']),
+    ("angle without quotes", '"40 deg"', "40 deg", ['in quotes, like "40 deg"']),
     ("bare length", '"0.1 m"', "0.1", ["lengths.input", "0.1", "with a unit"]),
     ("length without unit", '"0.1 m"', '"0.1"', ["lengths.input", "unit is missing"]),
     ("bare angle", '"60 deg"', "60", ["motion.theta_2", "60", "135 deg"]),
@@ -80,6 +86,10 @@ MISTAKES = [
     ("negative damping", '"0.01 N', '"-0.01 N', ["effects.viscous.O2", "-0.01 N m s/rad", ">= 0"]),
     ("negative spring", "viscous =", SPRINGS.format("-0.1 m", 4), ["effects.springs[1].length", "-0.1", ">= 0"]),
     ("spring on one bar", "viscous =", SPRINGS.format("0.1 m", 1), ["effects.springs[1].to.bar", "another bar"]),
+    ("spring that softens", "viscous =", SPRINGS.format("0.1 m", 4).replace("1 N/m", "-5 N/cm"), ["-5 N/cm", ">= 0"]),
+    ("gas and coil", "viscous =", SPRINGS.format('1 m", gas = "', 3), ["springs[1].stiffness", "from, to, gas"]),
+    ("gas without a stroke", "viscous =", GAS.format(""), ["effects.springs[0].gas.stroke", "missing", "1 m"]),
+    ("gas of too long a stroke", "viscous =", GAS.format('stroke = "60 cm", '), ["springs[0].gas.stroke", "0.5 m"]),
     ("inertia overflows", '"0.2 kg"', '"1e308 kg"\n[bars.coupler]\nmass = "1e400 kg"', ["bars.coupler.mass"]),
     ("lengths missing", GOOD[GOOD.index("[lengths]") : GOOD.index("[bars")], "", ["lengths.ground", "missing"]),
     ("one length missing", 'output = "0.22 m"\n', "", ["lengths.output", "missing"]),

@@ -17,7 +17,8 @@ from fourbar.files import loads
 from fourbar.files.effects import REGISTRY
 from fourbar.scene import Scene
 from fourbar.show import animate
-from fourbar.show.acting import acting
+from fourbar.show.acting import NO_SYMBOL, acting
+from fourbar.show.between import between
 from fourbar.show.page_data import page_data
 from tests.support.scenes import crank_rocker
 
@@ -36,7 +37,7 @@ def everything() -> Scene:
 
 def test_everything_that_acts_has_a_symbol(everything: Scene) -> None:
     kinds = [symbol.kind for symbol in acting(everything)]
-    for key in REGISTRY:
+    for key in REGISTRY.keys() - NO_SYMBOL:
         assert {"springs": "spring"}.get(key, key) in kinds
     assert kinds.count("force") == 2 and kinds[0] == "drive"
     released = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4)))
@@ -71,6 +72,45 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> Non
         assert abs(complex(*line[-1]) - O4 - cmath.rect(0.08, theta_4)) < 1e-15
 
 
+def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(everything: Scene) -> None:
+    """Rings stay within a crank of a twelfth of the coupler; a plate goes from pin to point to pin."""
+    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
+    from matplotlib.figure import Figure
+
+    from fourbar.show.plot.labels import Labels
+    from fourbar.show.plot.mechanism import draw_mechanism, scale_of
+    from fourbar.show.plot.view import view
+
+    lengths = {"input": 0.02, "coupler": 0.25, "output": 0.22}
+    short = replace(
+        everything.linkage, **{k: replace(getattr(everything.linkage, k), length=v) for k, v in lengths.items()}
+    )
+    shown = view(replace(everything, linkage=short, points=(fourbar.Point("P", 3, (0.15, 0.7)),)))
+    factor, *_ = scale_of(shown)
+    axes = Figure().subplots()
+    draw_mechanism(axes, shown, shown.here, 0, Labels())
+    bars = [line for line in axes.lines if line.get_linewidth() == 4.5]
+    rings = [line for line in axes.lines if len(line.get_xdata()) > 30]
+    assert len(rings) >= 5 and all(line.get_zorder() < min(bar.get_zorder() for bar in bars) for line in rings)
+    pins = [np.zeros(2), factor * shown.here.A[0]]
+    closed = [line.get_xydata()[:-1] for line in rings if np.allclose(line.get_xydata()[0], line.get_xydata()[-1])]
+    at_crank = [ring for ring in closed if any(np.allclose(ring.mean(axis=0), pin, atol=1e-6) for pin in pins)]
+    assert len(at_crank) >= 2
+    assert all(np.ptp(ring, axis=0).max() < 2.0 * factor * short.input.length for ring in at_crank)
+    plates = [patch.get_xy() for patch in axes.patches if patch.get_linestyle() in (":", "dotted")]
+    at = {name: factor * getattr(shown.here, name)[0] for name in ("A", "B", "G3", "G4")}
+    assert any(np.allclose(corners, [at["A"], factor * shown.here.points["P"][0], at["B"]]) for corners in plates)
+    assert any(
+        np.allclose(corners[[0, 2]], [at["A"], at["B"]])
+        and np.allclose(
+            corners[1],
+            at["G3"]
+            + factor * 0.03 * np.array([math.cos(1.0 + shown.here.theta_3[0]), math.sin(1.0 + shown.here.theta_3[0])]),
+        )
+        for corners in plates
+    )
+
+
 def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
     text = animate.page(everything)
     match = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
@@ -88,7 +128,9 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     from fourbar.show.plot.figures import drawn
 
     scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
-    solution = fourbar.solve(scene)
+    found = between(scene, fourbar.solve(scene))
+    assert found is not None
+    solution = found.solution
     panels = drawn(scene, "points", units=fourbar.units("m m/s m/s^2")).figure.subfigs[0].axes
     path = next(line for line in panels[0].lines if line.get_label() == "path of P")
     assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {line.get_label() for line in panels[0].lines}

@@ -1,11 +1,13 @@
 """Shaking force and moment from momentum, the loads of the pins, and the duty of a motor."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import fourbar
-from fourbar.show.duty import bearing_load, drive_power, motor_duty, motor_entry, shaking_force, shaking_moment
+from fourbar.show.duty import bearing_load, motor_duty, motor_entry, shaking_force, shaking_moment
 from fourbar.show.tables import heading
 from fourbar.show.units import units
 from tests.support.scenes import crank_rocker
@@ -27,8 +29,15 @@ def test_shaking_is_the_momentum_that_the_bars_lose() -> None:
         force -= bar.mass * a
         moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0]) + bar.moment_of_inertia * alpha
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * np.abs(force).max()
-    assert np.abs(shaking_moment(scene.linkage, s) - moment).max() < ROUND_OFF * np.abs(moment).max()
-    assert np.array_equal(drive_power(s), s.torque * 10.0)
+    assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * np.abs(moment).max()
+
+
+def test_the_power_is_the_same_whichever_bar_is_driven() -> None:
+    one, *others = (fourbar.solve(crank_rocker(drive_bar=bar)) for bar in (2, 3, 4))
+    assert one.power is not None
+    for other in others:
+        assert np.abs(other.power - one.power).max() < ROUND_OFF * np.abs(one.power).max()
+    assert fourbar.solve(crank_rocker(), "acceleration").power is None
 
 
 def test_bearing_load() -> None:
@@ -63,10 +72,35 @@ def test_the_summary_and_the_json_hold_the_duty() -> None:
     duty, entry = motor_duty(s), motor_entry(s, imperial)
     assert duty is not None and entry is not None and duty.energy_out is not None
     inch_pound = 0.0254 * 0.45359237 * 9.80665
-    assert entry["units"]["rms_power"] == "lbf in/s" and entry["units"]["energy_out"] == "lbf in"
-    assert abs(entry["rms_power"] * inch_pound - duty.rms_power) < ROUND_OFF * duty.rms_power
+    assert entry["units"]["rms_power"] == "hp" and entry["units"]["energy_out"] == "lbf in"
+    assert abs(entry["rms_power"] * 6600.0 * inch_pound - duty.rms_power) < ROUND_OFF * duty.rms_power
     assert abs(entry["energy_out"] * inch_pound - duty.energy_out) < ROUND_OFF * duty.energy_out
     assert abs(entry["pins"]["B"]["rms"] * inch_pound / 0.0254 - bearing_load(s, "B").rms) < ROUND_OFF * 100.0
     lines = "\n".join(heading(scene, s))
     assert f"motor: RMS torque {duty.rms_torque:.6g} N m, peak speed 10 rad/s, power peak" in lines
     assert f"the drive gives {duty.energy_in:.6g} J per turn and takes back {duty.energy_out:.6g} J" in lines
+
+
+def test_a_study_has_what_each_of_its_members_has() -> None:
+    """Closed and open sweeps, one member whose ground is another, one that never closes."""
+    scene = crank_rocker(loads=())
+    values = {
+        "lengths.ground": np.array([0.3, 0.32, 0.31, 3.0]),
+        "lengths.ground_angle": np.array([0.2, 0.3, 0.1, 0.0]),
+    }
+    turn = np.linspace(0.1, 0.1 + 2.0 * np.pi, 61)
+    theta_2 = np.array([turn, turn, np.linspace(0.1, 3.0, 61), turn])
+    s = fourbar.solve(fourbar.vary(scene, {**values, "motion.theta_2": theta_2}))
+    force, moment, duty, load = shaking_force(s), shaking_moment(s), motor_duty(s), bearing_load(s, "A")
+    assert force.shape == (4, 61, 2) and moment.shape == (4, 61) and duty is not None
+    for member in range(3):
+        d, angle = (float(array[member]) for array in values.values())
+        linkage = replace(scene.linkage, ground=d, ground_angle=angle)
+        alone = fourbar.solve(replace(scene, linkage=linkage, motion=replace(scene.motion, theta_2=theta_2[member])))
+        assert moment[member] == pytest.approx(shaking_moment(alone), rel=1e-12, abs=1e-12)
+        assert force[member] == pytest.approx(shaking_force(alone), rel=1e-12, abs=1e-12)
+        for of_study, one in ((duty, motor_duty(alone)), (load, bearing_load(alone, "A"))):
+            assert one is not None
+            assert [array[member] for array in of_study] == pytest.approx(list(one), rel=1e-12)  # type: ignore[index]
+    assert np.isnan(load.largest[3]) and np.isnan(duty.rms_power[3]) and np.isnan(moment[3]).all()  # type: ignore[index]
+    assert duty.closed.tolist()[:3] == [True, True, False]  # type: ignore[attr-defined]

@@ -97,7 +97,7 @@ def test_showing_needs_numpy_alone() -> None:
 
 
 def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> None:
-    text = new_scene(("20 cm", "0.48", "55 cm", "20 cm"))
+    text = new_scene(("20 cm", "0.48 m", "55 cm", "20 cm"))
     scene = files.loads(text)
     assert scene.linkage.lengths == (0.2, 0.48, 0.55, 0.2)
     assert [scene.linkage.bar(n).mass for n in (2, 3, 4)] == [0.48, 0.55, 0.2]
@@ -113,7 +113,12 @@ def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> 
 
 @pytest.mark.parametrize(
     ("lengths", "named"),
-    [(("1", "2", "3", "40"), "never close"), (("1 kg", "2", "3", "4"), "ground"), (("1", "2", "-3", "4"), "coupler")],
+    [
+        (("1 m", "2 m", "3 m", "40 m"), "never close"),
+        (("1 kg", "2 m", "3 m", "4 m"), "ground"),
+        (("1 m", "2 m", "-3 m", "4 m"), "coupler"),
+        (("1 m", "2 m", "3 m", "4"), "output.*unit is missing"),
+    ],
 )
 def test_a_new_scene_of_bad_lengths_is_refused(lengths: tuple[str, ...], named: str) -> None:
     with pytest.raises(InputError, match=named):
@@ -122,8 +127,58 @@ def test_a_new_scene_of_bad_lengths_is_refused(lengths: tuple[str, ...], named: 
 
 def test_a_new_scene_never_replaces_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "mine.toml"
-    assert status(["new", str(file), "--lengths", "4", "2", "5", "5"]) == 0
+    assert status(["new", str(file), "--lengths", "4", "2", "5", "5", "--unit", "m"]) == 0
     before = file.read_text()
-    assert status(["new", str(file), "--lengths", "4", "2", "5", "6"]) == 2
+    assert status(["new", str(file), "--lengths", "4", "2", "5", "6", "--unit", "m"]) == 2
     assert "is there already" in capsys.readouterr().err
     assert file.read_text() == before
+
+
+def test_results_say_in_ten_lines_what_they_hold() -> None:
+    scene = crank_rocker(tolerances=(fourbar.Tolerance("lengths.input", 1e-4),))
+    solution, found, spread = fourbar.solve(scene), fourbar.sensitivity(scene), fourbar.tolerances(scene, 64)
+    study = fourbar.vary(scene, {"lengths.input": np.array([0.1, 0.11, 3.0])})
+    for shown in (solution, found, spread, study, fourbar.solve(study), fourbar.solve(scene, "position")):
+        text = repr(shown)
+        assert 2 <= len(text.splitlines()) <= 10 and max(map(len, text.splitlines())) <= 150, text
+        assert scene.title in text and "61" in text
+    assert f"torque: {solution.torque.min():.6g} to {solution.torque.max():.6g} N m" in repr(solution)
+    assert "status: 122 ok, 61 not_assembled" in repr(fourbar.solve(study))
+    lengths = {key: number for key, number in zip(found.keys, found.numbers, strict=True) if key.startswith("lengths")}
+    own = {key: np.abs(found.of("torque", key)).max() * 0.01 * number for key, number in lengths.items()}
+    own["lengths.ground_angle"] *= math.radians(1.0) / (0.01 * lengths["lengths.ground_angle"])
+    most = max(own, key=lambda key: own[key])
+    line = next(line for line in repr(found).splitlines() if line.startswith("torque"))
+    assert f"{most} {own[most]:.3g}" in line
+    assert f"sigma up to {spread.spreads['torque'].deviation.max():.3g}" in repr(spread)
+    for each in (found, spread):
+        shown = each._repr_html_()
+        assert (
+            shown.count("<tr>") == 8 and HOSTILE not in replace(each, scene=replace(scene, title=HOSTILE))._repr_html_()
+        )
+
+
+def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names() -> None:
+    pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
+    scene = crank_rocker(tolerances=(fourbar.Tolerance("lengths.input", 1e-4),))
+    found, spread = fourbar.sensitivity(scene), fourbar.tolerances(scene, 64)
+    table = found.to_pandas()
+    assert len(table) == len(found.keys) * 61
+    rows = table[table["key"] == "lengths.input"]
+    for name in ("torque", "F12_x", "|F12|", "|F14|", "A_y"):
+        assert np.array_equal(rows[name].to_numpy(), found.of(name, "lengths.input"))
+    assert set(spread.spreads) <= set(table.columns) and all(
+        np.isfinite(found.value(name)).all() for name in spread.spreads
+    )
+    step = 1e-6
+    sides = [fourbar.solve(fourbar.vary(scene, {"lengths.input": [0.1 + sign * step]})).F12[0] for sign in (1, -1)]
+    slope = (np.hypot(*sides[0].T) - np.hypot(*sides[1].T)) / (2.0 * step)
+    assert found.of("|F12|", "lengths.input") == pytest.approx(slope, abs=1e-6 * np.abs(slope).max())
+    wide = spread.to_pandas()
+    own = wide[wide["quantity"] == "|F43|"]
+    assert len(wide) == 61 * len(spread.spreads)
+    assert np.array_equal(own["deviation"].to_numpy(), spread.spreads["|F43|"].deviation)
+    assert np.array_equal(own["share of lengths.input"].to_numpy(), spread.spreads["|F43|"].shares[0])
+    for wrong in ("|A|", "F12_z", "|torque|", "torque_x", 3):
+        with pytest.raises(InputError, match="is not known here"):
+            found.of(wrong, "lengths.input")  # type: ignore[arg-type]

@@ -262,7 +262,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     driver = browse(animate.page(scene))
     driver.execute_script("go(20)")
     s = fourbar.solve(scene)
-    script = """return [...document.querySelectorAll("#acting path.act")].map(e => [e.getAttribute("class"),
+    script = """return [...document.querySelectorAll("path.act")].map(e => [e.getAttribute("class"),
         [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(
             m => [(m[1] - view.x) / view.k, (view.y - m[2]) / view.k])])"""
     found = dict(driver.execute_script(script))
@@ -285,7 +285,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
         assert math.atan2(y, x) == pytest.approx(math.atan2(*expected[::-1]), abs=0.001)
     driver.execute_script("toggle('show-dimensions'); toggle('show-acting')")
     assert [text for text, _ in driver.execute_script(names)] == ["1: 300 mm", "3: 250 mm"]
-    assert not driver.find_elements("css selector", "#acting *")
+    assert not driver.find_elements("css selector", "#acting *, #under .act")
 
 
 @pytest.mark.parametrize("value", ("-1", "0", "5000", ""))

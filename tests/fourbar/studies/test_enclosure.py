@@ -91,7 +91,7 @@ def test_with_tolerances_no_linkage_lies_outside(rocker: tuple[Scene, Extremes])
     ("changes", "words"),
     [
         ({"motion": Motion(1.0)}, "is needed for extremes"),
-        ({"effects": (Friction.at(B=0.05),)}, "not evaluated in balls"),
+        ({"effects": (Friction.at(B=0.05),)}, "cannot be guaranteed; those with gravity"),
         ({"linkage": fourbar.uniform(0.3, 0.1, 0.3, 0.1)}, "change point"),
         ({"tolerances": (Tolerance("bars.coupler.inertia", 1e-4),)}, "is no number that the scene states"),
     ],
@@ -130,7 +130,13 @@ def test_the_command(rocker: tuple[Scene, Extremes], monkeypatch: pytest.MonkeyP
     model = str(MODELS / "crank_rocker.toml")
     assert status(["extremes", model]) == 0
     text = capsys.readouterr().out
-    assert "proven over theta_2 = 0 to 360 deg" in text and "319.8767" in text
+    assert "guaranteed over theta_2 = 0 to 360 deg" in text and "319.8767" in text
+    assert status(["extremes", model, "--units", "mm N.mm rad"]) == 0
+    low = 1000.0 * rocker[1].greatest["torque"].low
+    text = capsys.readouterr().out
+    assert "theta_2 = 0 to 6.28319 rad" in text and f"{low:.11g}" in text and "N mm  greatest" in text
+    assert status(["extremes", model, "--json", "--units", "mm"]) == 2
+    assert "--json is SI" in capsys.readouterr().err
     assert status(["extremes", model, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["extremes"]["torque"]["greatest"]["high"] == rocker[1].greatest["torque"].high

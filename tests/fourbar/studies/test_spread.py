@@ -4,6 +4,7 @@ import json
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,10 @@ import fourbar.formulas.mobility
 from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, uniform
 from fourbar.cli import status
 from fourbar.files import dump, loads
+from fourbar.show.tolerances import parted
 from fourbar.studies import spread as studied
 from fourbar.studies.spread import tolerances
+from tests.support.scenes import crank_rocker
 
 MODEL = (Path(__file__).parents[3] / "models" / "crank_rocker.toml").read_text()
 TABLE = '[tolerances]\n"lengths.input" = "0.05 mm"\nlengths.coupler = ["0.02 mm", "sigma"]\n'
@@ -100,6 +103,14 @@ def test_a_bad_tolerance_is_one_line(line: str, words: str) -> None:
     assert words in text and text.startswith("s.toml: tolerances") and "\n" not in text
 
 
+def test_the_positions_at_which_first_order_fails_are_named_each() -> None:
+    found = SimpleNamespace(
+        theta_2=np.radians(np.arange(0.0, 361.0, 5.0)),
+        spreads={"torque": SimpleNamespace(parted=np.isin(np.arange(73), (0, 1, 9, 72)))},
+    )
+    assert "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)" in parted(found, "torque")  # type: ignore[arg-type]
+
+
 def test_what_the_study_refuses() -> None:
     for given, words in (
         ((), "states none"),
@@ -121,6 +132,12 @@ def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.Capt
     printed = capsys.readouterr().out
     assert "64 samples (seed 0), 13 positions" in printed and "lengths.input" in printed
     assert plot.read_bytes().startswith(b"\x89PNG")
+    nominal = re.search(r"^torque +N m +\S+ +(\S+)", printed, re.M)
+    assert status(["tolerance", str(scene), "--samples", "64", "--units", "N.mm rad"]) == 0
+    rows = capsys.readouterr().out
+    other = re.search(r"^torque N mm +\S+ +(\S+)", rows, re.M)
+    assert nominal and other and float(other[1]) == pytest.approx(1000.0 * float(nominal[1]), rel=1e-5)
+    assert re.search(r"unit +rad +nominal", rows)
     assert status(["tolerance", str(scene), "--samples", "64", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     torque = document["quantities"]["torque"]
@@ -132,3 +149,10 @@ def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.Capt
     scene.write_text(text)
     assert status(["tolerance", str(scene)]) == 2
     assert "tolerances = None: the scene states none" in capsys.readouterr().err
+
+
+def test_the_share_that_is_done_is_told_from_the_start_and_reaches_all_of_it() -> None:
+    told: list[float] = []
+    scene = crank_rocker(tolerances=(Tolerance("lengths.input", 5e-5),))
+    tolerances(scene, 16384, progress=told.append)
+    assert told[0] == 0.0 and told[-1] == 1.0 and len(told) > 3 and np.all(np.diff(told) > 0.0)

@@ -31,6 +31,7 @@ from fourbar.files.effects import REGISTRY
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import state
 from fourbar.linkage import MOVING_BARS
+from fourbar.mjcf.effects import NO_MJCF
 from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_effects
 from fourbar_validation.engines.effects import TERM_OF
@@ -50,6 +51,9 @@ ACTING: dict[str, Effect] = {
         (
             Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(4, 0.08, 0.2), 200.0, 0.05, 3.0),
             Spring(SpringEnd(2, 0.05, 0.5), SpringEnd(3, 0.1, 0.3), 50.0, 0.05, 1.0),
+            Spring.gas(SpringEnd(1, 0.2, 2.0), SpringEnd(3, 0.05, 1.0), 0.5, 0.3, 4.0, 7.0),
+            Spring(SpringEnd(1, 0.15, -0.6), SpringEnd(4, 0.1, 0.4), 0.0, preload=-2.0),
+            Spring(SpringEnd(1, 0.12, -2.0), SpringEnd(2, 0.05, 0.4), 30.0, 0.0, 2.0),
         )
     ),
     "flywheel": Flywheel(0.02, 2),
@@ -61,7 +65,7 @@ SIMULATED = [replace(witness, order=None) for witness in WITNESSES if witness.th
 ENGINES = {"pinocchio-inverse", "mujoco-inverse"}
 """What acts by `TERM_OF`, the table of the engines."""
 INVERSE = {*ENGINES, "free-body"}
-NO_COUNTERPART = {"mujoco-simulated": {"pin_friction"}}
+NO_COUNTERPART = {"mujoco-simulated": NO_MJCF}
 """What an engine cannot do; it must say so, and the others remain."""
 
 
@@ -172,13 +176,9 @@ def moved(effect: Effect) -> Effect:
         case Springs():
             first, *others = effect.springs
             return Springs((replace(first, end=first.end._replace(bar=3)), *others))
-        case Flywheel():
-            return Flywheel(effect.inertia, 4)
         case Gravity():
             return Gravity(effect.magnitude, effect.angle + 1.0)
-        case Load():
-            return replace(effect, bar=5 - effect.bar if effect.bar == 3 else 3)
-    raise NotImplementedError(effect)
+    return replace(effect, bar={2: 4, 3: 2, 4: 3}[effect.bar])  # type: ignore[attr-defined, call-arg]
 
 
 @contextmanager

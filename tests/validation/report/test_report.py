@@ -14,7 +14,10 @@ import pytest
 
 import fourbar
 from fourbar_validation.compare.rows import FAILS, to_csv
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines import added
+from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
+from fourbar_validation.report import colours
+from fourbar_validation.report.colours import style_of
 from fourbar_validation.report.costs import cost_points
 from fourbar_validation.report.figures import STRETCHES, worst_of_stretches
 from fourbar_validation.report.html import ALL_OPEN, Section, html, markdown
@@ -192,3 +195,18 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.Monkey
     assert "the 80 of 1100 scenes and engines" in markdown(summary)
     assert markdown(summary).count("\n") < 150
     assert len(text) < 1.8e6  # 20 scenes, each with a figure of 20 kB and some 55 kB of rows of eleven engines
+
+
+def test_every_witness_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever is drawn first, and in whatever process: the witness says its number."""
+    monkeypatch.setattr(colours, "NUMBERS", {})
+    guests = "tests.validation.engines.test_added_guests:"
+    witnesses = added.named([f"{guests}Right", f"{guests}Leaves"], [each.name for each in (*WITNESSES, *FURTHER)])
+    names = [each.name for each in (*WITNESSES, *FURTHER, *witnesses)]
+    colours.NUMBERS.update(added.numbers(witnesses))
+    marks = {name: (style_of(name).symbol, style_of(name).marker) for name in names}
+    assert len({mark for mark, _ in marks.values()}) == len({marker for _, marker in marks.values()}) == len(names)
+    colours.NUMBERS.clear()
+    colours.NUMBERS.update(added.numbers(witnesses[1:]))  # a scene in which the first broke down
+    assert style_of(names[-1]).symbol == marks[names[-1]][0]
+    assert all(style_of(name).colour in colours.VARIABLES for name in names)

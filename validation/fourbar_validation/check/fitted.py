@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import FourBarError
-from fourbar.files.units import factor_to
 from fourbar.linkage import Bar
 from fourbar.quantities import FORCES, UNITS
+from fourbar.quantities.units import factor_to
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve

@@ -36,8 +36,8 @@ from fourbar_validation.scenes.suites import scene_files
 SECONDS = 120.0
 """A four-bar takes less than one."""
 ABOUT_SHARES = (
-    "share: of the error of that quantity, what goes when this one entry alone is as generated; "
-    "a dash: it cannot be corrected alone in the compiled file"
+    "share: by how much the error of that quantity falls when this one entry is set as in the generated file and all "
+    "others stay; shares do not add up to 100 %. A dash: this entry cannot be changed by itself in the compiled file"
 )
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"

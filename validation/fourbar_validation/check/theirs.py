@@ -32,6 +32,7 @@ DECIMALS = 4
 """12.5 deg and 0.25 rad are positions that somebody chose, 0.1745 rad is one that was rounded."""
 NOT_JUDGED = {
     "time": "a row is found by its theta_2",
+    "power": "the torque is judged, and the speed",
     **dict.fromkeys(("torque_error", "force_error", "friction_residual"), "an error of the formulas themselves"),
     **dict.fromkeys(("status", "branch", "drive_bar"), "stated by the scene"),
 }
@@ -191,7 +192,7 @@ def _columns(
 def _unit(path: Path, heading: str, quantity: str, text: str) -> Unit:
     if not text or text == UNITS[quantity]:
         return Unit(UNITS[quantity], 1.0)
-    from fourbar.files.units import factor_to
+    from fourbar.quantities.units import factor_to
 
     try:
         return Unit(text, factor_to(UNITS[quantity], text))

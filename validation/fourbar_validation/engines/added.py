@@ -8,7 +8,7 @@ import hashlib
 import os
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from importlib.metadata import distributions, entry_points
@@ -43,6 +43,8 @@ class AddedWitness(Witness):
     """Why its class cannot be used, or nothing."""
     code: str = ""
     """Hash of what its answers come from."""
+    number: int = 0
+    """Which one it is: each is drawn with a mark of its own, in whatever process."""
 
     def missing(self) -> str | None:
         """Why it cannot answer here, or None."""
@@ -84,9 +86,14 @@ def _described(adapters: Sequence[str], known: Iterable[str]) -> list[Witness | 
         if isinstance(each, Witness) and each.name in names:
             result.append(_UnusableError(f"must have a name of its own; {each.name!r} is another's"))
             continue
+        result.append(replace(each, number=len(names)) if isinstance(each, AddedWitness) else each)
         names |= {each.name} if isinstance(each, Witness) else set()
-        result.append(each)
     return result
+
+
+def numbers(witnesses: Iterable[Witness]) -> dict[str, int]:
+    """List the numbers of those from outside, by name."""
+    return {each.name: each.number for each in witnesses if isinstance(each, AddedWitness)}
 
 
 def _trouble(_: str, error: Exception, __: object) -> _UnusableError:

@@ -118,7 +118,7 @@ def compare(
     """Say what changed from OLD (a run's folder, its results.csv, or an accepted name) to NEW.
 
     Scenes that changed come first, entry by entry; their rows, and those with other settings or at other
-    positions, are named and not compared. What was not wanted of the new run is "not run", and no regression.
+    positions, are named and not compared. What the new run was not asked for is "not run", and no regression.
     Exit status 1 on a regression: a verdict that got worse, an error that grew beyond round-off and its allowance,
     a row that was run for and is gone, a new row that fails; and where nothing was compared.
     """

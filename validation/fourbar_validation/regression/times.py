@@ -48,7 +48,7 @@ class TimeChange:
 def time_changes(scenes: Iterable[tuple[str, Sequence[Time], Sequence[Time]]]) -> list[TimeChange]:
     """Every engine with times of at least ENOUGH scenes in both runs, over the formulas' own.
 
-    Where several engines all changed in one sense it is the time of the formulas that changed in the other.
+    Where all of several engines became slower, or all faster, it is the formulas whose time changed the other way.
     """
     sums: dict[str, list[float]] = {}
     for _, old, new in scenes:

@@ -30,8 +30,16 @@ STYLES = {
     "mujoco-simulated": Style("#c74f00", "#ff9350", "^", "△", simulated=True),
     "free-body": Style("#a6478a", "#e59fce", "D", "◇"),
     "ball-arithmetic": Style("#5f5b9e", "#b3aef0", "v", "▽"),
+    "exudyn-constraints": Style("#8c564b", "#d8a597", "<", "◁"),
+    "opensim-constraints": Style("#3f7d20", "#8fce6a", ">", "▷"),
+    "drake-inverse": Style("#00708f", "#5cc3df", "h", "⬡"),
 }
-OTHER = Style("#7a6a00", "#d9c64a", "P", "✚")
+_COLOURS = (("#7a6a00", "#d9c64a"), ("#7b4fc9", "#c3a6ff"), ("#9a5b00", "#f0b060"))
+_MARKS = (("P", "✚"), ("X", "✖"), ("*", "★"), ("p", "⬟"))
+OTHERS = tuple(Style(*_COLOURS[n % 3], *_MARKS[n % 4]) for n in range(12))
+"""Of engines that are not named above, one after the other."""
+NUMBERS: dict[str, int] = {}
+"""Which of them an engine has; as a run numbers its witnesses, else by who is drawn first."""
 INK, SOFT, GRID, BAND, ALLOWED, PAPER = "#1b1f24", "#57606a", "#d0d7dd", "#c3cad3", "#6e7781", "#fefefe"
 VARIABLES = {
     "#000000": ("--ink", "#e6edf3"),
@@ -41,14 +49,14 @@ VARIABLES = {
     BAND: ("--under", "#4a535e"),
     ALLOWED: ("--allowed", "#98a2ad"),
     PAPER: ("--paper", "#0d1117"),
-    **{style.colour: (f"--e{number}", style.dark) for number, style in enumerate((*STYLES.values(), OTHER), 1)},
+    **{style.colour: (f"--e{number}", style.dark) for number, style in enumerate((*STYLES.values(), *OTHERS[:3]), 1)},
 }
 """Light colour: (custom property, colour on dark pages)."""
 
 
 def style_of(engine: str) -> Style:
-    """Choose the style of an engine; all that are not named here look alike."""
-    return STYLES.get(engine, OTHER)
+    """Choose the style of an engine: one that is not named in `STYLES` has the next of `OTHERS`."""
+    return STYLES.get(engine) or OTHERS[NUMBERS.setdefault(engine, len(NUMBERS)) % len(OTHERS)]
 
 
 def by_variable(svg: str) -> str:

@@ -11,7 +11,9 @@ import numpy as np
 
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.rows import FORMULAS, Row
+from fourbar_validation.engines.added import numbers
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.report.colours import NUMBERS
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.answers import check_mjcf, compare_answers, compare_inertia, compare_statements
 from fourbar_validation.run.formulas import check_identities, check_status
@@ -70,6 +72,7 @@ def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *,
     if draw:
         from fourbar_validation.report.figures import scene_figure
 
+        NUMBERS.update(numbers(witnesses))
         figure = scene_figure(record)
     return record.kept(figure)
 

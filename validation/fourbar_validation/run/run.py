@@ -12,10 +12,12 @@ from fourbar.writing import naming, write_text
 from fourbar_validation.compare.columns import Columns, read_columns
 from fourbar_validation.compare.rows import FAILS, FORMULAS, Row, csv_text, plain
 from fourbar_validation.compare.tolerance import IDENTITY
+from fourbar_validation.engines.added import numbers
 from fourbar_validation.engines.hard_suite import Hard
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.regression.record import ABOUT, COLUMNS, TABLE, about, write_about
 from fourbar_validation.regression.scenes import descriptions
+from fourbar_validation.report.colours import NUMBERS
 from fourbar_validation.report.html import html, markdown
 from fourbar_validation.report.machine import code
 from fourbar_validation.report.record import Record
@@ -127,6 +129,7 @@ def run(
         write_text(out / "report.md", markdown(summary))
         models, why_not = picture_models(suite, places) if places and generated else ({}, "")
         more = sections(read_columns(out / "results.parquet") if isinstance(suite, Hard) else None, out)
+        NUMBERS.update(numbers(witnesses))
         page = html(summary, columns.first_lines, pictures=models, no_pictures=why_not, sections=more)
         write_text(out / "report.html", page)
         store.finish()

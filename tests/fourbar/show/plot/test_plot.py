@@ -19,6 +19,7 @@ from fourbar.formulas.path import state
 from fourbar.formulas.torque import inertia
 from fourbar.scene.motion_law import Law
 from fourbar.show import plot
+from fourbar.show.between import between
 from fourbar.show.duty import energies
 from fourbar.show.plot.curves import broken, limit_of, poles
 from fourbar.show.plot.figures import FIGURES, drawn
@@ -112,7 +113,7 @@ def test_no_text_stands_on_a_bar() -> None:
 def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None:
     figure = composed(CRANK_ROCKER, "overview")
     flat = [axes for axes in figure.axes if axes.name == "rectilinear"]
-    assert len(flat) == 7
+    assert len(flat) == 8
     for axes in flat:
         for label in (axes.get_xlabel(), axes.get_ylabel()):
             assert label.endswith(")"), label
@@ -121,9 +122,16 @@ def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None
             assert axes.get_xlim() == pytest.approx(np.degrees([0.1, 0.1 + 2 * math.pi]))
 
 
+def solved(scene: fourbar.Scene) -> fourbar.Solution:
+    """At the positions of a scene, and those that a figure shows between them."""
+    solution = fourbar.solve(scene)
+    found = between(scene, solution)
+    return solution if found is None else found.solution
+
+
 def test_drawn_curves_are_those_of_the_solution() -> None:
     scene = crank_rocker()
-    solution = fourbar.solve(scene)
+    solution = solved(scene)
     axes = composed(scene, "kinematics").axes
     drawn = {line.get_label(): line.get_ydata() for panel in axes for line in panel.lines}
     np.testing.assert_allclose(drawn[r"$\theta_4$"], np.degrees(solution.theta_4))
@@ -144,6 +152,19 @@ def test_bars_are_drawn_to_scale_at_the_requested_position() -> None:
     assert math.atan2(y, x) == pytest.approx(1.3)
     x_scale, y_scale = (np.diff(axes.transData.transform([(0, 0), step]), axis=0)[0] for step in ((1, 0), (0, 1)))
     assert x_scale[0] == pytest.approx(y_scale[1])
+
+
+def test_the_coupler_figure_shows_the_points_of_the_scene() -> None:
+    scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)), fourbar.Point("Q", 4, (0.1, 0.0))))
+    (axes,) = drawn(scene, "coupler", units=fourbar.units("m")).figure.axes
+    curves = {line.get_label(): line.get_xydata() for line in axes.lines if line.get_label()[0] != "_"}
+    assert list(curves) == ["$A$", "$B$", "P"]  # Q belongs to the output
+    np.testing.assert_allclose(curves["P"], solved(scene).points["P"], atol=1e-15)
+
+
+def test_couples_of_a_free_body_have_an_arrow_and_no_sign() -> None:
+    lines = [text for text, _ in texts_shown(composed(crank_rocker(), "freebody")) if text[0] in "↺↻"]
+    assert lines and not any(" = −" in line for line in lines)
 
 
 def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> None:
@@ -175,7 +196,9 @@ def test_an_ordinary_curve_is_not_clipped() -> None:
 
 def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     panel = composed(thesis(FULL_TURN), "transmission").axes[0]
-    marks = {line.get_label(): np.sort(line.get_xdata()) for line in panel.lines if line.get_marker() in "sD"}
+    marks = {
+        line.get_label().split(":")[0]: np.sort(line.get_xdata()) for line in panel.lines if line.get_marker() in "sD"
+    }
     d, a, b, c = thesis().linkage.lengths
     # bars 3 and 4 folded: |b - c| between A and O4; bars 2 and 3 in line on the sweep: c seen from O2 at b - a or a + b
     limit = math.degrees(math.acos((a * a + d * d - (b - c) ** 2) / (2 * a * d)))
@@ -291,7 +314,7 @@ def by_law() -> fourbar.Scene:
 
 @pytest.mark.parametrize("scene", (released(60, 1.2), by_law()), ids=("released", "by law"))
 def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
-    solution = fourbar.solve(scene)
+    solution = solved(scene)
     drawn = {line.get_label(): line for panel in composed(scene, "kinematics").axes for line in panel.lines}
     for name, values in ((r"$\theta_2$", np.degrees(solution.theta_2)), (r"$\omega_4$", solution.omega_4)):
         np.testing.assert_allclose(drawn[name].get_xdata(), solution.time)

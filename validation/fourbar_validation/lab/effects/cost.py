@@ -5,11 +5,12 @@ from pathlib import Path
 import click
 
 from fourbar.errors import DependencyError, InputError
+from fourbar.mjcf.effects import NO_MJCF
 from fourbar.writing import write_text
 from fourbar_validation.engines.witnesses import not_installed
 from fourbar_validation.lab.effects.work import DEFAULT_FLAGS, EFFECTS, ENGINES, flags
 
-NO_COUNTERPART = {("mujoco-simulated", "pin_friction"), ("mujoco-simulated", "load over theta_2")}
+NO_COUNTERPART = {("mujoco-simulated", name) for name in (*NO_MJCF, "load over theta_2")}
 
 
 def pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple[str, str]]:

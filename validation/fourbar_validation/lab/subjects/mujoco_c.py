@@ -30,8 +30,8 @@ def text(scene: Scene, steps: int, simulator: str | None) -> str:
     Without a simulator's name all that the solver is set to goes.
     """
     timestep, _ = turn(scene, steps)
-    settings, note = SIMULATORS[simulator or "warp"]  # without pads
-    written = mjcf(scene, replace(settings, timestep=timestep), note, start=start(scene))
+    reader = simulator or "warp"  # without pads
+    written = mjcf(scene, replace(SIMULATORS[reader], timestep=timestep), reader, start=start(scene))
     return written if simulator is not None else without(written, BY_DEFAULT)
 
 

@@ -21,12 +21,12 @@ PROBLEM = MODELS / "problems" / "crank_rocker.toml"
 FINDINGS = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
 HEAD = ("simulator", "version", "setting", "of", *TORQUE_AND_FORCES, "gap at B", "CPU s per s", "order")
 EXPLAINED = (
-    "Errors of the torque and of each pin force are the greatest of the readings, relative to the greatest value in a "
-    "turn; the formulas are evaluated at the simulator's own angle, speed and acceleration. 'states': single states; "
-    "'N steps': a turn at constant speed, without its first quarter. Empty: the simulator does not report it. Gap at "
-    "B: the greatest distance between the ends of bars 3 and 4, relative to the longest bar. Order: of the torque's "
-    "error, from the line above to this one. The time leaves out readings and compilation. No line is a ranking: "
-    "double and single precision, compiled and interpreted loops stand side by side."
+    "Torque and pin forces: the largest error, divided by the largest value in a turn. The simulator is compared with "
+    "the formulas at the angle, speed and acceleration that it had itself. 'states': single states; 'N steps': a turn "
+    "at constant speed, without its first quarter. Empty: the simulator does not report it. Gap at B: the largest "
+    "distance between the ends of bars 3 and 4, divided by the longest bar. Order: the power of the timestep with "
+    "which the torque's error fell from the line above to this one. CPU time is without reading results and without "
+    "compilation. This is no ranking: double and single precision, compiled and interpreted loops stand side by side."
 )
 
 
@@ -103,6 +103,7 @@ def table(found: Examination) -> str:
 
 def work_precision(found: Examination) -> str:
     """Draw the error of the torque through a turn over the cost of a simulated second, as SVG."""
+    from matplotlib import colormaps
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.5, 4.2), layout="constrained")
@@ -111,11 +112,15 @@ def work_precision(found: Examination) -> str:
     for line in found.lines:
         if line.cost:
             series.setdefault((line.simulator, line.setting), []).append(line)
+    names = list(dict.fromkeys(simulator for simulator, _ in series))
     for index, ((simulator, setting), lines) in enumerate(series.items()):
+        nth = [own for name, own in series if name == simulator].index(setting)
         axes.loglog(
             [line.cost or 0.0 for line in lines],
             [line.errors["torque"] for line in lines],
+            color=[0.8 * part for part in colormaps["turbo"]((names.index(simulator) + 0.5) / len(names))[:3]],
             marker="osD^vP*Xh<>"[index % 11],
+            linestyle=("-", "--", ":", "-.")[nth % 4],
             markersize=4,
             linewidth=1,
             label=f"{simulator}: {setting}",

@@ -15,7 +15,7 @@ from typing import Any
 
 from fourbar.errors import InputError
 
-FILE = files("fourbar.files").joinpath("units.toml")
+FILE = files("fourbar.quantities").joinpath("units.toml")
 DEFINITIONS: str = tomllib.loads(FILE.read_text(encoding="utf-8"))["definitions"]
 """In the form of the units library."""
 JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")

@@ -21,8 +21,9 @@ class Quantity(NamedTuple):
     """That computes it; None: it is commanded."""
     meaning: str
     group: str = ""
-    """unknown: of the equations of a position, which an engine can be held to; dry friction, pin loads: exists only
-    where the scene has dry friction, or friction that depends on the pin forces."""
+    """unknown: of the equations of a position, which an engine can be held to; product: of other quantities, by
+    `Solution`; dry friction, pin loads: exists only where the scene has dry friction, or friction that depends on the
+    pin forces."""
 
 
 def _scalar(*line: str | None) -> Any:
@@ -82,9 +83,14 @@ class Quantities:
     time: Array | None = _scalar("s", None, "of a motion law or a free motion, which ends at a limit position")
 
 
-QUANTITIES = tuple(Quantity(each.name, *each.metadata["line"]) for each in fields(Quantities))
+POWER = Quantity("power", "scalar", "W", "force", "of the drive, its torque times the speed of its bar", "product")
+QUANTITIES = tuple(
+    line
+    for each in fields(Quantities)
+    for line in (Quantity(each.name, *each.metadata["line"]), *((POWER,) if each.name == "torque" else ()))
+)
 UNITS = {q.name: q.unit for q in QUANTITIES}
-STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None}
+STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None and q.group != "product"}
 """Every evaluated quantity and the stage that computes it."""
 STAGES = tuple(dict.fromkeys(STAGE_OF.values()))
 KIND = {q.name: q.kind for q in QUANTITIES}

@@ -1,0 +1,188 @@
+"""The circuit of a scene as a curve that can be walked through its limits, and the generalised force along it."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects.actions import Actions, bodies
+from fourbar.errors import NotAssembledError
+from fourbar.evaluation.case import Case
+from fourbar.formulas.circuits import circuit_of, circuits
+from fourbar.formulas.closed_curve import on_curve, transmission
+from fourbar.formulas.mobility import TURN, change_points, turns_fully
+from fourbar.formulas.motion import State
+from fourbar.formulas.position import loop
+from fourbar.scene import Scene, command
+from fourbar.scene.motion import Sweep
+from fourbar.studies.sloped import Sloped
+
+Array = NDArray[np.float64]
+SAMPLES = 3600
+"""Positions of a whole branch that are looked at for friction, and for zeros where they cannot be proven."""
+NOTHING = 1e-11
+"""Of the sum of the absolute terms of Q: no more than this everywhere is what rounding leaves of zero."""
+AT_END = 1e-12
+"""rad; an equilibrium so near to an end of the sweep is in it."""
+
+
+class RestPosition(NamedTuple):
+    """A position of the linkage, angles in rad."""
+
+    theta_2: float
+    theta_3: float
+    theta_4: float
+    branch: int
+    """+1 or -1; 0 at a limit of theta_2, where the two meet."""
+
+
+def generalised_force(scene: Scene, terms: tuple[Any, ...], state: State) -> Any:
+    """Compute Q of loads and effects, by the parameter that the state's coefficients belong to."""
+    actions = Actions(state, bodies(scene.linkage, terms))
+    for term in terms:
+        term.act(actions, state)
+    return actions.work()[0]
+
+
+class _Sizes(Actions):
+    """Sums of the absolute terms of Q, each with the speed of the fastest bar: one that rests has rounding alone."""
+
+    def __init__(self, state: State, of: Any) -> None:
+        super().__init__(state, of)
+        self.size: Any = 0.0
+        self.fastest = np.max(np.abs([state.k.h2, state.k.h3, state.k.h4]), axis=0)
+
+    def force(self, bar: int, force: Any, arm: Any = 0.0j) -> None:
+        super().force(bar, force, arm)
+        if bar == 3:
+            self.size = self.size + np.abs(force) * self.state.lengths.a * self.fastest
+
+    def moment(self, bar: int, moment: Any) -> None:
+        super().moment(bar, moment)
+        if bar != 1:
+            self.size = self.size + np.abs(moment) * self.fastest
+
+    def couple(self, pin: str, couple: Any) -> None:
+        super().couple(pin, couple)
+        self.size = self.size + np.abs(couple) * self.fastest
+
+
+class CircuitCurve:
+    """The circuit of a scene: its branches as closed rows of psi = theta_2 - theta_1 and mu = theta_4 - theta_3.
+
+    A row is sampled by an angle tau: psi itself where the input turns fully, else psi = middle - half width cos tau, on
+    the open branch up to half a turn and back on the crossed one, so that it is smooth through the limits.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.case = scene, Case.of(scene)
+        self.case = self.case.with_start(command(scene)) if scene.counts_turns else self.case
+        linkage = scene.linkage
+        self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
+        self.ratios = self.case.path.lengths
+        """The lengths by a unit near them, of which no product leaves the range of doubles."""
+        at = command(scene)
+        number = circuit_of(linkage, at.theta_2, at.branch)
+        if (number < 0).all():
+            raise NotAssembledError("motion.theta_2: the linkage assembles at none of the positions requested")
+        self.circuit = circuits(linkage)[number[number >= 0][0]]
+        self.full = turns_fully(linkage)
+        self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
+        stated = isinstance(scene.motion.theta_2, Sweep) or scene.motion.law is not None
+        self.sweep = (float(at.theta_2.min()), float(at.theta_2.max())) if stated else None
+        self.singular = [
+            (point - self.theta_1, 0.0 if point == self.theta_1 else math.pi) for point in change_points(linkage)
+        ]
+        self.singular = [each for each in self.singular if self.inside(np.array([each[0]]), np.zeros(1))[0]]
+
+    def inside(self, psi: Array, radius: Array) -> NDArray[np.bool_]:
+        """Whether psi, within a radius, lies in the sweep, if one is stated."""
+        if self.sweep is None or self.sweep[1] - self.sweep[0] >= TURN:
+            return np.ones(psi.shape, dtype=bool)
+        middle, half = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1, 0.5 * (self.sweep[1] - self.sweep[0])
+        away = psi - middle - TURN * np.rint((psi - middle) / TURN)
+        return np.asarray(np.abs(away) <= half + radius + AT_END)
+
+    def point(self, tau: Array, branch: int) -> Array:
+        """Return psi and mu, (n, 2), at places of a row; `branch` where the input turns fully."""
+        tau = np.asarray(np.remainder(tau, TURN), dtype=float)
+        if self.full:
+            psi, sign = self.low + tau, np.full(tau.shape, float(branch))
+        else:
+            psi = 0.5 * (self.low + self.high) - 0.5 * (self.high - self.low) * np.cos(tau)
+            sign = np.where(tau <= math.pi, 1.0, -1.0)
+        return np.stack([psi, sign * transmission(self.ratios, psi)], axis=1)
+
+    def tau(self, points: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Return the place and the row (index into `rows`) of points."""
+        psi = self.low + np.remainder(points[:, 0] - self.low, TURN)
+        sign = np.where(np.sin(points[:, 1]) >= 0.0, 1, -1)
+        if self.full:
+            return psi - self.low, np.array([self.rows.index(each) for each in sign], dtype=np.intp)
+        part = np.clip((0.5 * (self.low + self.high) - psi) / (0.5 * (self.high - self.low)), -1.0, 1.0)
+        tau = np.where(sign > 0, np.arccos(part), TURN - np.arccos(part))
+        return tau, np.zeros(len(points), dtype=np.intp)
+
+    @property
+    def rows(self) -> tuple[int, ...]:
+        """The branch of each row; one row holds both where the input has limits."""
+        return self.circuit.branches if self.full else (1,)
+
+    def samples(self) -> Array:
+        """All rows at even places within the sweep, off the limits and change points, (n, 2)."""
+        tau = np.linspace(0.0, TURN, SAMPLES, endpoint=False) + 0.5 * TURN / SAMPLES
+        points = np.concatenate([self.point(tau, branch) for branch in self.rows])
+        return points[self.inside(points[:, 0], np.zeros(1))]
+
+    def sorted(self, points: Array) -> Array:
+        """Those in the sweep, along the rows."""
+        points = points[self.inside(points[:, 0], np.zeros(1))]
+        tau, row = self.tau(points)
+        return points[np.lexsort((tau, row))]
+
+    def state(self, points: Array) -> State:
+        """Positions with their derivatives along the curve."""
+        return on_curve(self.lengths, self.theta_1, points[:, 0], points[:, 1])
+
+    def force(self, points: Array) -> Array:
+        """Q of all but dry friction, by the curve's parameter."""
+        return np.broadcast_to(generalised_force(self.scene, self.case.terms, self.state(points)), len(points))
+
+    def slope(self, points: Array) -> Array:
+        """dQ/ds."""
+        k = self.state(points).k
+        psi, mu = (Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True))
+        Q = generalised_force(self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu))
+        return np.broadcast_to(Q.slopes[0], len(points)) if isinstance(Q, Sloped) else np.zeros(len(points))
+
+    def size(self, points: Array) -> Array:
+        """Sum of the absolute terms of Q."""
+        actions = _Sizes(state := self.state(points), self.case.bodies)
+        for term in self.case.terms:
+            term.act(actions, state)
+        return np.broadcast_to(actions.size, len(points))
+
+    def level(self, points: Array) -> NDArray[np.bool_]:
+        """Whether rounding leaves nothing of Q."""
+        return np.asarray(np.abs(self.force(points)) <= NOTHING * self.size(points))
+
+    def in_rows(self, tau: Array, branch: Array) -> Array:
+        """Points of several rows."""
+        found = np.empty((len(tau), 2))
+        for each in self.rows:
+            found[branch == each] = self.point(tau[branch == each], each)
+        return found
+
+    def place(self, point: Array) -> RestPosition:
+        """Describe a point, theta_2 within the sweep, else counted from the circuit's range."""
+        at, from_ = (
+            self.state(point[None]).at,
+            self.low if self.sweep is None else self.sweep[0] - self.theta_1 - AT_END,
+        )
+        theta_2 = self.theta_1 + from_ + math.remainder(point[0] - from_ - math.pi, TURN) + math.pi
+        theta_3, theta_4 = (float(np.angle(u)[0]) for u in (at.u3, at.u4))
+        sine = math.sin(point[1])
+        return RestPosition(
+            float(theta_2), theta_3, theta_4, 0 if abs(sine) < AT_END else int(math.copysign(1.0, sine))
+        )

@@ -1,0 +1,229 @@
+"""Equilibria: where a linkage stays by itself under weights, springs and loads, and what holds it elsewhere.
+
+With Q the generalised force (its power over q') and J the equivalent inertia, at rest and with no drive,
+    J q'' = Q,   stable where Q = 0 and dQ/dq < 0,   frequency sqrt(-Q'/J)/(2 pi).
+Dry friction holds wherever it takes Q: from the position in which it gives way forwards to that in which it gives way
+backwards.
+
+Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); L. Meirovitch, Fundamentals of Vibrations, ch. 2.
+"""
+
+import math
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import expect
+from fourbar.formulas.circuits import Circuit, circuits
+from fourbar.formulas.closed_curve import on_curve, transmission
+from fourbar.formulas.mobility import MARGIN, TURN, default_range, turns_fully
+from fourbar.formulas.position import Loop
+from fourbar.formulas.torque import inertia
+from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
+from fourbar.scene import Command, Scene, command
+from fourbar.scene.motion import DEFAULT_STEPS
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar.studies.circuit_curve import SAMPLES, Array, CircuitCurve, RestPosition, generalised_force
+from fourbar.studies.derivatives import differentiable
+from fourbar.studies.holding import HALVINGS, CircuitRange, holds, lies_in, moves, ranges
+from fourbar.studies.interval import KNOWN
+from fourbar.studies.keys import at_place, entries, left_out, with_numbers
+from fourbar.studies.sloped import Sloped
+from fourbar.studies.zeros import AT_CHANGE_POINT, Zeros, zeros
+
+A_JUMP = 1e-6
+"""Of the sum of the absolute terms: a torsion spring wound by half a turn makes Q jump, which is no zero."""
+STILL = 1e-3
+"""Where bar 2 turns by less than this of bar 4 it stands at a limit, and theta_4 takes its place."""
+A_RANGE = 3
+"""Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
+
+
+class Equilibrium(NamedTuple):
+    """A position in which the linkage stays by itself."""
+
+    place: RestPosition
+    stability: str
+    """"stable", "unstable", or "undecided" where dQ/dq is zero as far as can be said."""
+    angle: str
+    """q of the next two: "theta_2", at a limit of it "theta_4"."""
+    slope: float
+    """dQ/dq, N m/rad."""
+    inertia: float
+    """Equivalent inertia J, kg m^2."""
+    frequency: float | None
+    """Of small undamped oscillations, Hz; None: not stable, or without inertia."""
+    held: tuple[RestPosition, RestPosition] | None
+    """The ends of the positions around it that dry friction holds; None: there is none."""
+
+
+class Equilibria(NamedTuple):
+    """What `equilibrium` returns."""
+
+    found: tuple[Equilibrium, ...]
+    """Along theta_2, the open branch first; none where the linkage is indifferent."""
+    indifferent: tuple[tuple[RestPosition, RestPosition], ...]
+    """Ends of ranges in which Q is zero throughout, to the rounding of the description: it stays wherever it is put."""
+    proven: bool
+    """Whether no other equilibrium can be; otherwise there may be others between the samples."""
+    not_decided: tuple[RestPosition, ...]
+    """Change points, nearer than 1e-4 rad to which nothing is decided."""
+    held: tuple[tuple[RestPosition, RestPosition], ...]
+    """Ends of all ranges that dry friction holds, those without an equilibrium too."""
+    positions: Solution
+    """The scene's positions at rest: `torque` holds them, anything from `torque_low` to `torque_high` with friction."""
+    moves: NDArray[np.int8]
+    """How each begins to move when released: +1 as theta_2 grows, -1 as it falls, 0 it stays, or has no speeds."""
+
+
+def equilibrium(scene: Scene) -> Equilibria:
+    """Find the positions in which a linkage stays by itself, whether they are stable, and what holds the others.
+
+    On the circuit of the scene's first position that assembles, on both branches where it has both, within the sweep
+    of theta_2 if one is stated (or the angles of its motion law). Speed, acceleration and drive of the scene play no
+    part, viscous damping none either. With python-flint (extra "exact") and gravity, springs and constant loads alone
+    the equilibria are proven to be all.
+
+    Raises
+    ------
+    NotAssembledError : the linkage closes at none of the scene's positions.
+    """
+    expect("scene", scene, Scene)
+    with np.errstate(all="ignore"):
+        curve = CircuitCurve(scene)
+        level = [each for each in ranges(curve, curve.level, np.empty((0, 2))) if each.samples > A_RANGE]
+        samples = curve.samples()
+        idle = curve.level(samples)
+        result = Zeros(np.empty((0, 2)), np.empty((0, 2)), True)
+        if not idle.all():
+            proof = _proven(curve, samples[idle])
+            result = proof if proof is not None and proof.complete else _sign_changes(curve, samples)
+        points = curve.sorted(np.concatenate([result.found, result.undecided]))
+        held: list[CircuitRange] = []
+        if any(term.dry_pins for term in curve.case.terms):
+            held = ranges(curve, partial(holds, curve), points)
+        found = []
+        for point in points:
+            undecided = any(np.array_equal(point, each) for each in result.undecided)
+            around = next((each.ends for each in held if lies_in(curve, point, each)), None)
+            found.append(_described(curve, point, around, undecided=undecided))
+        singular = tuple(curve.place(np.array(point)) for point in curve.singular)
+        positions = _at_rest(scene, curve.circuit)
+        psi = positions.theta_2 - curve.theta_1
+        sense = moves(curve, np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1))
+        sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
+        flat, ends = (tuple(each.ends for each in of) for of in (level, held))
+        return Equilibria(tuple(found), flat, result.complete, singular, ends, positions, sense)
+
+
+def _at_rest(scene: Scene, circuit: Circuit) -> Solution:
+    """Solve the scene's positions at rest; of a single one, or a released linkage, those of the circuit."""
+    at = command(scene)
+    if len(at.theta_2) == 1:
+        low, high = default_range(scene.linkage) if turns_fully(scene.linkage) else circuit.theta_2
+        margin = 0.0 if turns_fully(scene.linkage) else min(MARGIN, 0.25 * (high - low))
+        theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
+        at = Command(theta_2, np.full(theta_2.shape, scene.motion.branch, dtype=np.int8), 0.0, 0.0)
+    return solve(scene, "force", at=Command(at.theta_2, at.branch, 0.0, 0.0, at.remainder))
+
+
+def _described(
+    curve: CircuitCurve, point: Array, held: tuple[RestPosition, RestPosition] | None, *, undecided: bool
+) -> Equilibrium:
+    """Describe an equilibrium by theta_2, at a limit by theta_4."""
+    state = curve.state(point[None])
+    bar = 4 if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]) else 2
+    square = float(state.k[bar - 2][0]) ** 2
+    slope = float(curve.slope(point[None])[0]) / square
+    J = float(np.sum(inertia(curve.lengths.a, curve.case.bodies, state.at, state.k))) / square
+    stable = "undecided" if undecided else "stable" if slope < 0.0 else "unstable"
+    frequency = math.sqrt(-slope / J) / TURN if stable == "stable" and J > 0.0 else None
+    return Equilibrium(curve.place(point), stable, f"theta_{bar}", slope, J, frequency, held)
+
+
+def _sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
+    """Find the zeros between samples at which Q changes its sign."""
+    idle = curve.level(points)
+    points = points[~idle | np.roll(idle, 1) | np.roll(idle, -1)]  # but for a zero that falls on a sample
+    tau, row = curve.tau(points)
+    Q, size, one, idle = curve.force(points), curve.size(points), np.arange(len(points)), curve.level(points)
+    other = np.concatenate([np.roll(one[row == each], -1) for each in range(len(curve.rows))])
+    gap = np.remainder(tau[other] - tau, TURN)
+    between = np.flatnonzero((Q * Q[other] < 0.0) & (gap < 2.5 * TURN / SAMPLES) & ~idle & ~idle[other])
+    low, high, start = tau[between], tau[between] + gap[between], Q[between]
+    branch = np.array(curve.rows)[row[between]]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        before = curve.force(curve.in_rows(middle, branch)) * start > 0.0
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    found = curve.in_rows(high, branch)
+    real = np.abs(curve.force(found)) <= A_JUMP * size[between]
+    for point in curve.singular:  # where Q vanishes because nothing moves
+        real &= ~(np.abs(np.sin(0.5 * (found - point))) < AT_CHANGE_POINT).all(axis=1)
+    found = found[real]
+    level = np.abs(curve.slope(found)) <= A_JUMP * curve.size(found)
+    return Zeros(found[~level], found[level], False)
+
+
+def _proven(curve: CircuitCurve, idle: Array) -> Zeros | None:
+    """All zeros of Q on the circuit; None where ball arithmetic or an effect's form in it is missing.
+
+    Between two change points, where signs of psi and mu tell the ways of moving apart, Q may be zero throughout: a load
+    on a bar that rests in one of them. There none is looked for.
+
+    Parameters
+    ----------
+    idle : samples in which Q is nothing.
+    """
+    try:
+        from flint import arb, ctx
+    except ImportError:
+        return None
+    scene = curve.scene
+    acting = tuple(term for term in scene.effects if not term.dry_pins)  # dry friction does no work at rest
+    for term in (*scene.loads, *acting):
+        if term.key not in KNOWN or getattr(term, "table", None) is not None:
+            return None
+    scene = differentiable(replace(scene, effects=acting))
+    still = np.zeros((2, 1), dtype=object)
+    numbers = {
+        key: Sloped(np.array([arb(at_place(scene, entry.place))], dtype=object), still)
+        for key, entry in entries(scene).items()
+        if not key.startswith("motion.") and not left_out(scene, entry)
+    }
+    exact = with_numbers(scene, numbers)
+    d, a, b, c = exact.linkage.lengths
+    lengths, theta_1 = Loop(d, a, b, c, 0.0, 0.0), exact.linkage.ground_angle
+    terms = (*exact.loads, *exact.effects)
+
+    def force(psi: Any, mu: Any) -> Sloped:
+        seeded = (Sloped(x, np.array([[i == 0], [i == 1]], dtype=object) * 1) for i, x in enumerate((psi, mu)))
+        Q: Sloped = generalised_force(exact, terms, on_curve(lengths, theta_1, *seeded))
+        return Q
+
+    turn, both = (-math.pi, math.pi), len(circuits(scene.linkage)) == 1
+    psi, mu = turn, turn
+    if not both and curve.full:
+        mu = (0.0, math.pi) if curve.circuit.branches == (1,) else (-math.pi, 0.0)
+    elif not both:
+        psi = (0.0, math.pi) if 0.0 <= curve.low < math.pi else (-math.pi, 0.0)
+    signs = [np.sign(np.sin(x)) for x in (curve.samples(), idle)]
+    ways = {tuple(way) for way in signs[1]} if curve.singular else set()
+    count = [lambda way, of=each: (of == way).all(axis=1).sum() for each in signs]
+    idle_ways = [np.array(way) for way in ways if count[0](way) == count[1](way)]
+
+    def wanted(centres: Array, radii: Array) -> NDArray[np.bool_]:
+        kept = curve.inside(centres[:, 0], radii[:, 0])
+        for way in idle_ways:
+            kept &= ~((way * np.sin(centres) > 0.0) & (np.abs(np.sin(centres)) > radii)).all(axis=1)
+        return kept
+
+    before, ctx.prec = ctx.prec, 128
+    try:
+        return zeros(curve.ratios, force, (psi, mu), wanted, curve.singular)
+    finally:
+        ctx.prec = before

@@ -1,0 +1,308 @@
+"""Every sentence that a generated MJCF says of itself is run: with loads, effects, and a drive on bar 4."""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import Friction
+from fourbar.effects.spring import SpringEnd
+from fourbar.linkage import BAR_NAMES
+from fourbar.mjcf import mjcf_for
+from fourbar.mjcf.document import SETTLING, Drive
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Array
+from tests.support.scenes import crank_rocker, thesis
+
+EXACT = 1e-6
+"""Of the greatest value in a turn, at MuJoCo's own angle, speed and acceleration; measured 2e-7."""
+QUICK = 5e-3
+"""The same of a released linkage, whose closure is made to take no energy out; measured 1.9e-3."""
+FOUND = 2e-3
+"""What a test must find where a sentence says that numbers differ."""
+NEXT_BAR = {"input": ("input", "coupler"), "coupler": ("coupler",), "output": ("output",)}
+VERSIONS = Path(__file__).parents[3] / "docs" / "examples" / "versions-mujoco.json"
+
+
+def acted_on(**changes: Any) -> Scene:
+    """Everything that has a counterpart in MJCF acts; a load of each kind on each bar, and the drive is on bar 4."""
+    spring = fourbar.Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.3), 200.0, 0.02)
+    effects = (
+        fourbar.Gravity(),
+        fourbar.Viscous.at(O2=0.02, B=0.03),
+        Friction.at(A=0.01),
+        fourbar.Torsion.at(O4=(0.5, 0.2, 0.1)),
+        fourbar.Springs((spring,)),
+        fourbar.Flywheel(0.02, 4),
+    )
+    loads = (
+        fourbar.Load(2, (2.0, 0.4), (0.03, 2.0), 0.1),
+        fourbar.Load(3, (4.0, -1.0), (0.05, 0.7), frame="bar"),
+        fourbar.Load(3, moment=-0.2),
+        fourbar.Load(4, (3.0, 0.7), (0.05, 1.0)),
+    )
+    motion = fourbar.Motion(fourbar.Sweep(0.4, 0.4 + math.tau, 60), 10.0)
+    return crank_rocker(**{"motion": motion, "effects": effects, "loads": loads, "drive_bar": 4, **changes})
+
+
+class Opened:
+    """A file in MuJoCo at its keyframe."""
+
+    def __init__(self, scene: Scene, drive: Drive) -> None:
+        self.scene, self.drive, self.text = scene, drive, mjcf_for(scene, drive=drive)
+        self.model = mujoco.MjModel.from_xml_string(self.text)
+        self.data = mujoco.MjData(self.model)
+        mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
+
+    def comments(self) -> list[str]:
+        parser = ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
+        return [str(each.text).strip() for each in ET.fromstring(self.text, parser) if each.tag is ET.Comment]
+
+    def step(self, steps: int = 20) -> None:
+        mujoco.mj_step(self.model, self.data, steps)
+
+    def forward(self) -> None:
+        mujoco.mj_forward(self.model, self.data)
+
+    @property
+    def exact(self) -> float:
+        return EXACT if self.scene.motion.free is None else QUICK
+
+    @property
+    def driven(self) -> Scene:
+        """The scene with the drive where the file has its own."""
+        return replace(self.scene, drive_bar=2) if self.drive == "flywheel" else self.scene
+
+    def errors(self, answers: dict[str, Any], scene: Scene | None = None) -> dict[str, float]:
+        """Against the formulas at the state that was last forwarded, by the greatest value in a turn."""
+        d, scene = self.data, scene or self.driven
+        round_ = replace(scene, drive_bar=2, motion=replace(scene.motion, free=None))  # without poles
+        at = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
+        expected, turn = fourbar.solve(scene, "force", at=at), fourbar.solve(round_, "force")
+        found = {}
+        for name, answer in answers.items():
+            size = np.abs(getattr(turn, name)).max()
+            found[name] = float(np.abs(np.asarray(answer) - getattr(expected, name)[0]).max() / size)
+        return found
+
+    def torque(self) -> float:
+        armature = self.model.dof_armature[self.model.joint("O2").dofadr[0]]
+        return float(self.data.actuator_force[self.model.actuator("drive").id] - armature * self.data.qacc[0])
+
+    def at_pins(self, *, loads: bool) -> dict[str, Array]:
+        """cfrc_int, with the loads that MuJoCo counts in, or without."""
+        mujoco.mj_rnePostConstraint(self.model, self.data)
+        m, d, found = self.model, self.data, {}
+        for name, bars in NEXT_BAR.items():
+            found[name] = d.cfrc_int[m.body(name).id][3:5].copy()
+            for index, load in enumerate(self.scene.loads, 1):
+                if not loads and load.force is not None and BAR_NAMES[load.bar] in bars:  # type: ignore[attr-defined]
+                    size, angle = load.force  # type: ignore[attr-defined]
+                    if load.frame == "bar":  # type: ignore[attr-defined]
+                        x = d.site(f"load_{index}").xmat
+                        angle += math.atan2(x[3], x[0])
+                    found[name] -= size * np.array([math.cos(angle), math.sin(angle)])
+        return {"F12": found["input"], "F32": -found["coupler"], "F14": found["output"]}
+
+
+def opens_assembled(file: Opened) -> None:
+    m, d = file.model, file.data
+    mujoco.mj_resetData(m, d)
+    file.forward()
+    gap = math.dist(d.site("B3").xpos, d.site("B4").xpos)
+    s = fourbar.solve(file.scene, "position", at=Command(d.qpos[:1].copy(), np.array([1]), None, 0.0))
+    assert gap < 1e-9 and m.joint("O2").qpos0[0] == d.qpos[0] == pytest.approx(0.4)
+    for angle, theta in ((d.qpos[0] + d.qpos[1], s.theta_3[0]), (d.qpos[2], s.theta_4[0])):
+        assert math.remainder(angle - theta, math.tau) == pytest.approx(0.0, abs=1e-12)
+
+
+def is_driven(file: Opened) -> None:
+    m, d = file.model, file.data
+    mujoco.mj_resetData(m, d)
+    file.step(round(8 * SETTLING))
+    assert d.qvel[0] == pytest.approx(10.0, rel=1e-3)
+    m.actuator("drive").gainprm[:] = m.actuator("drive").biasprm[:] = 0.0
+    file.step(300)
+    assert d.qvel[0] == pytest.approx(10.0, rel=1e-3), "the flywheel alone"
+
+
+def is_accelerated(file: Opened) -> None:
+    d = file.data
+    assert d.qvel[0] == 10.0
+    file.step(100)
+    assert d.qvel[0] ** 2 == pytest.approx(100.0 + 2.0 * file.scene.motion.alpha_2 * (d.qpos[0] - 0.4), rel=1e-6)
+
+
+def starts_anew(file: Opened) -> None:
+    last = 0.0
+    for _ in range(round(math.tau / 0.2244 / file.model.opt.timestep)):
+        file.step(1)
+        if file.data.time < last:
+            return
+        last = file.data.time
+    raise AssertionError("the linkage went past its limit position")
+
+
+def is_driven_elsewhere(file: Opened) -> None:
+    file.step()
+    file.forward()
+    answers = {"F43": file.data.efc_force[:2], **file.at_pins(loads=False)}
+    assert max(file.errors(answers).values()) < EXACT < FOUND < min(file.errors(answers, file.scene).values())
+
+
+def takes_control(file: Opened) -> None:
+    assert file.data.qvel[0] == 10.0
+    file.data.ctrl[file.model.actuator("drive").id] = 0.7
+    file.step()
+    file.forward()
+    assert file.errors({"torque": 0.7})["torque"] < EXACT
+
+
+def takes_what_is_applied(file: Opened) -> None:
+    m, d = file.model, file.data
+    assert d.qvel[0] == 10.0 and all(m.actuator(each).name.startswith("load_") for each in range(m.nu))
+    d.qfrc_applied[{2: 0, 4: 2}[file.scene.drive_bar]] = 0.7
+    file.step()
+    file.forward()
+    assert file.errors({"torque": 0.7})["torque"] < EXACT
+
+
+def is_released(file: Opened) -> None:
+    assert file.data.qvel[0] == 10.0
+    file.step()
+    file.forward()
+    assert file.errors({"torque": 0.0})["torque"] < QUICK
+
+
+def is_of_the_instant_after_forward(file: Opened) -> None:
+    file.step()
+    before = np.array([*file.data.qacc, *file.data.actuator_force, *file.data.efc_force[:2]])
+    file.forward()
+    after = np.array([*file.data.qacc, *file.data.actuator_force, *file.data.efc_force[:2]])
+    assert np.abs(after - before)[[0, 1, 2, -2, -1]].min() > 0.0
+    assert file.errors({"F43": file.data.efc_force[:2]})["F43"] < file.exact
+    if file.drive == "flywheel" and file.scene.motion.free is None:  # the other files step more finely
+        assert file.errors({"F43": before[-2:]})["F43"] > 10.0 * file.exact
+
+
+def gives_torque(file: Opened) -> None:
+    file.step()
+    file.forward()
+    assert file.errors({"torque": file.torque()})["torque"] < EXACT
+
+
+def gives_force_at_B(file: Opened) -> None:
+    file.step()
+    file.forward()
+    assert file.errors({"F43": file.data.efc_force[:2]})["F43"] < file.exact
+
+
+def gives_forces_at_pins(file: Opened) -> None:
+    """Without loads as it stands."""
+    bare = Opened(replace(file.scene, loads=()), file.drive)
+    bare.step()
+    bare.forward()
+    assert max(bare.errors(bare.at_pins(loads=True)).values()) < bare.exact
+    assert "counts loads in" not in bare.text
+
+
+def counts_loads_in(file: Opened) -> None:
+    file.step()
+    file.forward()
+    assert max(file.errors(file.at_pins(loads=False)).values()) < file.exact
+    assert min(file.errors(file.at_pins(loads=True)).values()) > FOUND
+
+
+def was_wrong_before_3_7(file: Opened) -> None:
+    """Measured with sixteen versions; the page is generated."""
+    found: dict[str, list[float]] = {"before": [], "since": []}
+    for row in json.loads(VERSIONS.read_text())["versions"]:
+        if row["engine"] == "mujoco-simulated" and row["F43"] is not None:
+            old = tuple(int(part) for part in row["version"].split(".")[:2]) < (3, 7)
+            found["before" if old else "since"].append(row["F43"])
+    assert min(found["before"]) > 0.1 and max(found["since"]) < 1e-6, found
+
+
+SAID: dict[str, Callable[[Opened], None]] = {
+    "Written by fourbar. Opens assembled": opens_assembled,
+    "The drive brings the input to omega_2": is_driven,
+    "The drive is a constant motor for alpha_2": is_accelerated,
+    "Past a limit position": starts_anew,
+    "The scene drives bar 4, this file bar 2": is_driven_elsewhere,
+    "ctrl[drive] is the couple of ground on bar ": takes_control,
+    "No drive: the couple of ground on bar ": takes_what_is_applied,
+    "Released: no drive": is_released,
+    "After mj_step, qacc, actuator_force and efc_force": is_of_the_instant_after_forward,
+    "T2 = actuator_force[drive] - dof_armature[O2] qacc[O2]": gives_torque,
+    "efc_force[0], efc_force[1]: force of bar 4 on bar 3": gives_force_at_B,
+    "cfrc_int[bar][3:5]": gives_forces_at_pins,
+    "MuJoCo counts loads in": counts_loads_in,
+    "MuJoCo before 3.7": was_wrong_before_3_7,
+}
+"""By how a sentence begins, what it promises."""
+FILES: dict[str, tuple[Scene, Drive]] = {
+    "at omega_2": (acted_on(), "flywheel"),
+    "at alpha_2": (acted_on(motion=fourbar.Motion(fourbar.Sweep(0.4, 5.0, 60), 10.0, 30.0)), "flywheel"),
+    "motor on bar 4": (acted_on(), "motor"),
+    "motor on bar 3": (acted_on(drive_bar=3), "motor"),
+    "motor on bar 2": (acted_on(drive_bar=2), "motor"),
+    "no drive": (acted_on(), "none"),
+    "released": (acted_on(motion=fourbar.Motion(0.4, 10.0, free=fourbar.Free(0.1, 2))), "flywheel"),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_sentence_holds(name: str) -> None:
+    said = Opened(*FILES[name]).comments()
+    assert len(said) >= 6 and all(len(line) <= 115 for line in said)
+    for line in said:
+        holds = [check for start, check in SAID.items() if line.startswith(start)]
+        assert len(holds) == 1, f"no test of: {line}"
+        holds[0](Opened(*FILES[name]))
+
+
+def test_a_linkage_with_limits_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log of its resets into the working folder
+    file = Opened(thesis(), "flywheel")
+    assert any(line.startswith("Past a limit position") for line in file.comments())
+    starts_anew(file)
+
+
+def test_every_sentence_of_the_table_is_said_somewhere() -> None:
+    said = [line for name in FILES for line in Opened(*FILES[name]).comments()]
+    said += Opened(thesis(), "flywheel").comments()
+    assert not [start for start in SAID if not any(line.startswith(start) for line in said)]
+
+
+FOLLOWED = 1e-6
+"""Of the torque of a controller, by the greatest in a turn; measured 5e-8."""
+
+
+def test_a_controller_of_ones_own_finds_the_torque() -> None:
+    """PD control about omega_2 t; its torque is the formulas' at what then happens."""
+    file = Opened(crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.4, 6.0, 60), 10.0)), "motor")
+    m, d = file.model, file.data
+    assert m.dof_armature[0] == 0.0
+    worst = 0.0
+    for step in range(1000):
+        wanted = 0.4 + 10.0 * d.time
+        d.ctrl[0] = 400.0 * (wanted - d.qpos[0]) + 4.0 * (10.0 - d.qvel[0])
+        if step >= 200 and step % 100 == 0:  # ten time constants of the closure after the start
+            file.forward()
+            worst = max(worst, file.errors({"torque": d.ctrl[0], "F43": d.efc_force[:2]})["torque"])
+        file.step(1)
+    assert worst < FOLLOWED and abs(d.qpos[0] - 0.4 - 10.0 * d.time) < 0.05
+
+
+def test_a_motor_for_one_that_takes_none_is_refused() -> None:
+    for wrong in ({"simulator": "newton", "drive": "motor"}, {"drive": "servo"}, {"simulator": "ode"}):
+        with pytest.raises(fourbar.InputError, match=r"^[^\n]+$"):
+            mjcf_for(crank_rocker(), **wrong)  # type: ignore[arg-type]

@@ -1,0 +1,83 @@
+"""Jumps and peaks between the steps of a sweep are found where geometry and much finer steps have them."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.scene import Command
+from fourbar.scene.motion_law import Law
+from fourbar.show.between import between, sizes
+from fourbar.show.tables import heading
+from tests.support.scenes import crank_rocker, thesis
+
+LOCATED = 1e-7
+"""rad: one of the five steps in which the tests cut a turn, cut down five times by 40, with room."""
+PEAK = 1e-6
+"""Relative, of a largest value against that of steps of 0.01 degrees: (0.01 deg)^2 times its curvature."""
+WIPER = fourbar.load(Path(__file__).parents[3] / "models" / "gallery" / "wiper.toml")
+FINE = fourbar.Sweep(0.0, math.tau, 36000)
+
+
+def swept(scene: fourbar.Scene, steps: int) -> fourbar.Scene:
+    return replace(scene, motion=replace(scene.motion, theta_2=fourbar.Sweep(0.0, math.tau, steps)))
+
+
+@pytest.mark.parametrize("steps", (72, 97, 360))
+def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(steps: int) -> None:
+    """The output turns back where bars 2 and 3 are in line: cosine rule for O2, B, O4."""
+    d, a, b, c = WIPER.linkage.lengths
+    stretched, folded = (math.acos((r * r + d * d - c * c) / (2.0 * r * d)) for r in (b + a, b - a))
+    scene = swept(WIPER, steps)
+    found = between(scene, fourbar.solve(scene))
+    assert found is not None and [pin for _, pin in found.reversals] == ["O4", "O4"]
+    assert np.abs(np.subtract([angle for angle, _ in found.reversals], [stretched, folded + math.pi])).max() < LOCATED
+    located = sizes(found.solution)
+    for name in ("F12", "F32", "F43", "F14"):  # each is largest on one side of the first jump
+        most = max(_beside(scene, stretched, step)[name] for step in (-1, 1))
+        assert located[name].max() == pytest.approx(most, rel=PEAK)
+    assert located["F14"].max() == pytest.approx(22.464, abs=5e-4)
+
+
+def _beside(scene: fourbar.Scene, theta_2: float, step: int) -> dict[str, float]:
+    """Sizes next to an angle."""
+    at = Command(np.array([theta_2 + step * 1e-8]), np.array([1], dtype=np.int8), scene.motion.omega_2, 0.0)
+    return {name: float(size[0]) for name, size in sizes(fourbar.solve(scene, at=at)).items()}
+
+
+def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
+    coarse = swept(crank_rocker(), 24)
+    found = between(coarse, fourbar.solve(coarse))
+    assert found is not None and not found.growing and not found.reversals
+    fine = sizes(fourbar.solve(replace(coarse, motion=replace(coarse.motion, theta_2=FINE))))
+    for name, size in sizes(found.solution).items():
+        assert size.max() == pytest.approx(fine[name].max(), rel=PEAK), name
+    own = np.isin(found.solution.theta_2, fourbar.solve(coarse).theta_2)
+    assert own.sum() == 25 and np.all(np.diff(found.solution.theta_2) > 0.0)
+
+
+def test_towards_a_pole_no_largest_value_is_made_up() -> None:
+    scene = swept(thesis(), 360)
+    solution = fourbar.solve(scene)
+    found = between(scene, solution)
+    assert found is not None and "torque" in found.growing
+    assert np.nanmax(np.abs(found.solution.torque)) == np.nanmax(np.abs(solution.torque))
+    assert any(line.startswith("largest torque of these positions") for line in heading(scene, solution))
+    scene = swept(crank_rocker(), 24)
+    assert not any("of these positions" in line for line in heading(scene, fourbar.solve(scene)))
+
+
+def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_not() -> None:
+    law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest")
+    scene = crank_rocker(motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),))
+    found = between(scene, fourbar.solve(scene))
+    fine = sizes(fourbar.solve(replace(scene, motion=fourbar.Motion(law=replace(law, steps=20000)))))
+    assert found is not None and [pin for _, pin in found.reversals] == ["O2"]
+    assert np.max(sizes(found.solution)["power"]) == pytest.approx(fine["power"].max(), rel=PEAK)
+    assert np.all(np.diff(found.solution.time) > 0.0)
+    listed = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, 6.0, 9), 10.0))
+    assert between(listed, fourbar.solve(listed)) is None
+    assert any("torque of these positions" in line for line in heading(listed, fourbar.solve(listed)))

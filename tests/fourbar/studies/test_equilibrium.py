@@ -1,0 +1,325 @@
+"""Equilibria: pendulums and potential energy say where and how fast, released motions agree, and none is missed."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.special import ellipk
+
+import fourbar
+from fourbar import Bar, FourBar, Friction, Gravity, Load, Motion, PinFriction, Scene, Spring, Springs, Sweep, Torsion
+from fourbar.cli import status
+from fourbar.effects import SpringEnd
+from fourbar.mjcf import mjcf
+from fourbar.scene.motion import Free
+from fourbar.studies import equilibrium as module
+from fourbar.studies.circuit_curve import SAMPLES
+from fourbar.studies.equilibrium import Equilibria, Equilibrium, equilibrium
+from fourbar_validation.engines.free_body import FreeBody
+
+MODELS = Path(__file__).parents[3] / "models"
+M, R, INERTIA = 1.5, 0.04, 0.002
+DOWN = Gravity()
+CLOSE = 1e-12
+"""Relative and rad; a dozen operations in doubles, and angles of a few turns."""
+
+
+def crank_as_pendulum(*effects: object, loads: tuple[Load, ...] = (), **motion: object) -> Scene:
+    """A crank-rocker of which the crank alone has mass: theta_2 swings as one body about O2."""
+    linkage = FourBar(0.3, Bar(0.1, M, INERTIA, (R, 0.3)), Bar(0.25), Bar(0.22), 0.2)
+    return Scene(linkage, Motion(**{"theta_2": 0.7, **motion}), loads=loads, effects=effects)  # type: ignore[arg-type]
+
+
+def one(found: Equilibria, stability: str) -> Equilibrium:
+    (each,) = [each for each in found.found if each.stability == stability]
+    return each
+
+
+def test_gazebos_four_bar_hangs_at_the_frequency_of_its_pendulum() -> None:
+    scene = fourbar.load(MODELS / "problems" / "gz_physics_987.toml")
+    found = equilibrium(scene)
+    assert found.proven and [round(math.degrees(each.theta_2)) for each in found.not_decided] == [0, 180]
+    (hanging,) = [each for each in found.found if abs(each.place.theta_2 - 1.5 * math.pi) < CLOSE]
+    assert (hanging.place.branch, hanging.stability, hanging.angle) == (-1, "stable", "theta_2")
+    bars = scene.linkage
+    swinging = sum(bar.moment_of_inertia + bar.mass * 0.25**2 for bar in (bars.input, bars.output))
+    weight = 9.8 * (2 * bars.input.mass * 0.25 + bars.coupler.mass * 0.5)
+    J = swinging + bars.coupler.mass * 0.5**2
+    assert hanging.frequency == pytest.approx(math.sqrt(weight / J) / (2 * math.pi), rel=CLOSE)
+    assert f"{hanging.frequency:.10f}" == "0.7594391930"
+    released = hanging.frequency * math.pi / (2 * ellipk(math.sin(math.radians(12.5)) ** 2))
+    assert f"{released:.10f}" == "0.7504113317"
+
+
+def test_a_crank_with_mass_alone_is_a_pendulum() -> None:
+    found = equilibrium(crank_as_pendulum(DOWN))
+    stable, unstable = one(found, "stable"), one(found, "unstable")
+    assert found.proven and len(found.found) == 2 and not found.indifferent
+    assert math.remainder(stable.place.theta_2 + math.pi / 2 + 0.3, 2 * math.pi) == pytest.approx(0.0, abs=CLOSE)
+    assert math.remainder(unstable.place.theta_2 - math.pi / 2 + 0.3, 2 * math.pi) == pytest.approx(0.0, abs=CLOSE)
+    J = INERTIA + M * R * R
+    assert (stable.slope, stable.inertia) == pytest.approx((-M * 9.81 * R, J), rel=CLOSE)
+    assert stable.frequency == pytest.approx(math.sqrt(M * 9.81 * R / J) / (2 * math.pi), rel=CLOSE)
+    assert unstable.frequency is None and unstable.slope == pytest.approx(M * 9.81 * R, rel=CLOSE)
+
+
+def test_at_a_limit_of_the_input_the_output_is_the_angle() -> None:
+    linkage = FourBar(0.3, Bar(0.4), Bar(0.2), Bar(0.25, M, INERTIA, (R, 0.0)), 0.5)
+    for limit in fourbar.limit_positions(linkage):
+        beside = [limit.theta_2 + off for off in (0.01, -0.01)]  # on one side the linkage assembles
+        scene = Scene(linkage, Motion(np.array(beside)), effects=(Gravity(9.81, limit.theta_4),))
+        (hanging,) = [each for each in equilibrium(scene).found if each.angle == "theta_4" and each.place.branch == 0]
+        assert hanging.stability == "stable"
+        assert hanging.angle == "theta_4" and hanging.place.branch == 0
+        assert hanging.place.theta_4 == pytest.approx(limit.theta_4, abs=1e-10)  # theta_2 as a double: root of 2^-53
+        assert math.remainder(hanging.place.theta_2 - limit.theta_2, 2 * math.pi) == pytest.approx(0.0, abs=CLOSE)
+        J = INERTIA + M * R * R
+        assert (hanging.slope, hanging.inertia) == pytest.approx((-M * 9.81 * R, J), rel=1e-9)
+
+
+def springy(seed: int) -> Scene:
+    """A linkage of any type with weights, two springs, a force and a couple, at random."""
+    random = np.random.default_rng(seed)
+    while True:
+        lengths = random.uniform(0.1, 0.5, 4)
+        if 2 * max(lengths) < sum(lengths):
+            break
+    bars = [Bar(x, random.uniform(0.1, 2), None, tuple(random.uniform(-0.3, 0.3, 2))) for x in lengths[1:]]
+    linkage = FourBar(lengths[0], *bars, random.uniform(-3, 3))  # type: ignore[arg-type,misc]
+    ends = [SpringEnd(bar, *random.uniform(0.05, 0.4, 2)) for bar in (1, 3, 2, 4)]
+    springs = [Spring(ends[i], ends[i + 1], random.uniform(50, 300), random.uniform(0, 0.3)) for i in (0, 2)]
+    loads = (Load(3, tuple(random.uniform(0, 9, 2)), (0.1, 1.0)), Load(4, moment=random.uniform(-1, 1)))
+    low, high = fourbar.formulas.mobility.default_range(linkage)
+    branch = int(random.choice([1, -1]))
+    return Scene(linkage, Motion(0.5 * (low + high), branch=branch), 2, loads, (DOWN, Springs(tuple(springs))))
+
+
+def energy(scene: Scene, theta: np.ndarray, branch: np.ndarray) -> np.ndarray:
+    """Potential energy of weights, springs and loads from the places of points alone."""
+    loads = {f"L{i}": load for i, load in enumerate(scene.loads) if load.force is not None}
+    points = [fourbar.Point(name, load.bar, (0.0, 0.0)) for name, load in loads.items()]
+    springs = [each for effect in scene.effects if isinstance(effect, Springs) for each in effect.springs]
+    for i, spring in enumerate(springs):
+        points += [
+            fourbar.Point(f"{n}{i}", p.bar, p[1:]) for n, p in (("s", spring.start), ("e", spring.end)) if p.bar > 1
+        ]
+    at = fourbar.scene.Command(theta, branch.astype(np.int8), None, 0.0)
+    s = fourbar.solve(replace(scene, points=tuple(points)), "position", at=at)
+    V = sum(9.81 * scene.linkage.bar(k).mass * getattr(s, f"G{k}")[:, 1] for k in (2, 3, 4))
+    angles = {2: s.theta_2, 3: s.theta_3, 4: s.theta_4}
+    for load in scene.loads:
+        if load.force is not None:
+            arm = np.stack([np.cos(load.at[1]), np.sin(load.at[1])]) * load.at[0]
+            force = load.force[0] * np.array([math.cos(load.force[1]), math.sin(load.force[1])])
+            V = V - (getattr(s, f"G{load.bar}") + arm) @ force
+        V = V - load.moment * angles[load.bar]
+    for i, spring in enumerate(springs):
+        ends = []
+        for n, p in (("s", spring.start), ("e", spring.end)):
+            angle = p.angle + scene.linkage.ground_angle
+            fixed = p.distance * np.array([math.cos(angle), math.sin(angle)])
+            ends.append(fixed if p.bar == 1 else s.points[f"{n}{i}"])
+        stretch = np.hypot(*(ends[1] - ends[0]).T) - spring.length
+        V = V + 0.5 * spring.stiffness * stretch**2
+    return np.asarray(V)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_potential_energy_is_least_where_stable_and_nowhere_else(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = springy(seed)
+    scene = replace(scene, loads=tuple(replace(load, at=(0.0, 0.0)) for load in scene.loads))
+    found = equilibrium(scene)
+    assert found.proven and found.found
+    for each in found.found:
+        if each.angle == "theta_2" and each.stability != "undecided":
+            step = 1e-4 * np.array([-1.0, 0.0, 1.0])
+            V = energy(scene, each.place.theta_2 + step, np.full(3, each.place.branch))
+            curvature = (V[0] - 2 * V[1] + V[2]) / 1e-8
+            assert abs(V[2] - V[0]) / 2e-4 <= 1e-3 * abs(each.slope)  # zero but for the third derivative
+            assert -curvature == pytest.approx(each.slope, rel=1e-2)
+    monkeypatch.setattr(module, "_proven", lambda *_: None)
+    sampled = equilibrium(scene)
+    assert not sampled.proven and len(sampled.found) == len(found.found)
+    for one_of, other in zip(found.found, sampled.found, strict=True):
+        assert (one_of.stability, one_of.place.branch) == (other.stability, other.place.branch)
+        assert one_of.place == pytest.approx(other.place, abs=1e-9)
+
+
+def test_friction_holds_a_pendulum_within_the_angle_that_it_can() -> None:
+    f = 0.2
+    away = math.asin(f / (M * 9.81 * R))
+    found = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=f)))
+    for each in found.found:
+        assert each.held is not None
+        ends = [math.remainder(end.theta_2 - each.place.theta_2, 2 * math.pi) for end in each.held]
+        assert ends == pytest.approx([-away, away], abs=1e-12)
+    assert len(found.held) == 2 and found.proven
+    assert all(one.theta_2 < other.theta_2 for one, other in found.held)
+    stays = found.moves == 0
+    Q = -M * 9.81 * R * np.cos(found.positions.theta_2 + 0.3)
+    assert (stays == (np.abs(Q) <= f)).all() and (found.moves[~stays] == np.sign(Q[~stays])).all()
+    whole = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=10.0)))
+    assert (whole.moves == 0).all() and len(whole.held) == 1 and all(each.held for each in whole.found)
+
+
+def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move() -> None:
+    scene = fourbar.load(MODELS / "crank_rocker.toml")
+    scene = replace(scene, loads=(), effects=(DOWN, PinFriction.at(O2=(0.2, 0.01), A=(0.1, 0.01), O4=(0.2, 0.02))))
+    found = equilibrium(scene)
+    assert found.proven and len(found.held) == 2
+    for ends in found.held:
+        theta = np.array([end.theta_2 for end in ends])
+        at = fourbar.scene.Command(theta, np.array([end.branch for end in ends], dtype=np.int8), 0.0, 0.0)
+        torques = fourbar.solve(scene, at=at)
+        assert torques.torque_high is not None and torques.torque_low is not None
+        size = np.abs(found.positions.torque).max()
+        assert min(abs(torques.torque_low[0]), abs(torques.torque_high[0])) <= 1e-9 * size
+        assert min(abs(torques.torque_low[1]), abs(torques.torque_high[1])) <= 1e-9 * size
+
+
+def test_what_has_no_answer_says_so() -> None:
+    assert equilibrium(crank_as_pendulum()).indifferent and not equilibrium(crank_as_pendulum()).found
+    balanced = crank_as_pendulum(DOWN)
+    balanced = replace(balanced, linkage=replace(balanced.linkage, input=Bar(0.1, M, INERTIA, (0.0, 0.0))))
+    (ends,) = equilibrium(balanced).indifferent
+    assert ends[1].theta_2 - ends[0].theta_2 == pytest.approx(2 * math.pi)
+    touching = crank_as_pendulum(Gravity(8.0, 0.0), loads=(Load(2, moment=0.5),))  # 0.5 - 0.5 sin theta_2
+    touching = replace(touching, linkage=replace(touching.linkage, input=Bar(0.1, 1.0, 0.0, (0.0625, 0.0))))
+    (only,) = equilibrium(touching).found
+    assert only.stability == "undecided" and only.frequency is None
+    assert math.remainder(only.place.theta_2 - math.pi / 2, 2 * math.pi) == pytest.approx(0.0, abs=1e-5)
+    spring = Springs((Spring(SpringEnd(1, 0.3, 1.0), SpringEnd(2, 0.1, 0.0), 100.0),))
+    massless = replace(crank_as_pendulum(spring), linkage=FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22)))
+    rest = one(equilibrium(massless), "stable")
+    assert (rest.inertia, rest.frequency) == (0.0, None) and rest.place.theta_2 == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_load_on_a_bar_that_rests_is_indifferent_in_one_way_of_moving_alone() -> None:
+    found = equilibrium(fourbar.load(MODELS / "textbook" / "gtdynamics_square.toml"))
+    assert found.proven and found.indifferent and not found.found
+    assert {end.branch for ends in found.indifferent for end in ends} & {1, -1}
+
+
+def test_a_torsion_spring_is_searched_by_signs_and_its_half_turn_is_no_equilibrium() -> None:
+    scene = crank_as_pendulum(Torsion.at(O2=(2.0, 0.5, 0.0)))
+    found = equilibrium(scene)
+    (rest,) = found.found
+    assert not found.proven and rest.stability == "stable"
+    assert rest.place.theta_2 == pytest.approx(0.5 + 0.2, abs=1e-9)
+    assert rest.frequency == pytest.approx(math.sqrt(2.0 / (INERTIA + M * R * R)) / (2 * math.pi), rel=1e-9)
+
+
+def test_a_sweep_bounds_the_search() -> None:
+    sweep = crank_as_pendulum(DOWN, theta_2=Sweep(-3.0, 1.2, 30))
+    found = equilibrium(sweep)
+    assert [each.stability for each in found.found] == ["stable"] and len(found.positions) == 31
+    assert found.found[0].place.theta_2 == pytest.approx(-math.pi / 2 - 0.3, abs=CLOSE)
+
+
+@pytest.mark.parametrize("name", ["crank_rocker", "thesis", "gallery/hoecken", "gallery/pump_jack"])
+def test_the_free_bodies_need_no_torque_there_and_its_slope_beside(name: str) -> None:
+    """Newton-Euler on three free bodies with their own closure: no virtual work, no coefficient of motion."""
+    scene = replace(fourbar.load(MODELS / f"{name}.toml"), drive_bar=2)
+    found = equilibrium(scene)
+    most = np.nanmax(np.abs(found.positions.torque))
+    assert found.proven and found.found
+    for each in found.found:
+        step = 1e-5 * np.array([-1.0, 0.0, 1.0])
+        at = fourbar.scene.Command(each.place.theta_2 + step, np.full(3, each.place.branch, dtype=np.int8), 0.0, 0.0)
+        torque = FreeBody().answer(scene, at).quantities["torque"]
+        assert abs(torque[1]) <= 1e-12 * max(most, abs(each.slope))
+        assert (torque[0] - torque[2]) / 2e-5 == pytest.approx(each.slope, rel=1e-4)
+
+
+def crossings(time: np.ndarray, angle: np.ndarray, middle: float) -> float:
+    """Frequency from the passages one way through the middle, interpolated by a cubic."""
+    from scipy.interpolate import CubicSpline
+
+    roots = CubicSpline(time, angle - middle).roots(extrapolate=False)[::2]
+    return (len(roots) - 1) / float(roots[-1] - roots[0])
+
+
+def test_released_motions_swing_at_the_frequency() -> None:
+    scene = fourbar.load(MODELS / "crank_rocker.toml")
+    rest = one(equilibrium(scene), "stable")
+    assert rest.frequency is not None
+    off, period = 1e-3, 1.0 / rest.frequency
+    free = Free(8.2 * period, 820)
+    scene = replace(scene, motion=Motion(rest.place.theta_2 + off, 0.0, branch=rest.place.branch, free=free))
+    ours = fourbar.solve(scene, "position")
+    assert ours.time is not None
+    # the amplitude changes the frequency by a part of its square
+    assert crossings(ours.time, ours.theta_2, rest.place.theta_2) == pytest.approx(rest.frequency, rel=10 * off**2)
+    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    every = max(1, int(period / 100 / model.opt.timestep))
+    seen = []
+    for _ in range(400):
+        mujoco.mj_step(model, data, every)
+        seen.append((data.time, data.qpos[0]))
+    time, angle = np.array(seen).T
+    assert crossings(time, angle, float(rest.place.theta_2)) == pytest.approx(rest.frequency, rel=1e-4)
+
+
+def test_released_ones_begin_to_move_as_stated() -> None:
+    scene = fourbar.load(MODELS / "crank_rocker.toml")
+    found = equilibrium(replace(scene, effects=(*scene.effects, Friction.at(O2=0.2))))
+    chosen = range(7, len(found.positions), 40)
+    for i in chosen:
+        motion = Motion(float(found.positions.theta_2[i]), 0.0, free=Free(1e-2, 1))
+        released = fourbar.solve(
+            replace(scene, motion=motion, effects=(*scene.effects, Friction.at(O2=0.2))), "position"
+        )
+        assert np.sign(released.theta_2[1] - released.theta_2[0]) == found.moves[i]
+    assert {*found.moves[list(chosen)].tolist()} >= {0} and len(set(found.moves.tolist())) == 3
+
+
+def test_the_command_prints_what_python_finds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = MODELS / "problems" / "gz_physics_987.toml"
+    assert status(["equilibrium", str(file)]) == 0
+    text = capsys.readouterr().out
+    assert "0.759439193" in text and "proven to be all" in text and "stable" in text
+    assert status(["equilibrium", str(file), "--json", "-o", str(tmp_path / "rest.json")]) == 0
+    kept = json.loads((tmp_path / "rest.json").read_text())
+    found = equilibrium(fourbar.load(file))
+    assert [each["place"]["theta_2"] for each in kept["equilibria"]] == [each.place.theta_2 for each in found.found]
+    assert kept["proven"] and kept["positions"]["theta_2"] == found.positions.theta_2.tolist()
+    friction = MODELS.parent / "tests" / "counterexamples" / "dry_friction_on_a_crank_at_rest.toml"
+    assert status(["equilibrium", str(friction)]) == 0 and "friction alone holds" in capsys.readouterr().out
+    kite = MODELS.parent / "tests" / "counterexamples" / "kite_with_A_on_O4.toml"  # which has no theta_4 there
+    assert status(["equilibrium", str(kite), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["not_decided"][0]["theta_4"] is None
+    bad = tmp_path / "bad.toml"
+    bad.write_text(
+        '[lengths]\nground = "1 m"\ninput = "1.5 m"\ncoupler = "1 m"\noutput = "0.2 m"\n[motion]\ntheta_2 = "180 deg"\n'
+    )
+    assert status(["equilibrium", str(bad)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "assembles at none" in error
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e120])
+def test_no_unit_of_length_changes_an_equilibrium(unit: float) -> None:
+    bars = [Bar(x * unit, M, 1e-3 * unit * unit) for x in (0.1, 0.25, 0.22)]
+    found = equilibrium(Scene(FourBar(0.3 * unit, *bars, 0.2), Motion(0.7), effects=(DOWN,)))  # type: ignore[misc]
+    bars = [Bar(x, M, 1e-3) for x in (0.1, 0.25, 0.22)]
+    same = equilibrium(Scene(FourBar(0.3, *bars, 0.2), Motion(0.7), effects=(DOWN,)))  # type: ignore[misc]
+    assert found.proven and len(found.found) == len(same.found) == 2
+    for one_of, other in zip(found.found, same.found, strict=True):
+        assert one_of.place == pytest.approx(other.place, abs=CLOSE)
+        assert one_of.slope / unit == pytest.approx(other.slope, rel=1e-9)
+
+
+def test_a_zero_that_falls_on_a_sample_is_found_by_signs_too() -> None:
+    sample = 0.5 * 2 * math.pi / SAMPLES + 700 * (2 * math.pi / SAMPLES)
+    linkage = replace(crank_as_pendulum().linkage, ground_angle=0.0)
+    scene = replace(crank_as_pendulum(Torsion.at(O2=(2.0, sample, 0.0))), linkage=linkage)
+    (rest,) = equilibrium(scene).found
+    assert rest.place.theta_2 == pytest.approx(sample, abs=1e-9)

@@ -1,0 +1,127 @@
+"""`cost --mimic`: what is lost where a mimic joint takes the place of the loop, simulated side by side."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import click
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.files import load
+from fourbar.mjcf import mjcf, with_mimic
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Scene
+from fourbar.studies.ratio import MOST, ratio
+from fourbar.writing import write_text
+from fourbar_validation.compare.tolerance import magnitude
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.places import MODELS, PROGRAM
+from fourbar_validation.report.machine import machine, versions
+from fourbar_validation.report.terminal import lined_up
+
+SCENES = ("crank_rocker", "drag_link", "double_rocker", "gallery/bonnet_hinge", "gallery/landing_gear")
+"""Of models/, where none are named: a crank that turns fully, and ranges of 50 to 90 degrees."""
+PARTS = ("torque", *PIN_FORCES)
+HEADS = ("scene", "model", "theta_4 (deg)", *PARTS, "gap at B (mm)")
+
+
+class Lost(NamedTuple):
+    """Greatest errors of one model against the free bodies at the motion that happened."""
+
+    model: str
+    angle: float
+    """Of theta_4, rad."""
+    parts: dict[str, float]
+    """Of the torque and of each pin force that there is, by its largest value in the range."""
+    gap: float
+    """Between the ends of bars 3 and 4, m."""
+
+
+def lost(scene: Scene) -> list[Lost]:
+    """Simulate the loop, and what follows by polynomials of degree 4 and 1, over the range of a scene."""
+    if not scene.motion.omega_2:
+        raise InputError("motion.omega_2", scene.motion.omega_2, "is needed, not zero: the models are driven")
+    scene = replace(scene, drive_bar=2)
+    gear, written = ratio(scene), mjcf(scene)
+    low, high = float(gear.theta_2[0]), float(gear.theta_2[-1])
+    models = {"the loop": written}
+    for fit in (gear.fits[MOST - 1], gear.fits[0]):
+        text = with_mimic(written, scene, fit.about, fit.joint_A, fit.theta_4)
+        models[f"mimic joint, degree {fit.degree}"] = text
+    return [_compared(name, text, scene, (low, high)) for name, text in models.items()]
+
+
+def _compared(name: str, model: str, scene: Scene, ends: tuple[float, float]) -> Lost:
+    from fourbar_validation.engines.mujoco.mimic import moved
+
+    at, read = moved(model, scene, *ends)
+    answer = FreeBody().answer(scene, at).quantities
+    parts = {
+        each: float(magnitude(read[each] - answer[each]).max() / magnitude(answer[each]).max())
+        for each in PARTS
+        if each in read
+    }
+    off = read["theta_4"] - answer["theta_4"]
+    angle = float(np.abs(off - math.tau * np.rint(off / math.tau)).max())
+    return Lost(name, angle, parts, float(read["gap"].max()))
+
+
+def row(scene: str, of: Lost) -> list[str]:
+    """Write one row of the table."""
+    shares = [f"{_short(100.0 * of.parts[each])} %" if each in of.parts else "none" for each in PARTS]
+    return [scene, of.model, _short(math.degrees(of.angle)), *shares, _short(1e3 * of.gap)]
+
+
+def _short(number: float) -> str:
+    return f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
+
+
+@click.command(name="cost --mimic")
+@click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
+@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the page as Markdown too.")
+def command(scenes: tuple[Path, ...], out: Path | None) -> int:
+    """Simulate the loop and a mimic joint in its place, and compare both with the free bodies; a minute."""
+    from rich.console import Console
+
+    rows = []
+    for file in scenes or tuple(MODELS / f"{name}.toml" for name in SCENES):
+        try:
+            rows += [row(file.stem, each) for each in lost(load(file))]
+        except InputError as error:
+            raise error if error.file else error.in_file(str(file)) from None
+    Console().print(lined_up(HEADS, rows))
+    if out is not None:
+        write_text(out, _page(rows))
+        click.echo(f"written to {out}")
+    return 0
+
+
+def _page(rows: list[list[str]]) -> str:
+    lines = ["| " + " | ".join(cells) + " |" for cells in (HEADS, ["---"] * 2 + ["---:"] * (len(HEADS) - 2), *rows)]
+    used = ", ".join(f"{name} {version}" for name, version in versions().items())
+    return ABOUT.format(program=PROGRAM) + "\n".join(lines) + f"\n\n{NOTES}\n{used}; {machine()}.\n"
+
+
+ABOUT = """\
+# What a mimic joint loses
+
+Where a simulator has no loop, a joint that follows another takes its place: theta_4 = P(theta_2), in URDF and SDF with
+a P of degree 1, in MuJoCo of degree 4 at most. `fourbar ratio SCENE` fits the polynomials and says what they miss;
+`fourbar mjcf SCENE --mimic -o FILE` writes the model, the coupler following by a polynomial of its own.
+
+`{program} cost --mimic [SCENE...]` simulates the loop and both models in MuJoCo over the range of the scene, and
+compares each instant with the free bodies (their own closure, thirteen equations) at the motion that happened: the
+greatest error of the angle, of the torque on the input and of the pin forces, those by their largest value there.
+
+"""
+NOTES = """\
+- The first ten timesteps, in which the joints settle, are left out.
+- The torque is lost first: an error of the angle is multiplied twice by derivation, and weights and inertia see the
+  wrong speeds. A polynomial that looks right in the viewer may have the motor wrong by two fifths.
+- The forces that the joints at O2, A and O4 carry are those of a mechanism that is open at B: nothing pushes from the
+  coupler to the output, so their errors do not fall with those of the angle. F43 does not exist.
+- A constraint torque on joint O4 does what the coupler's force would do; no bearing feels it.
+- Outside the range a polynomial leads anywhere: a crank that turns on and on needs the loop.
+"""
