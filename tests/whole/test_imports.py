@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-HEAVY = "pint click rich jinja2 matplotlib scipy mujoco pinocchio flint mpmath tornado tomlkit".split()
+HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "mujoco", "pinocchio", "flint", "mpmath", "tornado")
 ENGINES = {name: name.removeprefix("py") for name in ("mujoco", "pinocchio", "exudyn", "opensim", "pydrake")}
 PACKAGES = {"fourbar": ROOT / "fourbar", "fourbar_validation": ROOT / "validation" / "fourbar_validation"}
 LAYERS = {

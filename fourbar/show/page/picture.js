@@ -102,10 +102,11 @@ function arrowShares(name, i) {
 // The greatest scale at which pins keep a margin and arrows with their names stay inside, and the length of an arrow.
 function fitted(points, tips, margin) {
   const edge = 30, side = Math.min(view.width, view.height);
+  const ends = [0, 1].map(j => points.reduce(([low, high], point) => [Math.min(low, point[j]), Math.max(high, point[j])], [Infinity, -Infinity]));
   const reach = (j, k, arrow) => {
     let low = Infinity, high = -Infinity;
     const take = (value, around) => { low = Math.min(low, value - around); high = Math.max(high, value + around); };
-    for (const point of points) take(k * point[j], margin);
+    for (const end of ends[j]) take(k * end, margin);
     for (const [foot, ...shares] of tips) for (const share of shares) take(k * foot[j] + arrow * share[j], edge);
     return [low, high];
   };
