@@ -15,13 +15,14 @@ from fourbar.errors import NotAssembledError
 from fourbar.scene import Scene
 from fourbar.show.page_data import live_data
 from fourbar.show.tables import heading
+from fourbar.show.tolerances import embedded_tolerances
 from fourbar.show.words import type_lines
 from fourbar.solution import DEGREES, Conversion, Solution
 from fourbar.solve import last_stage, solve
 
 
 def scene_data(scene: Scene, plain: dict[str, Any], units: Conversion, *, settled: bool = False) -> dict[str, Any]:
-    """Evaluate a scene for the page; `settled`: with error bars, which cost as much as all the rest.
+    """Evaluate a scene for the page; `settled`: with error bars, summary and tolerances, which cost more than the rest.
 
     Raises NotAssembledError where no position assembles, InputError as `solve` does.
     """
@@ -29,13 +30,13 @@ def scene_data(scene: Scene, plain: dict[str, Any], units: Conversion, *, settle
     own = solve(scene, stage)
     if not own.assembled.any():
         raise NotAssembledError("motion.theta_2: the linkage assembles at none of the positions requested")
-    return live_data(scene, units, stage=stage) | {
-        "tolerances": None,
-        "pictures": {},
-        "toml": None,
-        "summary": summary(scene, own, units),
-        "handles": [handle.drawn() for handle in handles(scene, plain)],
-    }
+    data = live_data(scene, units, stage=stage) | {"tolerances": None, "pictures": {}, "toml": None}
+    data["handles"] = [handle.drawn() for handle in handles(scene, plain)]
+    if settled:
+        data["summary"] = summary(scene, own, units)
+        if scene.tolerances:
+            data["tolerances"] = embedded_tolerances(scene, data["theta_2"])
+    return data
 
 
 def summary(scene: Scene, solution: Solution, units: Conversion) -> list[str]:

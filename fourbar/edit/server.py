@@ -293,6 +293,7 @@ def edit(path: Path, exports: Path, port: int = 0, *, browse: bool = True) -> No
         await Workbench(session).serve(port, browse)
 
     session = Session(path, exports)
+    session.answer()  # what assembles nowhere has no page
     with suppress(KeyboardInterrupt):
         asyncio.run(run())
     sys.stdout.flush()
