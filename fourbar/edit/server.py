@@ -43,6 +43,8 @@ class Workbench:
 
     def __init__(self, session: Session) -> None:
         self.session, self.ended = session, asyncio.Event()
+        self.loop = asyncio.get_running_loop()
+        self.address: asyncio.Future[str] = self.loop.create_future()
         self.pages: set[PageLine] = set()
         self.waiting: deque[tuple[PageLine, dict[str, Any]]] = deque()
         self.one = ThreadPoolExecutor(1)  # the session is touched from this thread alone
@@ -53,7 +55,7 @@ class Workbench:
     def later(self, name: str, seconds: float, what: Any) -> None:
         """Do something after a while, once: asked for again, it waits anew."""
         self.never(name)
-        self.timers[name] = asyncio.get_running_loop().call_later(seconds, what)
+        self.timers[name] = self.loop.call_later(seconds, what)
 
     def never(self, name: str) -> None:
         """Take back what was to be done later."""
@@ -96,14 +98,13 @@ class Workbench:
             self.working = asyncio.create_task(self._work())
 
     async def _work(self) -> None:
-        loop = asyncio.get_running_loop()
         while self.waiting:
             line, asked = self.waiting.popleft()
-            about = await loop.run_in_executor(self.one, self.session.do, asked)
+            about = await self.loop.run_in_executor(self.one, self.session.do, asked)
             about["for"] = asked.get("id")
             alone = not {"data", "text"} <= about.keys() or asked.get("do") == "hello"
             if about.pop("refer", False):
-                compared = await loop.run_in_executor(self.one, self._compared)
+                compared = await self.loop.run_in_executor(self.one, self._compared)
                 self.tell(compared, to=line if alone else None)
             self.tell(about, to=line if alone or "refused" in about or "ask" in about else None)
         self.later("settle", SETTLED, lambda: asyncio.create_task(self._settle()))
@@ -127,15 +128,12 @@ class Workbench:
     async def _settle(self) -> None:
         """Send the error bars, unless something has changed again."""
         with suppress(FourBarError):
-            about = await asyncio.get_running_loop().run_in_executor(
-                self.one, lambda: self.session.answer(settled=True)
-            )
+            about = await self.loop.run_in_executor(self.one, lambda: self.session.answer(settled=True))
             if not self.waiting:
                 self.tell(about)
 
     async def serve(self, port: int, browse: bool) -> None:
         """Serve until all pages have gone, or until Ctrl-C."""
-        self.loop = asyncio.get_running_loop()
         try:
             listening = socket.create_server((LOOPBACK, port))
         except (OSError, OverflowError) as error:
@@ -152,12 +150,18 @@ class Workbench:
                 self.loop.add_signal_handler(name, self.ended.set)
         address = f"http://{LOOPBACK}:{own}/{self.session.token}/"
         self.one.submit(self._keep)
+        self.address.set_result(address)
         print(address, flush=True)
         if browse:
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
         await self.ended.wait()
         server.stop()
         gone = not self.pages
+        self.waiting.clear()
+        if self.working is not None:
+            await asyncio.wait({self.working})
+        for name in list(self.timers):
+            self.never(name)
         for line in list(self.pages):
             line.close(1001, "the server ends")
         self.check.stop()
