@@ -160,8 +160,8 @@ class Workbench:
         self.waiting.clear()
         if self.working is not None:
             await asyncio.wait({self.working})
-        for name in list(self.timers):
-            self.never(name)
+        for timer in self.timers.values():
+            timer.cancel()
         for line in list(self.pages):
             line.close(1001, "the server ends")
         self.check.stop()

@@ -1,6 +1,6 @@
 // ---- the fields of a scene, made from its file ---------------------------------------------------
 const ORDER = ["title", "source", "lengths", "bars", "motion", "drive", "points", "loads", "effects", "tolerances"];
-const PER_PIN = ["O2", "A", "B", "O4"];
+const PAIRS = Object.fromEntries([...["centre", "from_pin", "at"].map(key => [key, ["distance", "angle"]]), ...["force", "gravity"].map(key => [key, ["size", "angle"]])]);
 let offers = null, plain = {}, shape = "", typing = 0;
 const fieldId = path => `field:${path.join("/")}`;
 const entryAt = (node, path) => path.reduce((inner, step) => inner?.[step], node);
@@ -36,7 +36,8 @@ function field(path, value, example) {
     if (event.key === "Escape") { input.value = entryAt(plain, path) ?? ""; refuse(path, ""); }
   });
   input.addEventListener("wheel", event => { if (document.activeElement === input) by(event.deltaY < 0 ? 1 : -1, event); }, { passive: false });
-  return element("label", { className: long ? "field long" : "field" }, nameOfKey(key), input, element("span", { id: `${id}!`, className: "warning", hidden: true }));
+  const shown = PAIRS[path[path.length - 2]]?.[key] ?? nameOfKey(key);
+  return element("label", { className: long ? "field long" : "field" }, shown, input, element("span", { id: `${id}!`, className: "warning", hidden: true }));
 }
 
 // A number a hundredth larger or smaller, in round steps; the unit stays. Null where there is no number.
@@ -66,7 +67,7 @@ function group(path, node, example) {
   }
   for (const part of partsAt(path)) box.append(part);
   if (path.length > 1 && entryAt(plain, path) !== undefined && !(path[0] === "bars" && path.length === 2)) {
-    const name = path.map(nameOfKey).join(" "), take = element("button", { type: "button", className: "take", textContent: `Take ${name} away` });
+    const name = path.map(nameOfKey).join(" "), take = element("button", { type: "button", className: "take", textContent: "Remove", ariaLabel: `Remove ${name}` });
     take.addEventListener("click", () => ask({ do: "remove", path }));
     box.append(take);
   }
