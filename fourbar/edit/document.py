@@ -81,6 +81,9 @@ class SceneDocument:
             holder.append(_table(value, tomlkit.nl()) if isinstance(holder, AoT) else _inline(value))
         elif isinstance(holder, (Table, InlineTable)) or holder is self.tree or isinstance(last, int):
             old = self.at(path)
+            if isinstance(old, Table):  # a table of its own is written anew, with its heading
+                del holder[last]
+                old = None
             holder[last] = _like(old, value) if old is not None else _written(path, value)
         else:
             raise InputError(dotted(path), value, "stands in no table")

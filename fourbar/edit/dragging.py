@@ -9,6 +9,8 @@ import math
 import re
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from fourbar.edit.document import Path, SceneDocument
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
@@ -94,7 +96,7 @@ def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], given: Dr
     Raises InputError where nothing of that name can be dragged, or the linkage does not assemble there.
     """
     own = command(scene)
-    where = Command(own.theta_2[:1] * 0.0 + given.theta_2, own.branch[:1], None, 0.0)
+    where = Command(np.array([given.theta_2]), own.branch[:1], None, 0.0)
     at = solve(scene, "position", at=where)
     pins = {"O2": 0j, "A": complex(*at.A[0]), "B": complex(*at.B[0])}
     pins["O4"] = cmath.rect(scene.linkage.ground, scene.linkage.ground_angle)

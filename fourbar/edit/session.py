@@ -142,15 +142,13 @@ class Session:
                 raise InputError("do", asked.get("do"), "must be one of " + ", ".join(ACTIONS))
             note = action(self, asked) or {}
             return self.answer() | note
-        except (FourBarError, OSError) as error:
+        except Exception as error:  # of a page whose request makes no sense too: the server goes on
             self.texts, self.place, self.now = before
             self.document = SceneDocument(self.now.text)
-            words = f"{error.key}: {error.allowed}" if isinstance(error, InputError) else str(error)
+            words = str(error) if isinstance(error, FourBarError | OSError) else f"this cannot be done: {error}"
+            if isinstance(error, InputError):
+                words = f"{error.key}: {error.allowed}"
             return {"refused": words, "text": self.now.text, "plain": self.now.plain}
-        except (TypeError, ValueError, KeyError, AttributeError) as error:
-            self.texts, self.place, self.now = before
-            self.document = SceneDocument(self.now.text)
-            return {"refused": f"this cannot be done: {error}", "text": self.now.text, "plain": self.now.plain}
 
     def change(self, alter: Callable[[SceneDocument], None], gesture: str = "") -> None:
         """Alter the document; what belongs to one gesture begins from the same state and is one step to undo."""

@@ -1,4 +1,4 @@
-"""Error bars of torque and pin forces: how far rounding makes them scatter.
+"""Error bars of what the drive does and of the pin forces: how far rounding makes them scatter.
 
 The forces are evaluated again with every number of the position, coefficient and term of a sum changed in its last
 digit. All roundings then fall differently, so the root mean square of the changes is of the size of the error
@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.evaluation.case import Case, Dynamics
-from fourbar.formulas.arithmetic import anywhere, select, two_sum
+from fourbar.formulas.arithmetic import angle, anywhere, select, two_sum
 from fourbar.formulas.motion import Coefficients, State, rates, side_may_turn_fast, side_turns_fast
-from fourbar.formulas.path import read_backwards
+from fourbar.formulas.path import read_from
 from fourbar.formulas.position import HalfAngle, Loop, Position
 
 EVALUATIONS = 14
@@ -80,7 +80,7 @@ def in_turn() -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
 def error_bars(
     case: Case, state: State, acceleration: Any, sign: Any, found: Dynamics, exact: NDArray[np.intp]
 ) -> dict[str, Any]:
-    """`torque_error` (N m) and `force_error` (N, worst of the four pin forces), each (n,).
+    """Compute that of the drive (N m or N) and `force_error` (N, worst of the four pin forces), by name, each (n,).
 
     Parameters
     ----------
@@ -88,25 +88,26 @@ def error_bars(
     exact : indices of the positions whose half angle is known in many digits.
     """
     rounded, path = Roundings(state.at.u1), case.path
-    q = state.theta_2 if path.bar == 2 else np.angle(state.at.u4)
+    q = state.theta_2 if state.q is None else state.q
     lost = two_sum(q, -path.theta_1)[1]
     known = exact.size > 0 and np.isin(np.arange(np.size(state.at.half.ss)), exact)
     half = rounded_half_angle(path.lengths, state.at.half, lost, known, rounded.next(6))
     near, k = path.motion(path.position(q, half, sign), sign)
     near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
-    k = k if path.bar == 2 else read_backwards(k)
-    k = rounded_coefficients(path.lengths, near, k, rounded.next(13))
-    k = k if path.bar == 2 else read_backwards(k)
+    k = read_from(path.bar, rounded_coefficients(path.lengths, near, read_from(path.bar, k), rounded.next(13)))
     nearby = state._replace(at=near, k=k, moving=rates(k, state.speed, acceleration))
+    if path.bar != 2:  # there both are found from the directions
+        to_O4, to_A = rounded(case.lengths.d * near.u1), case.lengths.a * near.u2
+        nearby = nearby._replace(at=near._replace(diagonal=rounded(to_O4 - to_A)), theta_2=rounded(angle(near.u2)))
     other = case.dynamics(nearby, acceleration, case.side, rounded)
-    values, others = (*found.pins, found.torque), (*other.pins, other.torque)
+    values, others = (*found.pins, found.drive), (*other.pins, other.drive)
     spread = root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))
     size = np.array([np.abs(value) for value in values]).reshape(spread.shape)
-    force_error, torque_error = bar(
+    force_error, drive_error = bar(
         np.array([spread[:4].max(axis=0), spread[4]]), np.array([size[:4].max(axis=0), size[4]])
-    ).reshape(2, *np.shape(found.torque))
-    return {"torque_error": torque_error, "force_error": force_error}
+    ).reshape(2, *np.shape(found.drive))
+    return {case.names.error: drive_error, "force_error": force_error}
 
 
 def rounded_real(x: Any, sign: Any) -> Any:

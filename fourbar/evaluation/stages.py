@@ -11,13 +11,14 @@ from fourbar.evaluation.withheld import no_value
 from fourbar.formulas.arithmetic import angle, anywhere
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.position import HalfAngle
+from fourbar.formulas.position import HalfAngle, Position
 from fourbar.quantities import (
     ANGLES,
     JAMMED,
     NO_DIRECTION,
+    NO_LEVER,
     NOT_ASSEMBLED,
-    OF_DRY_FRICTION,
+    OF_LINE,
     OK,
     OVERFLOW,
     SINGULAR,
@@ -41,37 +42,51 @@ Part = tuple[Any, ...]
 """Index of some positions in the arrays of all."""
 
 
-WITHOUT_FORCES = (NO_DIRECTION, WOUND)
-"""Statuses of positions at which an effect has no value, and so the forces have none."""
+WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
+"""Statuses of positions at which an effect or the drive has no value, and so the forces have none."""
 
 
 def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """Evaluate some positions of a command to the input.
+    """Evaluate some positions of a command.
 
     Parameters
     ----------
     wanted : number of the last stage that the quantities named need.
     """
-    theta_2: Any = where.theta_2[part]
-    if theta_2.ndim == 0:
-        theta_2 = theta_2.item()  # with Python's own numbers a formula takes half the time
+    q: Any = where.angle[part]
+    if q.ndim == 0:
+        q = q.item()  # with Python's own numbers a formula takes half the time
     branch = sign_of(where.branch[part])
-    half, exact = case.half_angle(theta_2, where.remainder)
-    of_angles = len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
+    half, exact = case.half_angle(q, where.remainder)
+    of_angles = where.bar == 2 and len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
     if of_angles and where.remainder is None and not case.path.may_stay_parallel:
         return _angles(case, half, branch, names)
-    at = case.path.position(theta_2, half, branch)
+    at = case.path.position(q, half, branch)
     codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
     if anywhere(codes):  # velocities are 0/0
         at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
-    omega_2, alpha_2 = piece(where.omega_2, part), piece(where.alpha_2, part)
-    state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
+    speed, acceleration = piece(where.speed, part), piece(where.acceleration, part)
+    state = case.state(case.path, q, at, branch, speed, acceleration, moving=wanted > 0)
     values = kinematics(case, state, names)
+    if where.bar != 2:
+        values |= {name: value for name, value in of_command(case, at, state, q).items() if name in names}
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
-        codes, forces = _forces(case, state, alpha_2, branch, branch, codes, names, known)
+        codes, forces = _forces(case, state, acceleration, branch, branch, codes, names, known)
         values |= forces
-    return codes, values, at
+    return codes, values, state.at
+
+
+def of_command(case: Case, at: Position, state: State, q: Any) -> dict[str, Any]:
+    """Quantities that a command of bar 3 or 4 has in the place of others: its angle as commanded, theta_2, its sine.
+
+    Parameters
+    ----------
+    at : in the order in which the path reads the loop.
+    """
+    if case.path.bar == 2:
+        return {}
+    return {f"theta_{case.path.bar}": q, "theta_2": state.theta_2, "condition": abs(at.sin_mu)}
 
 
 def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:
@@ -103,30 +118,28 @@ def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> E
 
 
 def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """Evaluate instants of a free motion that have one independent angle; there is no driving torque."""
+    """Evaluate instants of a free motion that have one independent angle; the drive does nothing."""
     codes = np.zeros(len(part[0]), dtype=np.uint8)
     if not codes.size:
         return codes, {}, None
     bar = int(moved.bar[part][0])
-    free = case._replace(drive_bar=bar, path=moved.paths[bar], side=moved.side[part])
+    free = case._replace(drive_bar=bar, drive=None, path=moved.paths[bar], side=moved.side[part])
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
     at = free.path.position(q, free.path.half_angle(q), branch)
-    state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.theta_2[part])
+    state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.angle[part])
     values = kinematics(case, state, names)
     if wanted >= FORCE:
         exact = NOWHERE if wanted == ERROR else None
         codes, forces = _forces(free, state, growth, None, branch, codes, names, exact)
         values |= forces
-        values |= {
-            name: np.zeros(codes.shape) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)
-        }
+        values |= {name: np.zeros(codes.shape) for name in (*case.names, "power") if name in names}
     return codes, values, None
 
 
 def _forces(
     case: Case,
     state: State,
-    alpha_2: Any,
+    acceleration: Any,
     branch: NDArray[np.int8] | None,
     sign: Any,
     codes: Any,
@@ -141,25 +154,29 @@ def _forces(
     sign : of the path's root.
     exact : indices of the positions known in many digits; None: no error bars.
     """
-    found = case.dynamics(state, alpha_2, case.side)
-    values: dict[str, Any] = {**found.pins._asdict(), "torque": found.torque}
+    found = case.dynamics(state, acceleration, case.side)
+    values: dict[str, Any] = {**found.pins._asdict(), case.names.value: found.drive}
+    if "power" in names:
+        values["power"] = found.drive * case.drive_speed(state)
     if "drive_condition" in names:
-        condition = abs(case.path.drive_sine(state.at, case.drive_bar))
+        condition = case.drive_condition(state)
         values["drive_condition"] = condition if found.from_jamming is None else condition * found.from_jamming
     if "friction_residual" in names:
         values["friction_residual"] = 0.0 if found.residual is None else found.residual
-    if "torque_low" in names or "torque_high" in names:
-        *ends, held = case.torque_interval(state, alpha_2, found.torque)
-        values |= zip(OF_DRY_FRICTION, ends, strict=True)
+    if case.names.low in names or case.names.high in names:
+        *ends, held = case.drive_interval(state, acceleration, found.drive)
+        values |= zip(case.names[2:], ends, strict=True)
         if held is not None and found.status is not None:
             found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
     if exact is not None:
         from fourbar.evaluation.error_bars import error_bars
 
-        values |= error_bars(case, state, alpha_2, sign, found, exact)
-    without = [status for term in case.terms if (status := term.status(state, branch)) is not None]
+        values |= error_bars(case, state, acceleration, sign, found, exact)
+    without: list[Any] = [status for term in case.terms if (status := term.status(state, branch)) is not None]
     if found.status is not None:
         without.append(found.status)
+    if case.drive is not None and (status := case.drive.status(state, case.sines(state.at))) is not None:
+        without.append(status)
     if without:
         codes = np.where(codes == OK, np.max(without, axis=0), codes).astype(np.uint8)
     if anywhere(codes > SINGULAR):
@@ -195,6 +212,10 @@ PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G
 def kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
     """Those of the quantities that come before the forces, a scene's own points among them."""
     values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
+    if case.drive is not None and not wanted.isdisjoint(OF_LINE):
+        stroke, unit = case.drive.line(state)
+        own = {"stroke": stroke, "drive_line": unit, "stroke_speed": case.drive.speed(state)}
+        values |= {name: value for name, value in own.items() if name in wanted}
     if not case.points and wanted.isdisjoint(PLACES):
         return values
     lengths, (two, three, four) = case.lengths, case.bodies

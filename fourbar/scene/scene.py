@@ -6,16 +6,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, expect
-from fourbar.formulas.mobility import default_range, limit_positions, on_smooth_path
-from fourbar.linkage import FourBar, require_bar
+from fourbar.errors import InputError, LimitError, expect
+from fourbar.formulas.mobility import default_range, limit_angles, on_smooth_path
+from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.scene.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
+from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.point import Point
 from fourbar.scene.tolerance import Tolerance
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, Load
+    from fourbar.effects import Effect, LinearDrive, Load
     from fourbar.files.pictures import Picture
 
 
@@ -26,19 +27,21 @@ class Scene:
     Parameters
     ----------
     linkage : bars and ground, as `uniform` or `FourBar` make them.
-    motion : what the input does: angles, speed, branch.
-    drive_bar : 2, 3 or 4, on which the drive's torque acts.
+    motion : what the commanded bar does: angles, speed, branch.
+    drive_bar : 2, 3 or 4, on which the drive's torque acts; left out: 2.
     loads : forces and couples, `Load`.
     effects : `Gravity`, `Viscous`, `Friction`, ...: only what acts, each kind once.
     title, source : words.
     pictures : of bars, as a scene file names them.
     points : points of bars whose paths are wanted, `Point`.
     tolerances : of numbers by their keys in a scene file, `Tolerance`.
+    drive : along a line, `LinearDrive`, in place of a torque on a bar.
     """
 
     linkage: FourBar
     motion: Motion = field(default_factory=Motion)
-    drive_bar: int = 2
+    drive_bar: int = None  # type: ignore[assignment]  # resolved below
+    """2, where nothing is stated; None where the drive is linear."""
     loads: "tuple[Load, ...]" = ()
     effects: "tuple[Effect, ...]" = ()
     title: str = ""
@@ -46,12 +49,17 @@ class Scene:
     pictures: "tuple[Picture, ...]" = ()
     points: tuple[Point, ...] = ()
     tolerances: tuple[Tolerance, ...] = ()
+    drive: "LinearDrive | None" = None
 
     def __post_init__(self) -> None:
         one = {"linkage": FourBar, "motion": Motion, "title": str, "source": str}
         for name, kind in one.items():
             expect(name, getattr(self, name), kind)
-        object.__setattr__(self, "drive_bar", require_bar("drive.bar", self.drive_bar))
+        if self.drive is None:
+            bar = 2 if self.drive_bar is None else require_bar("drive.bar", self.drive_bar)
+            object.__setattr__(self, "drive_bar", bar)
+        else:
+            self._require_linear(self.drive)
         from fourbar.effects.effect import Effect
 
         many = {"loads": Effect, "effects": Effect, "pictures": object, "points": Point, "tolerances": Tolerance}
@@ -69,6 +77,16 @@ class Scene:
         if len({picture.bar for picture in self.pictures}) < len(self.pictures):
             raise InputError("pictures", [picture.bar for picture in self.pictures], "a bar has one picture")
 
+    def _require_linear(self, drive: object) -> None:
+        """InputError where the drive is none along a line, acts on a bar too, or never moves its ends."""
+        from fourbar.effects.linear_drive import LinearDrive
+
+        expect("drive", drive, LinearDrive)
+        if self.drive_bar is not None:
+            raise InputError("drive.bar", self.drive_bar, "a drive acts on a bar or along a line: bar, or from and to")
+        assert isinstance(drive, LinearDrive)
+        drive.require_stroke(self.linkage)
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Scene):
             return NotImplemented
@@ -84,50 +102,84 @@ class Scene:
 
 
 class Command(NamedTuple):
-    """What the input bar must do at each of n independent positions."""
+    """What one bar, the input unless another is named, must do at each of n independent positions."""
 
-    theta_2: Array
+    angle: Array
     """(n,), rad."""
     branch: NDArray[np.int8]
-    """(n,), +1 or -1."""
-    omega_2: float | Array | None
+    """(n,), +1 or -1: the sign of the sine between the two other moving bars, as `Motion` has it."""
+    speed: float | Array | None
     """rad/s; None: positions only."""
-    alpha_2: float | Array
+    acceleration: float | Array
     """rad/s^2."""
     remainder: Any = None
-    """What theta_2 as a double leaves out of the one angle meant (mpmath), rad: a limit position plus its offset."""
+    """What the angle as a double leaves out of the one angle meant (mpmath), rad: a limit position plus its offset."""
     time: Array | None = None
     """(n,), s; where the motion is given over time."""
+    bar: int = 2
+
+    @property
+    def commanded(self) -> str:
+        """Name of the angle."""
+        return COMMANDS[self.bar][0]
+
+    @property
+    def theta_2(self) -> Array:
+        """Of the input, where that is commanded; InputError where it is not."""
+        self._require_input()
+        return self.angle
+
+    @property
+    def omega_2(self) -> float | Array | None:
+        """Of the input, likewise."""
+        self._require_input()
+        return self.speed
+
+    @property
+    def alpha_2(self) -> float | Array:
+        """Of the input, likewise."""
+        self._require_input()
+        return self.acceleration
+
+    def _require_input(self) -> None:
+        if self.bar != 2:
+            raise InputError("at", self.commanded, "is commanded, and theta_2 is not")
+
+
+def require_input(scene: Scene, what: str) -> None:
+    """Raise a LimitError where what is asked for takes a command of the input alone, and another bar has it."""
+    if scene.motion.bar != 2:
+        raise LimitError(f"motion.{scene.motion.names[0]}: {what} takes a command of theta_2 alone")
 
 
 def command(scene: Scene) -> Command:
     """List the positions that the scene's motion names, each with its branch."""
     expect("scene", scene, Scene)
-    motion, linkage = scene.motion, scene.linkage
-    stated, remainder, time = motion.theta_2, None, None
-    omega_2: float | Array | None = motion.omega_2
-    alpha_2: float | Array = motion.alpha_2
+    motion, linkage, bar = scene.motion, scene.linkage, scene.motion.bar
+    stated, remainder, time = motion.angle, None, None
+    speed: float | Array | None = motion.speed
+    acceleration: float | Array = motion.acceleration
     if motion.law is not None:
         time = motion.law.times()
-        theta_2, omega_2, alpha_2 = motion.law.at(time)
+        angle, speed, acceleration = motion.law.at(time)
     elif stated is None:
-        theta_2 = np.linspace(*default_range(linkage), DEFAULT_STEPS + 1)
+        angle = np.linspace(*default_range(linkage, bar), DEFAULT_STEPS + 1)
     elif isinstance(stated, Sweep):
-        theta_2 = np.linspace(stated.start, stated.stop, stated.steps + 1)
+        angle = np.linspace(stated.start, stated.stop, stated.steps + 1)
     elif isinstance(stated, FromLimit):
-        limits = limit_positions(linkage)
+        key, limits = f"motion.theta_{bar}.limit", limit_angles(linkage, bar)
         if not limits:
-            raise InputError("motion.theta_2.limit", stated.limit, "the input of this linkage has no limit positions")
+            raise InputError(key, stated.limit, f"the {BAR_NAMES[bar]} of this linkage has no limit positions")
         if stated.limit > len(limits):
-            raise InputError("motion.theta_2.limit", stated.limit, f"must be from 1 to {len(limits)}")
+            raise InputError(key, stated.limit, f"must be from 1 to {len(limits)}")
         from fourbar.formulas.many_digits import limit_remainder
 
-        limit = limits[stated.limit - 1].theta_2
-        theta_2 = np.array([limit + stated.offset])
-        remainder = limit_remainder(linkage, limit, float(theta_2[0]), stated.offset)
+        limit = limits[stated.limit - 1]
+        angle = np.array([limit + stated.offset])
+        remainder = limit_remainder(linkage, limit, float(angle[0]), stated.offset, bar)
     else:
-        theta_2 = np.array(stated, dtype=float, ndmin=1)
-    branch = np.full(theta_2.shape, motion.branch, dtype=np.int8)
+        angle = np.array(stated, dtype=float, ndmin=1)
+    branch = np.full(angle.shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
-        branch = on_smooth_path(linkage, theta_2, motion.branch)
-    return Command(theta_2, branch, omega_2, alpha_2, remainder, time)
+        branch = on_smooth_path(linkage, angle, motion.branch, bar)
+    return Command(angle, branch, speed, acceleration, remainder, time, bar)

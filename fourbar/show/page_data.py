@@ -14,7 +14,7 @@ from fourbar.files.pictures import data_uri
 from fourbar.files.scene_text import BARS
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, OK, PIN_FORCES
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, require_input
 from fourbar.show.acting import Symbol, acting
 from fourbar.show.duty import energies
 from fourbar.show.plot.style import length_unit
@@ -28,7 +28,17 @@ MAX_ROWS = 1441
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
-SCALARS = (*ANGLES, "condition", *RATES, "torque", "torque_error", "power")
+SCALARS = (
+    *ANGLES,
+    "condition",
+    *RATES,
+    "torque",
+    "torque_error",
+    "power",
+    "drive_force",
+    "drive_force_error",
+    "stroke",
+)
 
 
 def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
@@ -51,6 +61,7 @@ def live_data(
     signs : the branches of a sweep; left out: the scene's.
     stage : the last one evaluated; left out: as of `solve`.
     """
+    require_input(scene, "a page")
     linkage, motion = scene.linkage, scene.motion
     shown = _through_time(scene, stage) if over_time(scene) else _sweep(scene, signs or (motion.branch,), stage)
     closes = np.isfinite(shown["branches"][str(motion.branch)]["theta_3"])
@@ -130,7 +141,7 @@ def _through_time(scene: Scene, stage: str | None) -> dict[str, Any]:
     columns = _columns(solution)
     columns["theta_2"] = where.theta_2.tolist()
     if scene.motion.free is not None:
-        for name in ("torque", "torque_error", "power"):
+        for name in ("torque", "torque_error", "power", "drive_force", "drive_force_error"):
             columns.pop(name, None)
         columns["energy"] = energies(scene, solution).kinetic
     duration = float(where.time[-1] - where.time[0])

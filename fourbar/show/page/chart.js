@@ -9,6 +9,7 @@ const quantitiesOf = () => [
   ...POINTS.flatMap(([name]) => [other(`v_${name}`, `speed of ${typeset(name)}`, "m/s"), other(`a_${name}`, `acceleration of ${typeset(name)}`, "m/s^2")]),
   other("energy", "kinetic energy", "J"), other("torque", `torque on bar ${data.drive_bar}`, "N m"), other("power", "power of the drive", "W"),
   angle("transmission", "transmission angle"),
+  other("drive_force", "force of the drive", "N"), other("stroke", "stroke", "m"),
   ...FORCES.map(name => other(name, `|${typeset(name)}|`, "N")),
 ];
 let QUANTITIES = quantitiesOf(), reference = null;   // reference: the curves of another state, drawn thin behind

@@ -106,8 +106,8 @@ function show(about, own) {
 }
 
 // ---- the table of positions --------------------------------------------------------------------------
-const COLUMNS = ["torque", "torque_error", "drive_force", "power", ...FORCES, "transmission"];
-const LABELS = { torque_error: ["error bar", "N m"], torque: ["torque", "N m"], power: ["power", "W"], drive_force: ["drive force", "N"], transmission: ["transmission angle", "rad"] };
+const COLUMNS = ["torque", "torque_error", "drive_force", "drive_force_error", "power", ...FORCES, "transmission"];
+const LABELS = { torque_error: ["error bar", "N m"], torque: ["torque", "N m"], power: ["power", "W"], drive_force: ["drive force", "N"], drive_force_error: ["error bar", "N"], transmission: ["transmission angle", "rad"] };
 function showPositions() {
   const body = byId("positions").tBodies[0], t = table(), names = COLUMNS.filter(name => name in t);
   if (!byId("table-of").open) return;
@@ -119,7 +119,7 @@ function showPositions() {
   rows.forEach((i, n) => {
     const at = body.rows[n] ?? rowOf(body);
     at.dataset.row = i;
-    const texts = names.map(name => { const v = t[name][i]; return Array.isArray(v) ? text(v[0] === null ? null : inUnit("N", Math.hypot(...v))) : text(v === null ? null : v * factor(LABELS[name][1]), name === "torque_error" ? 2 : 5); });
+    const texts = names.map(name => { const v = t[name][i]; return Array.isArray(v) ? text(v[0] === null ? null : inUnit("N", Math.hypot(...v))) : text(v === null ? null : v * factor(LABELS[name][1]), name.endsWith("_error") ? 2 : 5); });
     at.cells[0].firstChild.textContent = (grid[i] * DEG).toFixed(2);
     if (throughTime) texts.unshift(data.time[i].toFixed(clock));
     while (at.cells.length > texts.length + 1) at.deleteCell(-1);

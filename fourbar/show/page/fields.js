@@ -66,7 +66,7 @@ function group(path, node, example) {
     else if (path.length || inner !== undefined || model !== undefined || partsAt(own).length) box.append(branchOf(own, inner, model));
   }
   for (const part of partsAt(path)) box.append(part);
-  if (path.length > 1 && entryAt(plain, path) !== undefined && !(path[0] === "bars" && path.length === 2)) {
+  if ((path.length > 1 || path[0] === "drive" && node?.from) && entryAt(plain, path) !== undefined && !(path[0] === "bars" && path.length === 2)) {
     const name = path.map(nameOfKey).join(" "), take = element("button", { type: "button", className: "take", textContent: "Remove", ariaLabel: `Remove ${name}` });
     take.addEventListener("click", () => ask({ do: "remove", path }));
     box.append(take);
@@ -81,6 +81,7 @@ function partsAt(path) {
   const rows = offers.parts.map((part, n) => [part, n]).filter(([{ at }]) => at.length === path.length + 1 && path.every((step, k) => at[k] === step));
   const free = rows.filter(([{ at }]) => {
     const last = at[at.length - 1], inner = entryAt(plain, at);
+    if (last === "drive") return !plain.drive?.from;
     return last === -1 || last === "" ? path.length === 1 || entryAt(plain, path) !== undefined : path.length === 2 && path[0] === "effects" ? entryAt(plain, path) !== undefined && inner === undefined : inner === undefined || (at[0] === "motion" && last === "theta_2" && scalar(inner));
   });
   if (!free.length) return [];

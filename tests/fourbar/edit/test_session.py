@@ -77,8 +77,6 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
             document.remove(["motion", "omega_2"])
         if place[-1] == "free":
             document.set(["motion", "theta_2"], "60 deg")
-        if place[0] == "drive":
-            document.remove(["drive"])
         if place[0] == "effects" and len(place) == 3:
             document.put(place[:2], next(p["value"] for p in offers()["parts"] if p["at"] == place[:2]))
         before = document.text()
@@ -141,7 +139,7 @@ def dragged(session: Session, what, to: complex, **more) -> dict:
 def at_50(session: Session) -> fourbar.Solution:
     scene = session.now.scene
     where = fourbar.command(scene)
-    at = where._replace(theta_2=np.array([math.radians(50.0)]), branch=where.branch[:1])
+    at = where._replace(angle=np.array([math.radians(50.0)]), branch=where.branch[:1])
     return fourbar.solve(scene, at=at)
 
 

@@ -119,15 +119,22 @@ def place(point: Any, ground_angle: float) -> tuple[float, float]:
 
 
 def speeds(at: Command) -> tuple[Array, Array]:
-    """omega_2 and alpha_2 of each position, (n,); an omega_2 that is not stated is 0."""
+    """omega_2 and alpha_2 of each position, or those of the commanded bar, (n,); a speed that is not stated is 0."""
     omega, alpha = (
-        np.broadcast_to(np.asarray(0.0 if x is None else x, float), at.theta_2.shape) for x in (at.omega_2, at.alpha_2)
+        np.broadcast_to(np.asarray(0.0 if x is None else x, float), at.angle.shape) for x in (at.speed, at.acceleration)
     )
     return omega, alpha
 
 
-def unknown_effect(scene: Scene, table: Container[str]) -> str:
-    """Give the reason to refuse a scene with an effect that a table has no row for; empty where there is none."""
+def unknown_effect(scene: Scene, table: Container[str], *, linear: bool = False) -> str:
+    """Give the reason to refuse a scene with an effect that a table has no row for; empty where there is none.
+
+    Parameters
+    ----------
+    linear : whether a drive along a line is known.
+    """
+    if scene.drive is not None and scene.motion.free is None and not linear:
+        return "the linear drive (drive.from, drive.to) has no model here"
     return next(
         (f"the effect {effect.key!r} has no model here" for effect in scene.effects if effect.key not in table), ""
     )
