@@ -102,14 +102,14 @@ function arrowShares(name, i) {
 // The greatest scale at which pins keep a margin and arrows with their names stay inside, and the length of an arrow.
 function fitted(points, tips, margin) {
   const edge = 30, side = Math.min(view.width, view.height);
-  const ends = [0, 1].map(j => points.reduce(([low, high], point) => [Math.min(low, point[j]), Math.max(high, point[j])], [Infinity, -Infinity]));
-  const reach = (j, k, arrow) => {
-    let low = Infinity, high = -Infinity;
-    const take = (value, around) => { low = Math.min(low, value - around); high = Math.max(high, value + around); };
-    for (const end of ends[j]) take(k * end, margin);
-    for (const [foot, ...shares] of tips) for (const share of shares) take(k * foot[j] + arrow * share[j], edge);
-    return [low, high];
+  // of all tips k foot + arrow share only those count that no other exceeds in both
+  const far = (j, sign) => {
+    let most = -Infinity;
+    const both = tips.flatMap(([foot, ...shares]) => shares.map(share => [sign * foot[j], sign * share[j]]));
+    return both.sort((p, q) => q[0] - p[0] || q[1] - p[1]).filter(([, share]) => share > most && ((most = share), true));
   };
+  const ends = [0, 1].map(j => [-1, 1].map(sign => ({ point: points.reduce((most, point) => Math.max(most, sign * point[j]), -Infinity), tips: far(j, sign), sign })));
+  const reach = (j, k, arrow) => ends[j].map(({ point, tips, sign }) => sign * Math.max(k * point + margin, ...tips.map(([foot, share]) => k * foot + arrow * share + edge)));
   const fits = (k, arrow) => [view.width, view.height].every((size, j) => { const [low, high] = reach(j, k, arrow); return high - low <= size; });
   const largest = arrow => {
     let low = 0, high = side / Math.max(...lengths);
