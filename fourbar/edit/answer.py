@@ -15,14 +15,13 @@ from fourbar.errors import NotAssembledError
 from fourbar.scene import Scene
 from fourbar.show.page_data import live_data
 from fourbar.show.tables import heading
-from fourbar.show.tolerances import embedded_tolerances
 from fourbar.show.words import type_lines
 from fourbar.solution import DEGREES, Conversion, Solution
 from fourbar.solve import last_stage, solve
 
 
 def scene_data(scene: Scene, plain: dict[str, Any], units: Conversion, *, settled: bool = False) -> dict[str, Any]:
-    """Evaluate a scene for the page; `settled`: with error bars, summary and tolerances, which cost more than the rest.
+    """Evaluate a scene for the page; `settled`: with error bars and summary, which cost more than the rest.
 
     Raises NotAssembledError where no position assembles, InputError as `solve` does.
     """
@@ -34,8 +33,6 @@ def scene_data(scene: Scene, plain: dict[str, Any], units: Conversion, *, settle
     data["handles"] = [handle.drawn() for handle in handles(scene, plain)]
     if settled:
         data["summary"] = summary(scene, own, units)
-        if scene.tolerances:
-            data["tolerances"] = embedded_tolerances(scene, data["theta_2"])
     return data
 
 

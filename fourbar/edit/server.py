@@ -23,6 +23,7 @@ from fourbar.edit.session import Session
 from fourbar.edit.witness import HarnessRun
 from fourbar.errors import FourBarError, InputError
 from fourbar.show.animate import page
+from fourbar.show.tolerances import embedded_tolerances
 
 LOOPBACK = "127.0.0.1"
 LARGEST_REQUEST = 2_000_000
@@ -34,6 +35,8 @@ GONE = 10.0
 """s, after which the server ends when the last page has gone."""
 SETTLED = 0.15
 """s without a change, after which error bars follow."""
+STILL = 1.0
+"""s without a change, after which the spreads of tolerances are sampled: that takes seconds."""
 KEPT = 0.3
 """s, after which a change is written to the state file."""
 
@@ -48,6 +51,7 @@ class Workbench:
         self.pages: set[PageLine] = set()
         self.waiting: deque[tuple[PageLine, dict[str, Any]]] = deque()
         self.one = ThreadPoolExecutor(1)  # the session is touched from this thread alone
+        self.aside = ThreadPoolExecutor(1)  # what takes seconds
         self.working: asyncio.Task[None] | None = None
         self.timers: dict[str, asyncio.TimerHandle] = {}
         self.check = HarnessRun(session.exports.folder / "check", self.tell)
@@ -94,6 +98,7 @@ class Workbench:
             return
         self.waiting.append((line, asked))
         self.never("settle")
+        self.never("sample")
         if self.working is None or self.working.done():
             self.working = asyncio.create_task(self._work())
 
@@ -131,6 +136,15 @@ class Workbench:
             about = await self.loop.run_in_executor(self.one, lambda: self.session.answer(settled=True))
             if not self.waiting:
                 self.tell(about)
+                self.later("sample", STILL, lambda: asyncio.create_task(self._sample(about["data"]["theta_2"])))
+
+    async def _sample(self, theta_2: list[float]) -> None:
+        """Send what the tolerances do, unless something has changed meanwhile."""
+        scene = self.session.now.scene
+        if scene.tolerances:
+            found = await self.loop.run_in_executor(self.aside, embedded_tolerances, scene, theta_2)
+            if scene is self.session.now.scene:
+                self.tell({"tolerances": found})
 
     async def serve(self, port: int, browse: bool) -> None:
         """Serve until all pages have gone, or until Ctrl-C."""
@@ -169,6 +183,7 @@ class Workbench:
             await asyncio.wait({self.check.task}, timeout=5.0)
         await self.loop.run_in_executor(self.one, lambda: self.session.end(gone=gone))
         self.one.shutdown()
+        self.aside.shutdown(wait=False, cancel_futures=True)
 
 
 class Guarded(RequestHandler):

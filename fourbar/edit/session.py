@@ -87,8 +87,8 @@ class Session:
         write_bytes(self.state_file, json.dumps(kept).encode(), private=True)
 
     def end(self, *, gone: bool) -> None:
-        """Take the state file away where everything is saved and no page is left (`gone`) that would go on."""
-        if gone and self.saved:
+        """Take the state file away where all is saved, or nothing was changed, and no page is left (`gone`)."""
+        if gone and (self.saved or len(self.texts) == 1):
             self.state_file.unlink(missing_ok=True)
         else:
             self.keep()

@@ -9,6 +9,7 @@ import hashlib
 import html
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -94,7 +95,10 @@ def page(
         connect=f"connect-src ws://{live.split('/')[2]}; " if live else "",
         panel=asset("edit.html") if live else "",
         results=asset("bench.html") if live else "",
-        data=embedded(page_data(scene, pictures or {}, units) | {"vectors": vectors, "live": live}),
+        data=embedded(
+            page_data(replace(scene, tolerances=()) if live else scene, pictures or {}, units)
+            | {"vectors": vectors, "live": live}
+        ),
     )
 
 

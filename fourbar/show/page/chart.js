@@ -70,7 +70,7 @@ function comparison(name, values) {
 function drawChart() {
   const moves = edited ? data.omega_2 !== null : "omega_3" in table();
   const available = QUANTITIES.filter(([name]) => /^[va]_/.test(name) ? moves : edited ? /^(theta|omega|alpha)_[34]$/.test(name) && (moves || name.startsWith("theta")) : name in table());
-  const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => q[0] === "torque") ?? available[0])[0];
+  const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => ["torque", "drive_force"].includes(q[0])) ?? available[0])[0];
   select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
   const values = column(wanted);
   const behind = reference?.throughTime === timed() ? reference.values[wanted] ?? [] : [];

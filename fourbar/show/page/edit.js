@@ -62,6 +62,7 @@ function take(about) {
   else if (own) { refuse(own.path, ""); refuse(null, ""); }
   if (about.ask) { byId("ask").firstElementChild.textContent = about.ask; byId("ask").hidden = false; }
   if (about.data && !about.compared && !(about.settled && (inFlight || waiting.length))) show(about, own);
+  if (about.tolerances && data.summary) { data.tolerances = about.tolerances; furnishTolerances(); drawBands(); showSpreads(row); }
   if (about.note) say(about.note);
   if (about.bodies) { byId("bodies-picture").src = about.bodies; byId("bodies-picture").hidden = false; }
   if (own && about.data) {

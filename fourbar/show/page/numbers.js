@@ -93,6 +93,7 @@ function showNumbers(i) {
   const across = v.theta_3 === undefined || v.theta_3 === null ? null : Math.atan2(Math.abs(Math.sin(v.theta_4 - v.theta_3)), Math.abs(Math.cos(v.theta_4 - v.theta_3)));
   byId("mu").textContent = degrees(across);
   byId("torque").textContent = text(inUnit("N m", v.torque));
+  byId("drive_force").textContent = text(inUnit("N", v.drive_force));
   byId("torque-error").textContent = Number.isFinite(v.torque_error) ? `give or take ${text(inUnit("N m", v.torque_error), 2)}` : "";
   byId("energy").textContent = text(inUnit("J", v.energy));
   if (dynamic()) {

@@ -127,6 +127,7 @@ function refresh() {
   for (const element of document.querySelectorAll(".swept")) element.hidden = timed();
   for (const element of document.querySelectorAll(".timed")) element.hidden = !timed();
   for (const element of document.querySelectorAll(".driven")) element.hidden = !shows("torque");
+  for (const element of document.querySelectorAll(".pushed")) element.hidden = !shows("drive_force");
   for (const element of document.querySelectorAll(".erring")) element.hidden = !shows("torque_error");
   for (const element of document.querySelectorAll(".energy")) element.hidden = !shows("energy");
   byId("original").disabled = !edited;
