@@ -76,7 +76,7 @@ function fit() {
     const own = [...[2, 4].filter(k => data.centres[k]).map(k => barPoint(p, k, data.centres[k])), ...data.points.map(point => framed(p, point.bar, point.at))];
     own.forEach((place, n) => { traces[n] = (traces[n] ?? "") + `${broken ? "M" : "L"}${place[0]} ${place[1]} `; });
     points.push(...reached, ...actingPoints(p), ...own);
-    if (dynamic()) for (const name of FORCES) tips.push([p[FORCE_PIN[name]], ...arrowShares(name, i)]);
+    if (dynamic() && !held) for (const name of FORCES) tips.push([p[FORCE_PIN[name]], ...arrowShares(name, i)]);
     curve.push([broken ? "M" : "L", g]);
     broken = false;
   }
