@@ -125,7 +125,7 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, t
         "<b>"
     )
     driver.find_element("id", "save").click()
-    wait_for(driver, "document.getElementById('bench').textContent.includes('saved')")
+    wait_for(driver, "/^saved|is saved/.test(document.getElementById('bench').textContent)")
     solution = fourbar.solve(loads(path.read_text(), str(path)), "error")
     for row in (0, 90, 217):
         driver.execute_script(f"go({row})")
