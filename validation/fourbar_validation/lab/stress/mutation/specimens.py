@@ -54,6 +54,12 @@ SPECIMENS: dict[str, Scene] = {
         drive_bar=None,  # type: ignore[arg-type]
         drive=LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7)),
     ),
+    "stroke": replace(
+        CRANK_ROCKER,
+        motion=Motion(stroke=Sweep(0.25, 0.35, 12), stroke_speed=0.2, stroke_acceleration=0.1, side="left"),
+        drive_bar=None,  # type: ignore[arg-type]
+        drive=LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)),
+    ),
     "cylinder on the ground": replace(
         CRANK_ROCKER,
         drive_bar=None,  # type: ignore[arg-type]
