@@ -8,7 +8,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, anywhere, dot, polar, power_of_two, sine, vector
+from fourbar.formulas.arithmetic import (
+    Number,
+    anywhere,
+    dot,
+    is_zero,
+    namespace,
+    polar,
+    power_of_two,
+    select,
+    sine,
+    vector,
+)
 from fourbar.formulas.motion import Coefficients, State, coefficients, rates, with_sines_of_rates
 from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
 from fourbar.formulas.position import HalfAngle, Loop, Position, close_loop, direction, half_angle, loop, parallel_pairs
@@ -48,10 +59,10 @@ class Path(NamedTuple):
         half : of q.
         branch : sign of the root in that order: for bar 2 the branch, for bar 4 that of sin(theta_3 - theta_2).
         """
-        turned, along = self.theta_1 != 0.0, anywhere(self.theta_1 == 0.0)
+        turned, along = self.theta_1 != 0.0, anywhere(is_zero(self.theta_1))
         u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
-        if isinstance(turned, np.ndarray):  # of linkages
-            u2 = np.where(turned, direction(q), u2)
+        if along and anywhere(turned):  # of linkages
+            u2 = select(turned, direction(q), u2)
         at = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
             at = parallel_position(at, *parallel_pairs(self.lengths, half, branch))
@@ -81,7 +92,7 @@ class Path(NamedTuple):
         at = with_sines_of_rates(self.lengths, at, k)
         if self.may_stay_parallel:
             first, second = parallel_pairs(self.lengths, at.half, branch)
-            known = ~np.isnan(at.root)
+            known = ~namespace(at.root).isnan(at.root)
             k = parallel_motion(k, first & known, second & known)
         return (at, k) if self.bar == 2 else (_turned_round(self, at), read_backwards(k))
 
@@ -91,8 +102,8 @@ class Path(NamedTuple):
             return drive_sine(at, drive_bar)
         sine = drive_sine_of_triangle(self.lengths, at, drive_bar)
         if self.may_stay_parallel:  # whose directions are exact
-            first, second = parallel_pairs(self.lengths, at.half, np.sign(at.root))
-            sine = np.where(first | second, drive_sine(at, drive_bar), sine)
+            first, second = parallel_pairs(self.lengths, at.half, namespace(at.root).sign(at.root))
+            sine = select(first | second, drive_sine(at, drive_bar), sine)
         return sine
 
 
@@ -104,7 +115,7 @@ def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     if bar == 4:
         a, c, theta_1 = c, a, theta_1 + np.pi
     own = loop(d, a, b, c)
-    return Path(bar, own, theta_1, polar(1.0, theta_1), unit, anywhere((own.E1 == 0.0) & (own.E2 == 0.0)))
+    return Path(bar, own, theta_1, polar(1.0, theta_1), unit, anywhere(is_zero(own.E1) & is_zero(own.E2)))
 
 
 def singular(at: Position, margin: float = NO_DIGIT_LEFT) -> Number:
