@@ -40,6 +40,7 @@ if _TYPE_CHECKING:
     from fourbar.effects import Flywheel as Flywheel
     from fourbar.effects import Friction as Friction
     from fourbar.effects import Gravity as Gravity
+    from fourbar.effects import LinearDrive as LinearDrive
     from fourbar.effects import Load as Load
     from fourbar.effects import PinFriction as PinFriction
     from fourbar.effects import Spring as Spring
@@ -64,7 +65,10 @@ if _TYPE_CHECKING:
     from fourbar.studies.study import Study as Study
     from fourbar.studies.study import vary as vary
 
-_EFFECTS = (*("Flywheel", "Friction", "Gravity", "Load", "PinFriction", "Spring", "Springs", "Torsion", "Viscous"),)
+_EFFECTS = (
+    *("Flywheel", "Friction", "Gravity", "LinearDrive", "Load", "PinFriction", "Spring", "Springs"),
+    *("Torsion", "Viscous"),
+)
 _ON_FIRST_USE = {
     **{name: "fourbar.effects" for name in _EFFECTS},
     **{name: "fourbar.files" for name in ("dump", "load", "save")},

@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import require
-from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES, STATUS_NAMES, UNITS, Quantities, is_scalar
+from fourbar.quantities import NOT_ASSEMBLED, OF_LINE, PIN_FORCES, STATUS_NAMES, UNITS, Quantities, is_scalar
 from fourbar.writing import between, data_frame, extent, listed, write_text
 
 Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+    from fourbar.effects import LinearDrive
 
 SCHEMA = "fourbar-analyze/1"
 Conversion = Mapping[str, tuple[str, float]]
@@ -39,6 +41,7 @@ class Solution(Quantities):
 
     title: str
     drive_bar: int
+    """2, 3 or 4; None where the drive is linear."""
     status_code: NDArray[np.uint8]
     """0 ok: every quantity that was requested is a number. 1 not_assembled, 2 singular (velocities are 0/0); of
     friction that depends on the pin forces: 3 jammed (no forces fulfil it: they are NaN; at rest, where it is the
@@ -47,7 +50,8 @@ class Solution(Quantities):
     rest). 7 no_torque: the two bars that are not driven are in line, no couple on the driven bar holds them in balance,
     forces are NaN (T3 and T4 have these poles where omega_3, omega_4 are 0). 8 overflow: numbers beyond the range of
     doubles; from the first stage (position, velocity, ...) that meets them on everything is NaN. 9 invalid: a member of
-    a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN."""
+    a study with numbers that a scene refuses (a length that is not positive, a mass below 0); all of it is NaN.
+    10 no_lever: the line of the drive has none there, its stroke stands still, forces are NaN."""
     branch: NDArray[np.int8]
     """+1 open, -1 crossed."""
     points: dict[str, Array] = field(default_factory=dict, init=False)
@@ -58,6 +62,8 @@ class Solution(Quantities):
     """Their accelerations, m/s^2."""
     ground: tuple[Any, Any] | None = field(default=None, init=False)
     """Length and angle of the ground bar, m and rad; of a study (m, 1) each where they vary."""
+    drive: "LinearDrive | None" = field(default=None, init=False)
+    """Where the drive is linear."""
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached a limit position or change point, s; None: it did not."""
 
@@ -67,20 +73,16 @@ class Solution(Quantities):
     def __repr__(self) -> str:
         """Say in ten lines what it holds."""
         counts = zip(STATUS_NAMES, np.bincount(self.status_code.ravel(), minlength=len(STATUS_NAMES)), strict=True)
-        shown = parts_of({name: values_of(self, name) for name in _quantities(self)}, scalars=("theta_2", "torque"))
+        shown = parts_of(
+            {name: values_of(self, name) for name in _quantities(self)}, scalars=("theta_2", "torque", "drive_force")
+        )
+        on = f"on bar {self.drive_bar}" if self.drive is None else "along a line"
         lines = [
-            f"Solution {self.title!r}: {extent(self.theta_2)}, drive on bar {self.drive_bar}",
+            f"Solution {self.title!r}: {extent(self.theta_2)}, drive {on}",
             "status: " + ", ".join(f"{count} {name}" for name, count in counts if count),
             *(f"{name}: {between(values)} {unit_of(name.strip('|'))}" for name, values in shown.items()),
         ]
         return "\n".join([*lines, listed("evaluated", self.evaluated())])
-
-    @property
-    def power(self) -> Array | None:
-        """Of the drive, T_k omega_k, W."""
-        speed: Array | None = getattr(self, f"omega_{self.drive_bar}")
-        with np.errstate(all="ignore"):
-            return None if self.torque is None or speed is None else self.torque * speed
 
     @property
     def assembled(self) -> NDArray[np.bool_]:
@@ -244,8 +246,9 @@ def unit_in(unit: str, units: Conversion) -> tuple[str, float]:
 
 
 def _quantities(solution: "Solution") -> list[str]:
-    """Every quantity of a solution, evaluated or not; the time only where a free motion has one."""
-    names = [name for name in UNITS if name != "time" or getattr(solution, name) is not None]
+    """Every quantity of a solution, evaluated or not; time and those of a linear drive only where there is one."""
+    left_out = () if solution.drive is not None else OF_LINE
+    names = [name for name in UNITS if name not in left_out and (name != "time" or solution.time is not None)]
     points = dict.fromkeys((*solution.points, *solution.velocity, *solution.acceleration))
     return names + [f"{start}{name}" for name in points for start in ("", "v_", "a_")]
 

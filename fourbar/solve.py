@@ -13,7 +13,7 @@ from fourbar.evaluation.blocks import each, evaluation, is_compiled, keep, posit
 from fourbar.evaluation.case import BLOCK, Case
 from fourbar.evaluation.stages import FORCE, Part, commanded, freely
 from fourbar.linkage import A_BRANCH, require, require_whole
-from fourbar.quantities import ANGLES, OF_DRY_FRICTION, OF_PIN_LOADS, STAGE_OF, STAGES, is_scalar
+from fourbar.quantities import ANGLES, COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, STAGE_OF, STAGES, is_scalar
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, unwrap
@@ -145,7 +145,8 @@ def requested(
     else:
         expect("out", out, Mapping)
         names = out.keys()
-        wanted = _highest_stage(out, shape, _stages(tuple(point.name for point in scene.points)))
+        stages = _stages(tuple(point.name for point in scene.points))
+        wanted = _highest_stage(out, shape, {name: of for name, of in stages.items() if name not in _foreign(scene)})
     if wanted > 0 and omega_2 is None:
         raise InputError("motion.omega_2", None, f"is needed for the stage {STAGES[wanted]!r}")
     return wanted, names
@@ -177,8 +178,11 @@ def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[s
         for start, arrays in own.items():
             if (array := result.get(start + point.name)) is not None:
                 arrays[point.name] = array
-    known = {name: array for name, array in result.items() if name in STAGE_OF} if scene.points else result
+    known: Mapping[str, Any] = result
+    if scene.points:
+        known = {name: array for name, array in result.items() if name in STAGE_OF}
     solution = Solution(scene.title, scene.drive_bar, code, np.asarray(at.branch), theta_2=at.theta_2, **known)
+    solution.drive = scene.drive
     solution.points, solution.velocity, solution.acceleration = own[""], own["v_"], own["a_"]
     solution.ground = (scene.linkage.ground, scene.linkage.ground_angle)
     return solution
@@ -254,9 +258,16 @@ def _released(scene: Scene) -> "FreeMotion":
     return moved
 
 
+def _foreign(scene: Scene) -> tuple[str, ...]:
+    """Quantities of the kind of drive that the scene has not."""
+    return OF_LINE if scene.drive is None else COUPLE
+
+
 def _absent(scene: Scene) -> tuple[str, ...]:
-    """Quantities that do not exist without dry friction, or without friction that depends on the pin forces."""
-    absent = () if any(effect.dry for effect in scene.effects) else OF_DRY_FRICTION
+    """Those, and what does not exist without dry friction, or without friction that depends on the pin forces."""
+    absent = _foreign(scene)
+    if not any(effect.dry for effect in scene.effects):
+        absent = (*absent, *OF_DRY_FRICTION)
     return absent if any(effect.loaded_pins for effect in scene.effects) else (*absent, *OF_PIN_LOADS)
 
 

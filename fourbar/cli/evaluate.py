@@ -187,7 +187,9 @@ def _refuse_units_of_json(as_json: bool, units: "Conversion") -> None:
 
 @click.command()
 @scene_argument
-@click.option("--quantity", "quantities", multiple=True, metavar="NAME", help="torque, F12 .. F14, transmission.")
+@click.option(
+    "--quantity", "quantities", multiple=True, metavar="NAME", help="torque or drive_force, F12 .. F14, transmission."
+)
 @click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
 @units_option
 @or_out_option
@@ -197,12 +199,11 @@ def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: "Co
     from fourbar.show.progress import running
     from fourbar.show.tables import under_heading
     from fourbar.solution import DEGREES
-    from fourbar.studies.enclosure import NAMES
     from fourbar.studies.enclosure import extremes as proven
 
     _refuse_units_of_json(as_json, units)
     with opened(scene) as stated, running("pieces of the interval are halved"):
-        found = proven(stated, quantities or NAMES)
+        found = proven(stated, quantities)
     if as_json:
         text = shown.json_text(stated, found)
     else:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from fourbar.effects.flywheel import Flywheel as Flywheel
     from fourbar.effects.friction import Friction as Friction
     from fourbar.effects.gravity import Gravity as Gravity
+    from fourbar.effects.linear_drive import LinearDrive as LinearDrive
     from fourbar.effects.load import Load as Load
     from fourbar.effects.load import Table as Table
     from fourbar.effects.pin_friction import PinFriction as PinFriction
@@ -37,6 +38,7 @@ OTHERS = {
     **dict.fromkeys(("Load", "Table"), "load"),
     **dict.fromkeys(("Spring", "SpringEnd"), "spring"),
     "Actions": "actions",
+    "LinearDrive": "linear_drive",
 }
 
 

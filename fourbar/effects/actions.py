@@ -75,6 +75,16 @@ class Actions:
         couple = self.rounded(couple)
         self.couples[pin] = self.couples[pin] + couple if pin in self.couples else couple
 
+    def plus(self, unit: "Actions", size: Number) -> "Actions":
+        """Make the sum of these and of what a drive of a size does that does `unit` per newton."""
+        whole = Actions(self.state, self.bodies, self.side, self.rounded)
+        whole.forces, whole.moments, whole.couples = dict(self.forces), dict(self.moments), self.couples
+        for bar, force in unit.forces.items():
+            whole.forces[bar] = whole.forces.get(bar, 0.0) + self.rounded(size * force, turned=True)
+        for bar, moment in unit.moments.items():
+            whole.moments[bar] = whole.moments.get(bar, 0.0) + self.rounded(size * moment)
+        return whole
+
     def work(self) -> tuple[Number, Number]:
         """Compute the generalised force Q (power over the independent angle's speed) of all and of bars 3, 4, N m."""
         k = self.state.k

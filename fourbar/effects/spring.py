@@ -32,6 +32,23 @@ class SpringEnd(NamedTuple):
         """In the bar's frame, along + i across its line, m; an array, whose products all round alike."""
         return np.asarray(polar(self.distance, self.angle))
 
+    def place(self, state: State) -> Any:
+        """Where it is, complex, m."""
+        return state.point(self.bar, self.in_bar)
+
+
+def require_ends(key: str, start: object, end: object) -> tuple[SpringEnd, SpringEnd]:
+    """Return the ends of a line between two bars, checked; InputError for what is none."""
+    ends = []
+    for name, point in (("from", start), ("to", end)):
+        if not isinstance(point, SpringEnd):
+            raise InputError(f"{key}.{name}", point, "must be a fourbar.effects.SpringEnd")
+        bar = require_whole(f"{key}.{name}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
+        ends.append(SpringEnd(bar, *(require(f"{key}.{name}.at", number) for number in point[1:])))
+    if ends[0].bar == ends[1].bar:
+        raise InputError(f"{key}.to.bar", ends[1].bar, "must be another bar than that of `from`")
+    return ends[0], ends[1]
+
 
 @dataclass(frozen=True, slots=True)
 class Spring:
@@ -55,15 +72,8 @@ class Spring:
     preload: float = 0.0
 
     def __post_init__(self) -> None:
-        for key, point in (("from", self.start), ("to", self.end)):
-            if not isinstance(point, SpringEnd):
-                raise InputError(f"effects.springs.{key}", point, "must be a fourbar.effects.SpringEnd")
-            bar = require_whole(f"effects.springs.{key}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
-            numbers = zip(point[1:], ("m", "rad"), strict=True)
-            place = (require(f"effects.springs.{key}.at", *number) for number in numbers)
-            object.__setattr__(self, {"from": "start", "to": "end"}[key], SpringEnd(bar, *place))
-        if self.start.bar == self.end.bar:
-            raise InputError("effects.springs.to.bar", self.end.bar, "must be another bar than that of `from`")
+        for name, point in zip(("start", "end"), require_ends("effects.springs", self.start, self.end), strict=True):
+            object.__setattr__(self, name, point)
         for name, of in OF_EFFECT["springs"].items():
             object.__setattr__(self, name, required(f"effects.springs.{name}", getattr(self, name), of))
 
@@ -128,7 +138,7 @@ class Springs(Effect):
     def act(self, actions: Actions, state: State) -> None:
         """At `start` the tension along the unit vector to `end`, at `end` its opposite."""
         for spring in self.springs:
-            start, end = (actions.rounded(_place(state, point)) for point in (spring.start, spring.end))
+            start, end = (actions.rounded(point.place(state)) for point in (spring.start, spring.end))
             across = end - start
             force = _per_distance(spring, across, actions) * across
             for point, sign in ((spring.start, 1.0), (spring.end, -1.0)):
@@ -140,15 +150,11 @@ class Springs(Effect):
         for spring in self.springs:
             if not anywhere(spring.slack != 0.0):
                 continue
-            across = _place(state, spring.end) - _place(state, spring.start)
+            across = spring.end.place(state) - spring.start.place(state)
             away = sum(state.lengths[:4]) + abs(spring.start.distance) + abs(spring.end.distance)
             here = (np.abs(across) <= COINCIDE * away) & (spring.slack != 0.0)
             codes = np.where(here, NO_DIRECTION, OK if codes is None else codes).astype(np.uint8)
         return codes
-
-
-def _place(state: State, point: SpringEnd) -> Any:
-    return state.point(point.bar, point.in_bar)
 
 
 def _per_distance(spring: Spring, across: Any, actions: Actions) -> Any:

@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions, as_it_is, bodies
 from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import LimitError
-from fourbar.formulas.arithmetic import anywhere, polar, vector
+from fourbar.formulas.arithmetic import anywhere, polar, select, vector
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path
 from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, coupler_about_B, inertia_wrenches, pin_forces
 from fourbar.formulas.position import HalfAngle, Loop, Position
-from fourbar.formulas.torque import driving_torque, half_slope, inertia
-from fourbar.linkage import FourBar
-from fourbar.quantities import JAMMED
+from fourbar.formulas.torque import half_slope, inertia
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.quantities import COUPLE, JAMMED, LINE, DriveNames
 from fourbar.scene import Command, Scene
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect
+    from fourbar.effects import Effect, LinearDrive
 
 
 BLOCK = 8000
@@ -72,13 +72,14 @@ def undecided(factor: Any, constant: Any, size: Any) -> Any:
 
 
 class Dynamics(NamedTuple):
-    """Pin forces and what friction that depends on them was solved to, as `SolvedFriction`, and the driving torque."""
+    """Pin forces and what friction that depends on them was solved to, as `SolvedFriction`, and what the drive does."""
 
     pins: PinForces
     from_jamming: Any
     residual: Any
     status: Any
-    torque: Any
+    drive: Any
+    """Its torque, N m, or its force, N."""
 
 
 class Case(NamedTuple):
@@ -94,6 +95,8 @@ class Case(NamedTuple):
     """The scene's own: name, bar, and place in the bar's frame at its first pin, complex, m."""
     side: Any = 0
     """In which sense pins at rest are about to turn, or the part of its torque that dry friction holds them with."""
+    drive: "LinearDrive | None" = None
+    """In place of a couple on the driven bar."""
 
     @classmethod
     def of(cls, scene: Scene) -> "Case":
@@ -103,7 +106,27 @@ class Case(NamedTuple):
         square = own.unit * own.unit
         lengths = Loop(*linkage.lengths, own.lengths.E1 * square, own.lengths.E2 * square)
         points = tuple((point.name, point.bar, polar(*point.from_pin)) for point in scene.points)
-        return cls(linkage, lengths, bodies(linkage, terms), terms, scene.drive_bar, own, points)
+        return cls(linkage, lengths, bodies(linkage, terms), terms, scene.drive_bar, own, points, drive=scene.drive)
+
+    @property
+    def names(self) -> DriveNames:
+        """What the quantities of the drive are called."""
+        return COUPLE if self.drive is None else LINE
+
+    def sines(self, at: Position) -> dict[int, Any]:
+        """Of the angles between two moving bars, each by the third one's number."""
+        return {bar: self.path.drive_sine(at, bar) for bar in MOVING_BARS}
+
+    def drive_speed(self, state: State) -> Any:
+        """Speed at which the drive works: of the driven bar, rad/s, or of the stroke, m/s."""
+        return state.omega(self.drive_bar) if self.drive is None else self.drive.speed(state)
+
+    def drive_condition(self, state: State) -> Any:
+        """Compute the drive's leverage as a part of the most it could have, in [0, 1]."""
+        if self.drive is None:
+            return abs(self.path.drive_sine(state.at, self.drive_bar))
+        lever, most = self.drive.leverage(state, self.sines(state.at))
+        return abs(lever) / most
 
     def state(
         self, path: Path, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
@@ -172,7 +195,12 @@ class Case(NamedTuple):
     def dynamics(
         self, state: State, acceleration: Any, side: Any = 0, rounded: Callable[..., Any] = as_it_is
     ) -> Dynamics:
-        """Compute pin forces and torque under everything that acts; for the parameters see `Actions`."""
+        """Compute pin forces and the drive under everything that acts; for the parameters see `Actions`.
+
+        A couple on one bar leaves the moments of the other two alone, which give the force between them. A force along
+        a line is found first, by virtual work, and then is one more load; where it acts on two moving bars or on bar 3,
+        of the three pairs of bars that whose directions differ most has the digits.
+        """
         a, at, k = self.lengths.a, state.at, state.k
         actions = Actions(state, self.bodies, side, rounded)
         for term in self.terms:
@@ -187,40 +215,60 @@ class Case(NamedTuple):
         if rounded is not as_it_is:
             own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))
             inertial, others = rounded(inertial), rounded(others)
-        sine, short = rounded(self.path.drive_sine(at, self.drive_bar)), anywhere(self.lengths.d < self.lengths.a)
-        if self.drive_bar == 4:
-            others = rounded(coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine))
+        driven = (self.drive_bar,) if self.drive is None else self.drive.apart
+        sines = {bar: rounded(self.path.drive_sine(at, bar)) for bar in driven}
+        about_B, short = 0.0, anywhere(self.lengths.d < self.lengths.a)
+        if 4 in sines:
+            about_B = rounded(coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sines[4]))
+        unit = None if self.drive is None else self.drive.per_newton(actions)
+        by = k[self.drive_bar - 2] if unit is None else unit.work()[0]
+
+        def apart(bar: int, acting: Actions, with_inertia: bool) -> PinForces:
+            """Solve from the moments of the two bars other than this."""
+            w, mass, rest = (own, mass_at_A, (others, about_B)) if with_inertia else (Wrenches(), 0.0j, (0.0, 0.0))
+            moment: Any = 0.0
+            if bar == 4:
+                moment = -(acting.about_B() + rest[1])
+            elif bar == 2 and short:
+                moment = acting.work()[1] - rest[0]
+            return pin_forces(self.lengths, at, bar, sines[bar], acting.wrenches(w), mass, moment)
 
         def eliminate(acting: Actions, *, with_inertia: bool = True) -> PinForces:
-            w, mass, rest = (own, mass_at_A, others) if with_inertia else (Wrenches(), 0.0j, 0.0)
-            moment: Any = 0.0
-            if self.drive_bar == 4:
-                moment = -(acting.about_B() + rest)
-            elif self.drive_bar == 2 and short:
-                moment = acting.work()[1] - rest
-            return pin_forces(self.lengths, at, self.drive_bar, sine, acting.wrenches(w), mass, moment)
+            if unit is None:
+                return apart(self.drive_bar, acting, with_inertia)
+            pushed = acting.plus(unit, ((inertial if with_inertia else 0.0) - acting.work()[0]) / by)
+            found = {bar: apart(bar, pushed, with_inertia) for bar in driven}
+            return found[driven[0]] if len(driven) == 1 else steadiest(sines, found)
 
         solved = SolvedFriction(eliminate(actions))
         for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
             if term.loaded_pins:
                 solved = term.solve_friction(actions, solved.pins, eliminate)
-        return Dynamics(*solved, driving_torque(k, self.drive_bar, inertial, actions.work()[0]))
+        return Dynamics(*solved, (inertial - actions.work()[0]) / by)
 
-    def torque_interval(self, state: State, alpha_2: Any, torque: Any) -> tuple[Any, Any, Any]:
-        """Least and greatest driving torque where dry friction holds a pin at rest, elsewhere the torque twice, N m.
+    def drive_interval(self, state: State, alpha_2: Any, drive: Any) -> tuple[Any, Any, Any]:
+        """Least and greatest torque or force of the drive where dry friction holds a pin at rest, elsewhere it twice.
 
         The third is where one of them is NaN because friction jams the motion that would begin; None: nowhere.
-        The ends are the torques at which the linkage would begin to move forwards or backwards, or, where only a
-        pin comes to rest while the linkage moves, the torques just before and after its reversal.
+        The ends are those at which the linkage would begin to move forwards or backwards, or, where only a
+        pin comes to rest while the linkage moves, those just before and after its reversal.
         """
         actions = Actions(state, self.bodies)
         pins = {pin for term in self.terms for pin in term.dry_pins}
         if np.all(state.speed) and all(np.all(actions.turning(pin)) for pin in pins):
-            return torque, torque, None
+            return drive, drive, None
         ahead, back = (self.dynamics(state, alpha_2, side) for side in (1, -1))
         jammed = [found.status == JAMMED for found in (ahead, back) if found.status is not None]
-        low, high = np.minimum(ahead.torque, back.torque), np.maximum(ahead.torque, back.torque)
+        low, high = np.minimum(ahead.drive, back.drive), np.maximum(ahead.drive, back.drive)
         return low, high, np.any(jammed, axis=0) if jammed else None
+
+
+def steadiest(sines: dict[int, Any], of: dict[int, PinForces]) -> PinForces:
+    """Of pin forces solved by the moments of two bars those of the pair with the greatest sine."""
+    s2, s3, s4 = (abs(sines[bar]) for bar in MOVING_BARS)
+    first, second = (s2 >= s3) & (s2 >= s4), s3 >= s4
+    rows = zip(*(of[bar] for bar in MOVING_BARS), strict=True)
+    return PinForces(*(select(first, x, select(second, y, z)) for x, y, z in rows))
 
 
 def state_at(scene: Scene, at: Command) -> State:

@@ -62,7 +62,7 @@ class Loads(NamedTuple):
 
 def carries(case: Case) -> bool:
     """Whether the loop can evaluate a case."""
-    plain = case.path.bar == 2 and not case.path.may_stay_parallel
+    plain = case.path.bar == 2 and case.drive is None and not case.path.may_stay_parallel
     return plain and all(type(term) in CARRIED for term in case.terms)
 
 
@@ -152,6 +152,7 @@ def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
     values = kinematics(case, state, names)
     others = dict(zip((*PIN_FORCES, "torque", "torque_error", "force_error"), (*pins, torque, *errors), strict=True))
     others["drive_condition"] = np.abs(sine)
+    others["power"] = torque * moving[case.drive_bar - 2]
     values |= {name: value for name, value in others.items() if name in names}
     codes = np.zeros(theta_2.shape, dtype=np.uint8)
     if left.any():

@@ -1,4 +1,4 @@
-"""Error bars of torque and pin forces: how far rounding makes them scatter.
+"""Error bars of what the drive does and of the pin forces: how far rounding makes them scatter.
 
 The forces are evaluated again with every number of the position, coefficient and term of a sum changed in its last
 digit. All roundings then fall differently, so the root mean square of the changes is of the size of the error
@@ -80,7 +80,7 @@ def in_turn() -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
 def error_bars(
     case: Case, state: State, acceleration: Any, sign: Any, found: Dynamics, exact: NDArray[np.intp]
 ) -> dict[str, Any]:
-    """`torque_error` (N m) and `force_error` (N, worst of the four pin forces), each (n,).
+    """Compute that of the drive (N m or N) and `force_error` (N, worst of the four pin forces), by name, each (n,).
 
     Parameters
     ----------
@@ -100,13 +100,13 @@ def error_bars(
     k = k if path.bar == 2 else read_backwards(k)
     nearby = state._replace(at=near, k=k, moving=rates(k, state.speed, acceleration))
     other = case.dynamics(nearby, acceleration, case.side, rounded)
-    values, others = (*found.pins, found.torque), (*other.pins, other.torque)
+    values, others = (*found.pins, found.drive), (*other.pins, other.drive)
     spread = root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))
     size = np.array([np.abs(value) for value in values]).reshape(spread.shape)
-    force_error, torque_error = bar(
+    force_error, drive_error = bar(
         np.array([spread[:4].max(axis=0), spread[4]]), np.array([size[:4].max(axis=0), size[4]])
-    ).reshape(2, *np.shape(found.torque))
-    return {"torque_error": torque_error, "force_error": force_error}
+    ).reshape(2, *np.shape(found.drive))
+    return {case.names.error: drive_error, "force_error": force_error}
 
 
 def rounded_real(x: Any, sign: Any) -> Any:

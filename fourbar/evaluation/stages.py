@@ -16,8 +16,9 @@ from fourbar.quantities import (
     ANGLES,
     JAMMED,
     NO_DIRECTION,
+    NO_LEVER,
     NOT_ASSEMBLED,
-    OF_DRY_FRICTION,
+    OF_LINE,
     OK,
     OVERFLOW,
     SINGULAR,
@@ -41,8 +42,8 @@ Part = tuple[Any, ...]
 """Index of some positions in the arrays of all."""
 
 
-WITHOUT_FORCES = (NO_DIRECTION, WOUND)
-"""Statuses of positions at which an effect has no value, and so the forces have none."""
+WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
+"""Statuses of positions at which an effect or the drive has no value, and so the forces have none."""
 
 
 def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
@@ -103,12 +104,12 @@ def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> E
 
 
 def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """Evaluate instants of a free motion that have one independent angle; there is no driving torque."""
+    """Evaluate instants of a free motion that have one independent angle; the drive does nothing."""
     codes = np.zeros(len(part[0]), dtype=np.uint8)
     if not codes.size:
         return codes, {}, None
     bar = int(moved.bar[part][0])
-    free = case._replace(drive_bar=bar, path=moved.paths[bar], side=moved.side[part])
+    free = case._replace(drive_bar=bar, drive=None, path=moved.paths[bar], side=moved.side[part])
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
     at = free.path.position(q, free.path.half_angle(q), branch)
     state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.theta_2[part])
@@ -117,9 +118,7 @@ def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Keys
         exact = NOWHERE if wanted == ERROR else None
         codes, forces = _forces(free, state, growth, None, branch, codes, names, exact)
         values |= forces
-        values |= {
-            name: np.zeros(codes.shape) for name in values if name in ("torque", "torque_error", *OF_DRY_FRICTION)
-        }
+        values |= {name: np.zeros(codes.shape) for name in (*case.names, "power") if name in names}
     return codes, values, None
 
 
@@ -142,24 +141,28 @@ def _forces(
     exact : indices of the positions known in many digits; None: no error bars.
     """
     found = case.dynamics(state, alpha_2, case.side)
-    values: dict[str, Any] = {**found.pins._asdict(), "torque": found.torque}
+    values: dict[str, Any] = {**found.pins._asdict(), case.names.value: found.drive}
+    if "power" in names:
+        values["power"] = found.drive * case.drive_speed(state)
     if "drive_condition" in names:
-        condition = abs(case.path.drive_sine(state.at, case.drive_bar))
+        condition = case.drive_condition(state)
         values["drive_condition"] = condition if found.from_jamming is None else condition * found.from_jamming
     if "friction_residual" in names:
         values["friction_residual"] = 0.0 if found.residual is None else found.residual
-    if "torque_low" in names or "torque_high" in names:
-        *ends, held = case.torque_interval(state, alpha_2, found.torque)
-        values |= zip(OF_DRY_FRICTION, ends, strict=True)
+    if case.names.low in names or case.names.high in names:
+        *ends, held = case.drive_interval(state, alpha_2, found.drive)
+        values |= zip(case.names[2:], ends, strict=True)
         if held is not None and found.status is not None:
             found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
     if exact is not None:
         from fourbar.evaluation.error_bars import error_bars
 
         values |= error_bars(case, state, alpha_2, sign, found, exact)
-    without = [status for term in case.terms if (status := term.status(state, branch)) is not None]
+    without: list[Any] = [status for term in case.terms if (status := term.status(state, branch)) is not None]
     if found.status is not None:
         without.append(found.status)
+    if case.drive is not None and (status := case.drive.status(state, case.sines(state.at))) is not None:
+        without.append(status)
     if without:
         codes = np.where(codes == OK, np.max(without, axis=0), codes).astype(np.uint8)
     if anywhere(codes > SINGULAR):
@@ -195,6 +198,10 @@ PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G
 def kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
     """Those of the quantities that come before the forces, a scene's own points among them."""
     values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
+    if case.drive is not None and not wanted.isdisjoint(OF_LINE):
+        stroke, unit = case.drive.line(state)
+        own = {"stroke": stroke, "drive_line": unit, "stroke_speed": case.drive.speed(state)}
+        values |= {name: value for name, value in own.items() if name in wanted}
     if not case.points and wanted.isdisjoint(PLACES):
         return values
     lengths, (two, three, four) = case.lengths, case.bodies

@@ -23,7 +23,9 @@ def withheld(case: Case, found: Evaluated) -> None:
     """Write `withhold` in place wherever a result is no number."""
     codes, values, driven = found
     if not all_finite(values):
-        in_line = driven is not None and np.abs(case.path.drive_sine(driven, case.drive_bar)) <= NO_DIGIT_LEFT
+        in_line: Any = False
+        if driven is not None and case.drive is None:
+            in_line = np.abs(case.path.drive_sine(driven, case.drive_bar)) <= NO_DIGIT_LEFT
         withhold(values, codes, np.broadcast_to(in_line, codes.shape))
 
 

@@ -28,7 +28,7 @@ def _read_springs(value: object, read: Reader) -> "Springs":
     for index, entry in enumerate(value):
         own = f"{key}[{index}]"
         given = read.table(own, entry, ("from", "to", *numbers, "gas"))
-        start, end = (_read_point(read, f"{own}.{name}", given.get(name)) for name in ("from", "to"))
+        start, end = read_ends(read, own, given)
         if gas := "gas" in given:
             read.table(own, entry, ("from", "to", "gas"))
             words = read.table(f"{own}.gas", given["gas"], OF_GAS_SPRING)
@@ -57,16 +57,27 @@ def _stated(read: Reader, key: str, given: Mapping[str, object], numbers: Mappin
     ]
 
 
-def _read_point(read: Reader, key: str, value: object) -> "SpringEnd":
-    entry = read.table(key, value, ("bar", "at"))
-    bar = read.whole(f"{key}.bar", entry.get("bar"), 1, 4)
-    return kinds.SpringEnd(bar, *(read.polar(f"{key}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0)))
+def read_ends(read: Reader, key: str, given: dict[str, Any]) -> "tuple[SpringEnd, SpringEnd]":
+    """Read the entries `from` and `to` of a line between two bars; an end without `at` is at the bar's first pin."""
+    ends = []
+    for name in ("from", "to"):
+        own = f"{key}.{name}"
+        entry = read.table(own, given.get(name), ("bar", "at"))
+        bar = read.whole(f"{own}.bar", entry.get("bar"), 1, 4)
+        ends.append(kinds.SpringEnd(bar, *(read.polar(f"{own}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0))))
+    return ends[0], ends[1]
+
+
+def write_ends(line: Any) -> dict[str, Any]:
+    """Write them back."""
+    ends = {"from": line.start, "to": line.end}
+    return {name: {"bar": end.bar, "at": polar(end[1], end[2], "m")} for name, end in ends.items()}
 
 
 def _write_springs(effect: "Springs") -> Any:
     return [
         {
-            **{name: {"bar": end.bar, "at": polar(*end[1:], "m")} for name, end in (("from", s.start), ("to", s.end))},
+            **write_ends(s),
             **{name: quantity(getattr(s, name), unit) for name, (unit, _) in OF_EFFECT["springs"].items()},
         }
         for s in effect.springs

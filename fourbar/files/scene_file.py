@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Load, Table
+from fourbar.effects import LinearDrive, Load, Table
 from fourbar.errors import InputError, expect
 from fourbar.files import reading
-from fourbar.files.effects import REGISTRY
+from fourbar.files.effects import REGISTRY, read_ends
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.pictures import Picture
 from fourbar.files.scene_text import BARS, BRANCHES
@@ -97,7 +97,12 @@ def _unreadable(text: str, reason: str, shown: str) -> InputError:
 
 def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     top = read.table("", document, TABLES)
-    drive = read.table("drive", top.get("drive", {}), ("bar",))
+    drive = read.table("drive", top.get("drive", {}), ("bar", "from", "to"))
+    line = None
+    if "from" in drive or "to" in drive:
+        if "bar" in drive:
+            raise read.refuse("drive.bar", drive["bar"], "a drive acts on a bar or along a line: bar, or from and to")
+        line = LinearDrive(*read_ends(read, "drive", drive))
     entries = top.get("loads", [])
     if not isinstance(entries, list) or len(entries) > MOST_LOADS:
         raise read.refuse("loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}")
@@ -105,13 +110,14 @@ def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     scene = Scene(
         _linkage(read, top),
         _motion(read, top.get("motion", {})),
-        read.whole("drive.bar", drive.get("bar", 2), 2, 4),
+        None if line else read.whole("drive.bar", drive.get("bar", 2), 2, 4),  # type: ignore[arg-type]
         tuple(_load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)),
         tuple(REGISTRY[key].read(value, read) for key, value in effects.items()),
         read.text("title", top.get("title", "")),
         read.text("source", top.get("source", "")),
         _pictures(read, top.get("bars", {}), folder),
         _points(read, top.get("points", {})),
+        drive=line,
     )
     return replace(scene, tolerances=read_tolerances(read, scene, top.get("tolerances", {})))
 

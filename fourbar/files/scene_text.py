@@ -9,7 +9,7 @@ import numpy as np
 
 from fourbar.effects import Load
 from fourbar.errors import InputError, expect
-from fourbar.files.effects import written
+from fourbar.files.effects import write_ends, written
 from fourbar.files.fields import polar, quantity
 from fourbar.files.tolerances import written_tolerances
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
@@ -54,7 +54,7 @@ def dump(scene: Scene) -> str:
         ("lengths", {**lengths, "ground_angle": angle}),
         *((f"bars.{name}", _bar_entry(scene, number)) for name, number in BARS.items()),
         ("motion", _motion_entry(scene.motion)),
-        ("drive", {"bar": scene.drive_bar}),
+        ("drive", {"bar": scene.drive_bar} if scene.drive is None else write_ends(scene.drive)),
         ("points", points),
         *(("[loads]", _load_entry(load)) for load in scene.loads),
         ("effects", effects),

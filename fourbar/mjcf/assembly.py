@@ -51,6 +51,8 @@ def assemble(
     if scene.loads and not without_loads:
         on = ", ".join(sorted({f"bar {load.bar}" for load in scene.loads}))
         raise LimitError(f"loads (here on {on}) have no counterpart in {form}; --without-loads leaves them out")
+    if scene.drive is not None:
+        raise LimitError(f"a linear drive (drive.from, drive.to) has no counterpart in {form}")
     linkage = scene.linkage
     carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}

@@ -60,9 +60,7 @@ def mjcf(
     LimitError : an effect or the motion has no counterpart in MJCF.
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
-    if scene.motion.law is not None:
-        raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
-    carriable(scene.linkage)
+    _require_carried(scene)
     if scene.motion.free is not None:
         drive = "none"
     if drive != "flywheel":
@@ -102,6 +100,15 @@ def mjcf(
         ET.SubElement(frame, "key", name="start", qpos=text(*start.qpos), qvel=text(*start.qvel))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _require_carried(scene: Scene) -> None:
+    """LimitError or InputError for what of a motion, a drive or a linkage MJCF does not carry."""
+    if scene.motion.law is not None:
+        raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
+    if scene.drive is not None and scene.motion.free is None:
+        raise LimitError("a linear drive (drive.from, drive.to) is not exported to MJCF")
+    carriable(scene.linkage)
 
 
 def _comments(scene: Scene, drive: Drive, reader: str) -> list[str]:

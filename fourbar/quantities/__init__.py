@@ -21,9 +21,8 @@ class Quantity(NamedTuple):
     """That computes it; None: it is commanded."""
     meaning: str
     group: str = ""
-    """unknown: of the equations of a position, which an engine can be held to; product: of other quantities, by
-    `Solution`; dry friction, pin loads: exists only where the scene has dry friction, or friction that depends on the
-    pin forces."""
+    """unknown: of the equations of a position, which an engine can be held to; dry friction, pin loads, linear drive:
+    exists only where the scene has dry friction, friction that depends on the pin forces, a drive along a line."""
 
 
 def _scalar(*line: str | None) -> Any:
@@ -53,6 +52,8 @@ class Quantities:
     G2: Array = _vector("m", "position", "mass centre of the input")
     G3: Array = _vector("m", "position", "mass centre of the coupler")
     G4: Array = _vector("m", "position", "mass centre of the output")
+    stroke: Array | None = _scalar("m", "position", "distance of the linear drive's ends", "linear drive")
+    drive_line: Array | None = _vector("1", "position", "unit vector from its one end to the other", "linear drive")
     omega_2: Array | None = _scalar("rad/s", "velocity", "angular velocity of the input")
     omega_3: Array | None = _scalar("rad/s", "velocity", "angular velocity of the coupler", "unknown")
     omega_4: Array | None = _scalar("rad/s", "velocity", "angular velocity of the output", "unknown")
@@ -61,6 +62,7 @@ class Quantities:
     v_G2: Array | None = _vector("m/s", "velocity", "velocity of G2")
     v_G3: Array | None = _vector("m/s", "velocity", "velocity of G3")
     v_G4: Array | None = _vector("m/s", "velocity", "velocity of G4")
+    stroke_speed: Array | None = _scalar("m/s", "velocity", "speed at which the stroke grows", "linear drive")
     alpha_2: Array | None = _scalar("rad/s^2", "acceleration", "angular acceleration of the input")
     alpha_3: Array | None = _scalar("rad/s^2", "acceleration", "angular acceleration of the coupler", "unknown")
     alpha_4: Array | None = _scalar("rad/s^2", "acceleration", "angular acceleration of the output", "unknown")
@@ -74,23 +76,23 @@ class Quantities:
     F43: Array | None = _vector("N", "force", "force of the output on the coupler, at B", "unknown")
     F14: Array | None = _vector("N", "force", "force of ground on the output, at O4", "unknown")
     torque: Array | None = _scalar("N m", "force", "couple of ground on the driven bar", "unknown")
-    drive_condition: Array | None = _scalar("1", "force", "sine between the two bars that are not driven, in (0, 1]")
+    drive_force: Array | None = _scalar("N", "force", "force of the drive, pushing its ends apart", "linear drive")
+    power: Array | None = _scalar("W", "force", "power of the drive")
+    drive_condition: Array | None = _scalar("1", "force", "leverage of the drive, in (0, 1]; 1 is best")
     torque_error: Array | None = _scalar("N m", "error", "error bar of the torque: what rounding makes it scatter by")
+    drive_force_error: Array | None = _scalar("N", "error", "error bar of the drive's force", "linear drive")
     force_error: Array | None = _scalar("N", "error", "error bar of the pin forces, of the worst of the four")
     torque_low: Array | None = _scalar("N m", "force", "least torque while dry friction holds a pin", "dry friction")
     torque_high: Array | None = _scalar("N m", "force", "greatest then; otherwise both are torque", "dry friction")
+    drive_force_low: Array | None = _scalar("N", "force", "least force of the linear drive then", "dry friction")
+    drive_force_high: Array | None = _scalar("N", "force", "greatest then", "dry friction")
     friction_residual: Array | None = _scalar("N m", "force", "largest remaining |mu r |F| - couple|", "pin loads")
     time: Array | None = _scalar("s", None, "of a motion law or a free motion, which ends at a limit position")
 
 
-POWER = Quantity("power", "scalar", "W", "force", "of the drive, its torque times the speed of its bar", "product")
-QUANTITIES = tuple(
-    line
-    for each in fields(Quantities)
-    for line in (Quantity(each.name, *each.metadata["line"]), *((POWER,) if each.name == "torque" else ()))
-)
+QUANTITIES = tuple(Quantity(each.name, *each.metadata["line"]) for each in fields(Quantities))
 UNITS = {q.name: q.unit for q in QUANTITIES}
-STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None and q.group != "product"}
+STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None}
 """Every evaluated quantity and the stage that computes it."""
 STAGES = tuple(dict.fromkeys(STAGE_OF.values()))
 KIND = {q.name: q.kind for q in QUANTITIES}
@@ -100,16 +102,33 @@ PIN_FORCES = tuple(name for name in VECTORS if UNITS[name] == "N")
 """F_ij, of bar i on bar j, in the order of the pins O2, A, B, O4."""
 UNKNOWNS = tuple(q.name for q in QUANTITIES if q.group == "unknown")
 """Every unknown of a position, in the order of the mechanics."""
-FORCES = (*PIN_FORCES, "torque")
+
+
+class DriveNames(NamedTuple):
+    """What the quantities of a kind of drive are called."""
+
+    value: str
+    error: str
+    low: str
+    high: str
+
+
+COUPLE = DriveNames("torque", "torque_error", "torque_low", "torque_high")
+"""Of a drive that turns a bar."""
+LINE = DriveNames("drive_force", "drive_force_error", "drive_force_low", "drive_force_high")
+"""Of one that pushes along a line."""
+OF_LINE = (*dict.fromkeys((*(q.name for q in QUANTITIES if q.group == "linear drive"), *LINE)),)
+"""Every quantity that exists only where the drive is linear."""
+FORCES = (*PIN_FORCES, COUPLE.value, LINE.value, "power")
 OF_DRY_FRICTION = tuple(q.name for q in QUANTITIES if q.group == "dry friction")
 OF_PIN_LOADS = tuple(q.name for q in QUANTITIES if q.group == "pin loads")
 
 STATUS_NAMES = (
     *("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound"),
-    *("no_torque", "overflow", "invalid"),
+    *("no_torque", "overflow", "invalid", "no_lever"),
 )
 """By code; `Solution.status_code` says what each means."""
-OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW, INVALID = range(
+OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW, INVALID, NO_LEVER = range(
     len(STATUS_NAMES)
 )
 

@@ -15,7 +15,7 @@ from fourbar.scene.tolerance import Tolerance
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, Load
+    from fourbar.effects import Effect, LinearDrive, Load
     from fourbar.files.pictures import Picture
 
 
@@ -38,7 +38,8 @@ class Scene:
 
     linkage: FourBar
     motion: Motion = field(default_factory=Motion)
-    drive_bar: int = 2
+    drive_bar: int = None  # type: ignore[assignment]  # resolved below
+    """2, where nothing is stated; None where the drive is linear."""
     loads: "tuple[Load, ...]" = ()
     effects: "tuple[Effect, ...]" = ()
     title: str = ""
@@ -46,12 +47,17 @@ class Scene:
     pictures: "tuple[Picture, ...]" = ()
     points: tuple[Point, ...] = ()
     tolerances: tuple[Tolerance, ...] = ()
+    drive: "LinearDrive | None" = None
 
     def __post_init__(self) -> None:
         one = {"linkage": FourBar, "motion": Motion, "title": str, "source": str}
         for name, kind in one.items():
             expect(name, getattr(self, name), kind)
-        object.__setattr__(self, "drive_bar", require_bar("drive.bar", self.drive_bar))
+        if self.drive is None:
+            bar = 2 if self.drive_bar is None else require_bar("drive.bar", self.drive_bar)
+            object.__setattr__(self, "drive_bar", bar)
+        else:
+            self._require_linear(self.drive)
         from fourbar.effects.effect import Effect
 
         many = {"loads": Effect, "effects": Effect, "pictures": object, "points": Point, "tolerances": Tolerance}
@@ -68,6 +74,16 @@ class Scene:
             raise InputError("points", names, "each point has a name of its own")
         if len({picture.bar for picture in self.pictures}) < len(self.pictures):
             raise InputError("pictures", [picture.bar for picture in self.pictures], "a bar has one picture")
+
+    def _require_linear(self, drive: object) -> None:
+        """InputError where the drive is none along a line, acts on a bar too, or never moves its ends."""
+        from fourbar.effects.linear_drive import LinearDrive
+
+        expect("drive", drive, LinearDrive)
+        if self.drive_bar is not None:
+            raise InputError("drive.bar", self.drive_bar, "a drive acts on a bar or along a line: bar, or from and to")
+        assert isinstance(drive, LinearDrive)
+        drive.require_stroke(self.linkage)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Scene):

@@ -19,7 +19,7 @@ class Symbol(NamedTuple):
     """One thing that acts."""
 
     kind: str
-    """spring, force, moment, drive, flywheel, gravity, or an effect in a pin: torsion, viscous, friction, ..."""
+    """spring, force, moment, drive, cylinder, flywheel, gravity, or an effect in a pin: torsion, viscous, ..."""
     name: str
     """As it is labelled."""
     bar: int = 1
@@ -34,7 +34,7 @@ class Symbol(NamedTuple):
     moment: float = 0.0
     """N m; of a drive and of what acts in a pin 0."""
     end: "tuple[int, complex] | None" = None
-    """Of a spring the bar and the point at its other end."""
+    """Of a spring or a cylinder the bar and the point at its other end."""
     pin: str = ""
     """Of what acts in a pin."""
     table: Any = None
@@ -51,7 +51,10 @@ class Symbol(NamedTuple):
 def acting(scene: Scene) -> list[Symbol]:
     """Everything that acts, the drive first; nothing that has no size."""
     found = []
-    if scene.motion.free is None:
+    if scene.drive is not None and scene.motion.free is None:
+        (bar, *start), (other, *end) = scene.drive.start, scene.drive.end
+        found.append(Symbol("cylinder", "F", bar, cmath.rect(*start), end=(other, cmath.rect(*end))))
+    elif scene.motion.free is None:
         found.append(Symbol("drive", f"T{scene.drive_bar}", scene.drive_bar, pin=FIRST_PIN[scene.drive_bar]))
     for number, load in enumerate(scene.loads, 1):
         at, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"

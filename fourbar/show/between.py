@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fourbar.linkage import PINS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
+from fourbar.show.duty import driving
 from fourbar.solution import Array, Solution
 from fourbar.solve import solve
 
@@ -41,10 +42,10 @@ class Between(NamedTuple):
 
 def sizes(solution: Solution) -> dict[str, Array]:
     """List the magnitudes whose largest values are located: torque, power and speed of the drive, and pin forces."""
-    speed = getattr(solution, f"omega_{solution.drive_bar}")
-    drive = {"torque": solution.torque, "power": solution.power, "speed": speed}
+    of_drive = driving(solution)
+    drive = {of_drive.keys.value: of_drive.keys.value, "power": "power", "speed": of_drive.speed_key}
     forces = {name: np.hypot(*getattr(solution, name).T) for name in PIN_FORCES}
-    return {**{name: np.abs(values) for name, values in drive.items()}, **forces}
+    return {**{name: np.abs(getattr(solution, key)) for name, key in drive.items()}, **forces}
 
 
 def between(scene: Scene, solution: Solution) -> Between | None:

@@ -10,7 +10,8 @@ from fourbar.errors import DependencyError, InputError, expect, installing
 from fourbar.evaluation.case import state_at
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
+from fourbar.quantities import COUPLE, LINE, UNITS, DriveNames
 from fourbar.scene import Command, Scene
 from fourbar.solution import Array, Conversion, Solution, unit_in
 
@@ -37,21 +38,74 @@ def _evaluated(solution: Solution, name: str) -> Array:
 def shaking_force(solution: Solution) -> Array:
     """Force of the bars on the frame through its pins, F21 + F41 = -(F12 + F14), N, (n, 2), of a study (m, n, 2).
 
-    A spring with one end on the ground pulls there besides.
+    A linear drive with an end on the ground adds its own; a spring pulls there besides.
     """
-    return -(_evaluated(solution, "F12") + _evaluated(solution, "F14"))
+    return -(_evaluated(solution, "F12") + _evaluated(solution, "F14")) + _pushed(solution)
+
+
+def _pushed(solution: Solution) -> Array:
+    """Force of a linear drive on the frame, N, (n, 2)."""
+    ends = () if solution.drive is None else solution.drive.ends
+    sense = sum(sense for sense, point in ends if point.bar == 1)
+    if not sense:
+        return np.zeros((*solution.theta_2.shape, 2))
+    return np.asarray(sense * _evaluated(solution, "drive_force")[..., None] * _evaluated(solution, "drive_line"))
 
 
 def shaking_moment(solution: Solution) -> Array:
     """Moment of the bars and of the drive on the frame about O2, -T - O4 x F14, N m, (n,), of a study (m, n).
 
+    The moment of a linear drive with an end on the ground takes the place of -T.
+
     Couples that effects exert between the bars and ground (pin damping or friction at O2, O4)
     are not part of it.
     """
-    F14, torque = _evaluated(solution, "F14"), _evaluated(solution, "torque")
+    F14 = _evaluated(solution, "F14")
+    of_drive = 0.0 if solution.drive is not None else -_evaluated(solution, "torque")
     assert solution.ground is not None
     length, angle = solution.ground
-    return np.asarray(-torque - length * (np.cos(angle) * F14[..., 1] - np.sin(angle) * F14[..., 0]))
+    for _, point in () if solution.drive is None else solution.drive.ends:
+        if point.bar == 1:
+            of_drive = _moment(point.distance, point.angle + angle, _pushed(solution))
+    return np.asarray(of_drive - _moment(length, angle, F14))
+
+
+def _moment(distance: Any, angle: Any, force: Array) -> Array:
+    """About O2, of a force at a place, N m, (n,), of a study (m, n)."""
+    return np.asarray(distance * (np.cos(angle) * force[..., 1] - np.sin(angle) * force[..., 0]))
+
+
+class Driving(NamedTuple):
+    """What the drive does, as it is shown."""
+
+    name: str
+    symbol: str
+    unit: str
+    values: Array | None
+    """(n,); None where only positions are known."""
+    error: Array | None
+    keys: DriveNames
+    """Of its torque or force among the quantities."""
+    speed_key: str
+    speed: Array | None
+    """rad/s of the driven bar, or m/s of the stroke."""
+
+
+def driving(solution: Solution) -> Driving:
+    """Torque or force of the drive, with its error bar and speed."""
+    names, symbol, word, speed = COUPLE, f"T{solution.drive_bar}", "torque", f"omega_{solution.drive_bar}"
+    if solution.drive is not None:
+        names, symbol, word, speed = LINE, "F", "drive force", "stroke_speed"
+    values, error = (getattr(solution, name) for name in names[:2])
+    return Driving(word, symbol, UNITS[names.value], values, error, names, speed, getattr(solution, speed))
+
+
+def drive_words(scene: Scene) -> str:
+    """Say what is driven."""
+    if scene.drive is not None:
+        start, end = scene.drive.start.bar, scene.drive.end.bar
+        return f"along a line from bar {start} ({BAR_NAMES[start]}) to bar {end} ({BAR_NAMES[end]})"
+    return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
 
 
 def once_round(solution: Solution) -> Any:
@@ -102,14 +156,14 @@ class MotorDuty(NamedTuple):
     Of a study each is an array (m,).
     """
 
-    peak_torque: float
-    """Largest size, N m."""
-    rms_torque: float
+    peak_torque: float | None
+    """Largest size, N m; None where the drive is linear."""
+    rms_torque: float | None
     """N m."""
     peak_speed: float
-    """Largest size of omega of the driven bar, rad/s."""
+    """Largest size of omega of the driven bar, rad/s, or of the speed of the stroke, m/s."""
     peak_power: float
-    """Largest size of T_k omega_k, W."""
+    """Largest size of T_k omega_k, or of force times speed, W."""
     rms_power: float
     """W."""
     energy_in: float | None
@@ -118,12 +172,16 @@ class MotorDuty(NamedTuple):
     """That the linkage gives back, J."""
     closed: bool
     """The sweep is one turn of the input, or several."""
+    peak_force: float | None = None
+    """Of a linear drive, N."""
+    rms_force: float | None = None
 
 
 DUTY_UNITS = {
     **{"peak_torque": "N m", "rms_torque": "N m", "peak_speed": "rad/s", "peak_power": "W", "rms_power": "W"},
-    **{"energy_in": "J", "energy_out": "J"},
+    **{"energy_in": "J", "energy_out": "J", "peak_force": "N", "rms_force": "N"},
 }
+"""The speed of a linear drive is in m/s."""
 
 
 def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty | None:
@@ -132,7 +190,7 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
     E = integral of P dt, dt = d theta_2/omega_2 in a sweep; E_in of the positive part of P, E_out of the negative.
     Positions without a value are left out, and so are the steps from and to them.
 
-    Returns None where no position has a torque: a released linkage, or positions alone.
+    Returns None where no position has a torque or force of the drive: a released linkage, or positions alone.
 
     Parameters
     ----------
@@ -140,20 +198,25 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
     located : the same with the positions of the peaks among its own, of which the peaks are taken.
     """
     expect("solution", solution, Solution)
-    if solution.torque is None or not np.isfinite(solution.torque).any():
+    drive = driving(solution)
+    if drive.values is None or not np.isfinite(drive.values).any():
         return None
     power = _evaluated(solution, "power")
     closed, peak = once_round(solution), solution if located is None else located
+    linear, largest = solution.drive is not None, _peak(_evaluated(peak, drive.keys.value))
+    rms = _rms(_counted(solution, drive.values))
     energy_in, energy_out = _energy(solution, power)
     return MotorDuty(
-        _peak(_evaluated(peak, "torque")),
-        _rms(_counted(solution, solution.torque)),
-        _peak(_evaluated(peak, f"omega_{solution.drive_bar}")),
+        None if linear else largest,
+        None if linear else rms,
+        _peak(_evaluated(peak, drive.speed_key)),
         _peak(_evaluated(peak, "power")),
         _rms(_counted(solution, power)),
         energy_in,
         energy_out,
         bool(closed) if np.ndim(closed) == 0 else closed,
+        largest if linear else None,
+        rms if linear else None,
     )
 
 
@@ -189,7 +252,8 @@ def motor_entry(solution: Solution, units: Conversion, located: Solution | None 
     if duty is None:
         return None
     entry: dict[str, Any] = {"closed": duty.closed}
-    for name, unit in DUTY_UNITS.items():
+    own = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
+    for name, unit in own.items():
         number = getattr(duty, name)
         entry[name] = None if number is None else number * unit_in(unit, units)[1]
     force, angle = unit_in("N", units)[1], unit_in("rad", units)[1]
@@ -199,7 +263,7 @@ def motor_entry(solution: Solution, units: Conversion, located: Solution | None 
         pin: {"peak": peaks[pin].largest * force, "rms": load.rms * force, "theta_2": peaks[pin].where * angle}
         for pin, load in loads.items()
     }
-    entry["units"] = {name: unit_in(unit, units)[0] for name, unit in DUTY_UNITS.items()}
+    entry["units"] = {name: unit_in(unit, units)[0] for name, unit in own.items()}
     return entry
 
 

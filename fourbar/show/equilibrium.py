@@ -8,6 +8,7 @@ import numpy as np
 
 from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
 from fourbar.scene.motion import BRANCH_NAMES
+from fourbar.show.duty import driving
 from fourbar.show.tables import MOST_ROWS, plain_table, under_heading
 from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
@@ -48,12 +49,14 @@ def _heading(found: Equilibria) -> list[str]:
 
 def _holding(found: Equilibria) -> tuple[list[str], Any]:
     """Write what holds the scene's positions, thinned out to what can be read."""
-    at, bar = found.positions, found.positions.drive_bar
-    assert at.torque is not None
+    at = found.positions
+    drive = driving(at)
+    values, low, high = drive.values, getattr(at, drive.keys.low), getattr(at, drive.keys.high)
+    assert values is not None
     index = range(0, len(at), -(-len(at) // MOST_ROWS))
-    heads, columns = ["theta_2 (deg)", "torque (N m)"], [np.degrees(at.theta_2), at.torque]
-    if at.torque_low is not None and at.torque_high is not None:
-        heads, columns = [heads[0], "from (N m)", "to (N m)"], [columns[0], at.torque_low, at.torque_high]
+    heads, columns = ["theta_2 (deg)", f"{drive.name} ({drive.unit})"], [np.degrees(at.theta_2), values]
+    if low is not None and high is not None:
+        heads, columns = [heads[0], f"from ({drive.unit})", f"to ({drive.unit})"], [columns[0], low, high]
     rows = [
         [
             *(_number(column[i]) for column in columns),
@@ -61,10 +64,11 @@ def _holding(found: Equilibria) -> tuple[list[str], Any]:
         ]
         for i in index
     ]
-    lines = [f"torque on bar {bar} that holds it at rest, and how it moves when released"]
-    if np.isfinite(at.torque).any():
-        most = int(np.nanargmax(np.abs(at.torque)))
-        lines.append(f"largest: {at.torque[most]:.6g} N m at theta_2 = {_degrees(at.theta_2[most])} deg")
+    on = "" if at.drive is not None else f" on bar {at.drive_bar}"
+    lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
+    if np.isfinite(values).any():
+        most = int(np.nanargmax(np.abs(values)))
+        lines.append(f"largest: {values[most]:.6g} {drive.unit} at theta_2 = {_degrees(at.theta_2[most])} deg")
     return lines, plain_table([*heads, "released"], rows, left=("released",))
 
 
@@ -106,7 +110,7 @@ def json_text(title: str, found: Equilibria) -> str:
     def column(values: Any) -> Any:
         return None if values is None else [*map(_finite, values.tolist())]
 
-    at = found.positions
+    at, keys = found.positions, driving(found.positions).keys
     document = {
         "schema": SCHEMA,
         "title": title,
@@ -125,7 +129,7 @@ def json_text(title: str, found: Equilibria) -> str:
             "drive_bar": at.drive_bar,
             "status": list(at.status),
             "branch": at.branch.tolist(),
-            **{name: column(getattr(at, name)) for name in ("theta_2", "torque", "torque_low", "torque_high")},
+            **{name: column(getattr(at, name)) for name in ("theta_2", keys.value, keys.low, keys.high)},
             "moves": found.moves.tolist(),
         },
     }

@@ -22,7 +22,7 @@ def heading(scene: Scene, found: Extremes, units: Conversion = DEGREES) -> list[
     if found.distance:
         lines.append(
             f"left out: theta_2 within {value(found.distance, 'rad', units)} of a limit of the input or of a pole of "
-            "the torque, where the loads grow without bound"
+            "the drive, where the loads grow without bound"
         )
     if found.nominal is None:
         lines.append(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import COUPLE, LINE, PIN_FORCES
 from fourbar.show.tables import plain_table
 from fourbar.solution import nulled, unit_of
 from fourbar.studies.derivatives import Sensitivity
@@ -41,7 +41,8 @@ def step_of(found: Sensitivity, key: str) -> float:
 def shown_quantities(found: Sensitivity) -> list[str]:
     """Torque and pin forces, or where the scene states no speed the angles; and its own points."""
     own = [point.name for point in found.scene.points]
-    return [*(("torque", *PIN_FORCES) if "torque" in found.by else ("theta_3", "theta_4")), *own]
+    drive = [name for name in (COUPLE.value, LINE.value) if name in found.by]
+    return [*((*drive, *PIN_FORCES) if drive else ("theta_3", "theta_4")), *own]
 
 
 def influences(found: Sensitivity, quantity: str) -> list[Influence]:

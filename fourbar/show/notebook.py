@@ -37,6 +37,7 @@ def scene_html(scene: "Scene", units: Conversion = SI) -> str:
 
 def _facts(scene: "Scene", units: Conversion) -> list[tuple[str, str]]:
     from fourbar.formulas.linkage_type import classify
+    from fourbar.show.duty import drive_words
     from fourbar.show.tables import value
 
     motion = scene.motion
@@ -47,12 +48,11 @@ def _facts(scene: "Scene", units: Conversion) -> list[tuple[str, str]]:
     speed = "positions only"
     if motion.omega_2 is not None:
         speed = f"ω2 = {value(motion.omega_2, 'rad/s', units)}, α2 = {value(motion.alpha_2, 'rad/s^2', units)}"
-    drive = f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
     acting = [f"load on bar {load.bar}" for load in scene.loads] + [effect.key for effect in scene.effects]
     return [
         *facts,
         ("motion", f"{speed}; {BRANCH_NAMES[motion.branch]} branch"),
-        ("drive", "released" if motion.free is not None else drive),
+        ("drive", "released" if motion.free is not None else drive_words(scene)),
         ("acting", ", ".join(acting) or "nothing"),
     ]
 

@@ -28,7 +28,7 @@ MAX_ROWS = 1441
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
-SCALARS = (*ANGLES, "condition", *RATES, "torque")
+SCALARS = (*ANGLES, "condition", *RATES, "torque", "drive_force", "stroke")
 
 
 def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
@@ -115,7 +115,8 @@ def _through_time(scene: Scene) -> dict[str, Any]:
     columns = _columns(solution)
     columns["theta_2"] = where.theta_2.tolist()
     if scene.motion.free is not None:
-        del columns["torque"]
+        for name in ("torque", "drive_force"):
+            columns.pop(name, None)
         columns["energy"] = nulled(energies(scene, solution).kinetic)
     duration = float(where.time[-1] - where.time[0])
     rate = _rate(duration)

@@ -13,7 +13,7 @@ from fourbar.quantities import ANGLES, PIN_FORCES, STATUS_NAMES, UNITS
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.between import Between, between
-from fourbar.show.duty import bearing_load, motor_duty
+from fourbar.show.duty import bearing_load, drive_words, driving, motor_duty
 from fourbar.solution import DEGREES, Array, Conversion, Solution, unit_in, unit_of
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def _ordinal(number: int) -> str:
 def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> list[str]:
     """Write the lines above the table: what was requested, and how many of the positions have an answer."""
     lengths = zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
-    drive = f"drive on bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
+    drive = f"drive {'on ' if scene.drive is None else ''}{drive_words(scene)}"
     if scene.motion.free is not None:
         drive = "released, no drive"
     branch = BRANCH_NAMES[scene.motion.branch]
@@ -116,19 +116,24 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
             f"{scene.motion.free.steps + 1} instants were wanted: the motion stops at a limit position at "
             f"t = {solution.stopped_at:.6g} s, where bars 3 and 4 are in line"
         )
-    if scene.motion.omega_2 is None and solution.torque is None and _acting(scene):
+    of_drive = driving(solution)
+    if scene.motion.omega_2 is None and of_drive.values is None and _acting(scene):
         lines.append(f"positions only, since omega_2 is left out; {STATIC}")
     found = between(scene, solution)
     if found is not None and found.reversals:
         where = ", ".join(f"{value(theta_2, 'rad', units)} ({pin})" for theta_2, pin in found.reversals)
         lines.append(f"dry friction reverses, and the pin forces jump, at theta_2 = {where}")
-    if scene.motion.free is None and solution.torque is not None and np.isfinite(solution.torque).any():
+    if scene.motion.free is None and of_drive.values is not None and np.isfinite(of_drive.values).any():
         peak = solution if found is None else found.solution
-        assert peak.torque is not None
-        worst = int(np.nanargmax(np.abs(peak.torque)))
+        values = driving(peak).values
+        assert values is not None
+        worst = int(np.nanargmax(np.abs(values)))
         where = value(peak.theta_2[worst], "rad", units)
-        most = f"largest torque{_among(solution, found, 'torque')}"
-        lines.append(f"{most} {value(peak.torque[worst], 'N m', units)} at theta_2 = {where}")
+        most = f"largest {of_drive.name}{_among(solution, found, of_drive.keys.value)}"
+        lines.append(f"{most} {value(values[worst], of_drive.unit, units)} at theta_2 = {where}")
+        if solution.stroke is not None:
+            ends = (value(end(solution.stroke), "m", units) for end in (np.nanmin, np.nanmax))
+            lines.append("stroke from {} to {}".format(*ends))
         lines += _warning(scene, solution, units)
         lines += _motor(solution, units, found)
     if solution.F12 is not None and np.isfinite(solution.F12).any():
@@ -153,8 +158,11 @@ def _motor(solution: Solution, units: Conversion, found: Between | None) -> list
     duty = motor_duty(solution, None if found is None else found.solution)
     if duty is None or len(solution) == 1:
         return []
+    rms = f"RMS torque {value(duty.rms_torque, 'N m', units)}" if duty.rms_torque is not None else ""
+    if duty.rms_force is not None:
+        rms = f"RMS force {value(duty.rms_force, 'N', units)}"
     lines = [
-        f"motor: RMS torque {value(duty.rms_torque, 'N m', units)}, peak speed {value(duty.peak_speed, 'rad/s', units)}"
+        f"motor: {rms}, peak speed {value(duty.peak_speed, 'rad/s' if solution.drive is None else 'm/s', units)}"
         f", power peak {value(duty.peak_power, 'W', units)}, RMS {value(duty.rms_power, 'W', units)}"
     ]
     if duty.energy_in is not None and duty.energy_out is not None:
@@ -179,19 +187,23 @@ def value(number: float, unit: str, units: Conversion) -> str:
 
 
 def _warning(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
-    """Where the torque has few digits left, and how far from in line the two bars are that cost them."""
-    assert solution.torque is not None
-    if solution.torque_error is None or solution.drive_condition is None:
+    """Where the drive's torque or force has few digits left, and how far from in line the bars are that cost them."""
+    drive = driving(solution)
+    assert drive.values is not None
+    if drive.error is None or solution.drive_condition is None:
         return []
-    # of torques that matter: one that passes through zero has no digits, and needs none
+    # of those that matter: one that passes through zero has no digits, and needs none
     with np.errstate(invalid="ignore"):
-        share = solution.torque_error / np.maximum(np.abs(solution.torque), np.nanmedian(np.abs(solution.torque)))
+        share = drive.error / np.maximum(np.abs(drive.values), np.nanmedian(np.abs(drive.values)))
     if not np.nanmax(share, initial=0.0) > FEW_DIGITS:
         return []
     worst = int(np.nanargmax(share))
     left = max(math.floor(-math.log10(share[worst])), 0)
     where = f"at theta_2 = {value(solution.theta_2[worst], 'rad', units)}"
     sines = {"3 and 4": abs(solution.sin_mu[worst])}
+    if scene.drive is not None:
+        lever, sine = solution.drive_condition[worst], sines["3 and 4"]
+        return [f"{left} digits left of F {where}: of its lever {lever:.2g}, of sin mu {sine:.2g} is left"]
     if scene.drive_bar != 2:
         sines[{3: "2 and 4", 4: "2 and 3"}[scene.drive_bar]] = solution.drive_condition[worst]
     bars = min(sines, key=lambda pair: sines[pair])
@@ -215,9 +227,10 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
     if solution.time is not None:
         add("time", "s", solution.time)
     add("theta_2", "rad", solution.theta_2)
-    if solution.torque is not None:
+    drive = driving(solution)
+    if drive.values is not None:
         if solution.time is None:  # released, it has no drive: its torque is rounding
-            add(f"T{solution.drive_bar}", "N m", solution.torque)
+            add(drive.symbol, drive.unit, drive.values)
             add("power", "W", solution.power)
         for name in PIN_FORCES:
             add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
@@ -227,12 +240,12 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
             add(f"{name}_{letter}", unit_of(name), vector[:, axis])
     for name in ANGLES:
         add(name, "rad", getattr(solution, name))
-    for name in ("omega_3", "omega_4", "alpha_3", "alpha_4"):
+    for name in ("stroke", "stroke_speed", "omega_3", "omega_4", "alpha_3", "alpha_4"):
         if getattr(solution, name) is not None:
             add(name, UNITS[name], getattr(solution, name))
     shown["sin mu\n"] = _cells(solution.sin_mu)
-    if solution.time is None and solution.torque is not None and solution.torque_error is not None:
-        shown["digits\nof T"] = _digits(solution.torque, solution.torque_error)
+    if solution.time is None and drive.values is not None and drive.error is not None:
+        shown[f"digits\nof {drive.symbol[0]}"] = _digits(drive.values, drive.error)
     return shown
 
 

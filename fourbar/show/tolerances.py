@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError
-from fourbar.quantities import PIN_FORCES, UNITS
+from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS
 from fourbar.scene import Scene
 from fourbar.show.progress import running
 from fourbar.show.tables import plain_table
@@ -29,8 +29,8 @@ SCHEMA = "fourbar-tolerance/1"
 def shown_parts(found: Tolerances) -> list[str]:
     """Torque and magnitudes of pin forces, or where the scene states no speed the angles; and its own points."""
     own = [f"{point.name}_{letter}" for point in found.scene.points for letter in "xy"]
-    first = ["torque", *(f"|{name}|" for name in PIN_FORCES)] if "torque" in found.spreads else ["theta_3", "theta_4"]
-    return [*first, *own]
+    drive = [name for name in (COUPLE.value, LINE.value) if name in found.spreads]
+    return [*([*drive, *(f"|{name}|" for name in PIN_FORCES)] if drive else ["theta_3", "theta_4"]), *own]
 
 
 def part_unit(part: str) -> str:

@@ -287,8 +287,9 @@ def _derivatives(
         for pin in {pin for term in case.terms for pin in term.dry_pins}:
             held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (values(omega_2) == 0.0)
         dynamics = case.dynamics(state, alpha_2)
-        found |= {**dynamics.pins._asdict(), "torque": dynamics.torque}
-        found["drive_condition"] = np.abs(case.path.drive_sine(position, case.drive_bar))
+        found |= {**dynamics.pins._asdict(), case.names.value: dynamics.drive}
+        found["power"] = dynamics.drive * case.drive_speed(state)
+        found["drive_condition"] = case.drive_condition(state._replace(at=position))
     return {name: found[name] for name in names}, held
 
 

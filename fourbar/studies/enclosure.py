@@ -22,7 +22,7 @@ from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Loop, close_loop
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import COUPLE, LINE, PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.studies.derivatives import differentiable
 from fourbar.studies.interval import interval, require, require_all
@@ -41,7 +41,8 @@ NEGLIGIBLE = 0.02
 """A box over which theta_2 adds less than this share of what the tolerances add is not halved: the rest is theirs."""
 MANY = 2**15
 """Boxes left; a quantity so level that more would be is bounded by these: a linkage that springs balance has none."""
-NAMES = ("torque", *(f"|{name}|" for name in PIN_FORCES), "transmission")
+DRIVES = (COUPLE.value, LINE.value)
+NAMES = (*DRIVES, *(f"|{name}|" for name in PIN_FORCES), "transmission")
 Balls = NDArray[Any]
 
 
@@ -63,7 +64,7 @@ class Extremes(NamedTuple):
     distance: float
     """How near to a limit of the input or a pole of the torque they reach, rad; 0 where there is none."""
     least: dict[str, Extreme]
-    """By quantity: torque (N m), |F12| .. |F14| (N), transmission (rad)."""
+    """By quantity: torque (N m) or drive_force (N), |F12| .. |F14| (N), transmission (rad)."""
     greatest: dict[str, Extreme]
     boxes: int
     """That were evaluated."""
@@ -83,8 +84,8 @@ class Extremes(NamedTuple):
         return (proven - middle) / (found - middle) if sign * (found - middle) > PROVEN * abs(middle) else None
 
 
-def extremes(scene: Scene, quantities: Sequence[str] = NAMES) -> Extremes:
-    """Largest and smallest torque, pin forces and transmission angle over the input's whole interval, proven.
+def extremes(scene: Scene, quantities: Sequence[str] = ()) -> Extremes:
+    """Largest and smallest drive, pin forces and transmission angle over the input's whole interval, proven.
 
     At the scene's omega_2, alpha_2 and branch. Where the scene has tolerances the bounds hold for every linkage within
     them (three sigma of a normal one): `high` of the greatest and `low` of the least are then proven, and the other end
@@ -93,7 +94,8 @@ def extremes(scene: Scene, quantities: Sequence[str] = NAMES) -> Extremes:
 
     Parameters
     ----------
-    quantities : of torque, |F12|, |F32|, |F43|, |F14|, transmission; left out: all. F12 means |F12|.
+    quantities : of torque (drive_force where the drive is linear), |F12|, |F32|, |F43|, |F14|, transmission; left out:
+        all. F12 means |F12|.
 
     Raises
     ------
@@ -110,10 +112,11 @@ def extremes(scene: Scene, quantities: Sequence[str] = NAMES) -> Extremes:
     expect("quantities", quantities, list, tuple)
     for name in quantities:
         expect("quantities", name, str)
-    names = [name for name in NAMES if name in quantities or name.strip("|") in quantities]
+    known = [name for name in NAMES if name not in DRIVES or name == DRIVES[scene.drive is not None]]
+    names = [name for name in known if not quantities or name in quantities or name.strip("|") in quantities]
     for name in quantities:
-        if name not in NAMES and f"|{name}|" not in NAMES:
-            raise InputError("quantity", name, "must be one of " + ", ".join(NAMES).replace("|", ""))
+        if name not in known and f"|{name}|" not in known:
+            raise InputError("quantity", name, "must be one of " + ", ".join(known).replace("|", ""))
     require(scene)
     before, flint.ctx.prec = flint.ctx.prec, BITS
     try:
@@ -187,13 +190,13 @@ class _Search:
         at = close_loop(lengths, u1, u2, half, self.branch)
         terms = (*scene.loads, *scene.effects)
         path = Path(2, lengths, theta_1, u1)
-        case = Case(link, lengths, bodies(link, terms), terms, scene.drive_bar, path)
+        case = Case(link, lengths, bodies(link, terms), terms, scene.drive_bar, path, drive=scene.drive)
         acceleration = numbers["motion.alpha_2"]
         state = case.state(path, q, at, self.branch, numbers["motion.omega_2"], acceleration)
         found = case.dynamics(state, acceleration)
         forces = {f"|{name}|": dot(force, force) for name, force in found.pins._asdict().items()}
         cosine = dot(at.u3, at.u4)
-        return {"torque": found.torque, **forces, "sine": at.sin_mu * at.sin_mu, "cosine": cosine * cosine}
+        return {case.names.value: found.drive, **forces, "sine": at.sin_mu * at.sin_mu, "cosine": cosine * cosine}
 
     def over(self, boxes: NDArray[np.float64]) -> tuple[dict[str, Sloped], dict[str, Sloped]]:
         """Evaluate the quantities over the boxes and all tolerances, and at the centres without any."""
@@ -213,7 +216,7 @@ class _Search:
         if of == "sine" and _lowest(sign, self.over(self.start)[1][of]).max() * sign > 0.5:
             of, sign = "cosine", -sign  # near a right angle it has the digits
         low, high, where = self.enclosed(of, sign)
-        if name != "torque":
+        if name not in DRIVES:
             low, high = (end.max(arb(0)).sqrt() for end in (low, high))
         if of == "sine":
             low, high = (end.min(arb(1)).asin() for end in (low, high))
@@ -245,7 +248,7 @@ class _Search:
             if found.max() > best:
                 best, where = float(found.max()), float(centre[int(found.argmax())])
                 size = max(size, abs(best))
-            allowed = PROVEN * (math.sqrt(abs(best) * size) + PROVEN * size if name != "torque" else size)
+            allowed = PROVEN * (math.sqrt(abs(best) * size) + PROVEN * size if name not in DRIVES else size)
             done = (top <= best + allowed) | ((settled | (radius < finest) | (len(boxes) > MANY)) & np.isfinite(top))
             closed = max([closed, *top[done & (top > best)].tolist()])
             done |= top <= closed

@@ -36,9 +36,9 @@ def with_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
         if chosen.any():
             part = curve.state(points[chosen])
             # the path of bar 4 takes the drive's sine from directions
-            case = curve.case._replace(drive_bar=bar, path=path(curve.lengths, curve.theta_1, 4))
+            case = curve.case._replace(drive_bar=bar, drive=None, path=path(curve.lengths, curve.theta_1, 4))
             found = case.dynamics(part, 0.0, side)
-            Q = -found.torque * part.k[bar - 2]
+            Q = -found.drive * part.k[bar - 2]
             result[chosen] = Q if found.status is None else np.where(found.status == JAMMED, -side * np.inf, Q)
     return result
 

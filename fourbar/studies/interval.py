@@ -59,7 +59,7 @@ def interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:
         start, stop = next(((low, high) for low, high in every if low <= first <= high), every[0])
         start, stop, gaps = start + DISTANCE, stop - DISTANCE, True
     parts = [(start, stop)]
-    if scene.drive_bar != 2:  # T3 has poles where bar 3 stands still against the ground, T4 where bar 4 does
+    if scene.drive_bar in (3, 4):  # T3 has poles where bar 3 stands still against the ground, T4 where bar 4 does
         for limit in limit_positions(linkage, scene.drive_bar):
             for turn in range(-2, 3):
                 at = limit.theta_2 + TURN * turn

@@ -62,9 +62,17 @@ def _of_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     for index in range(len(effect.springs)):
         spring, own = f"{key}.{index}", (*place, "springs", index)
         found |= {f"{spring}.{name}": SceneNumber((*own, name), *of) for name, of in numbers.items()}
-        for name, end in (("from", "start"), ("to", "end")):
-            found |= _pair(f"{spring}.{name}.at", (*own, end), "m", ("distance", "angle"))
+        found |= _of_ends(spring, own)
     return found
+
+
+def _of_ends(key: str, place: Place) -> dict[str, SceneNumber]:
+    """List the entries of both ends of a line between two bars."""
+    one, other = (
+        _pair(f"{key}.{name}.at", (*place, end), "m", ("distance", "angle"))
+        for name, end in (("from", "start"), ("to", "end"))
+    )
+    return one | other
 
 
 def entries(scene: Scene) -> dict[str, SceneNumber]:
@@ -81,6 +89,8 @@ def entries(scene: Scene) -> dict[str, SceneNumber]:
     if scene.motion.law is None:
         found["motion.omega_2"] = SceneNumber(("motion", "omega_2"), "rad/s")
         found["motion.alpha_2"] = SceneNumber(("motion", "alpha_2"), "rad/s^2")
+    if scene.drive is not None:
+        found |= _of_ends("drive", ("drive",))
     for index, load in enumerate(scene.loads):
         if load.force is not None:
             found |= _pair(f"loads.{index}.force", ("loads", index, "force"), "N")

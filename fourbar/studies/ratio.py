@@ -131,7 +131,7 @@ def _over_range(scene: Scene) -> Command:
         if low == high:
             raise InputError("motion.theta_2", scene.motion.theta_2, "must sweep over a range")
     else:
-        low, high = interval(replace(scene, drive_bar=2))[0][0]
+        low, high = interval(replace(scene, drive_bar=2, drive=None))[0][0]
     at = command(replace(scene, motion=replace(scene.motion, theta_2=Sweep(low, high, SAMPLES), free=None)))
     return at._replace(omega_2=scene.motion.omega_2 or 0.0)
 

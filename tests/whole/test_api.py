@@ -135,6 +135,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         ),
         "Load, its table": (Table, ((0.0, 2.0), (1.0, 1.0))),
         "Spring": (lambda *x: acting(fourbar.Springs((fourbar.Spring(*x),))), (*ends, 1.0, 0.1, 0.1)),
+        "LinearDrive": (lambda *x: fourbar.solve(fourbar.Scene(link, drive=fourbar.LinearDrive(*x))), ends),
         "Springs": (lambda x: acting(fourbar.Springs(x)), ((fourbar.Spring(*ends, 1.0),),)),
         "Gravity": (lambda *x: acting(fourbar.Gravity(*x)), (9.81, 1.0)),
         "Flywheel": (lambda *x: acting(fourbar.Flywheel(*x)), (0.1, 2)),

@@ -10,7 +10,7 @@ import pytest
 from fourbar import Motion, Scene, Sweep, command, solve, uniform
 from fourbar.effects import PinFriction
 from fourbar.formulas.pin_forces import PinForces
-from fourbar.quantities import FORCES, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
+from fourbar.quantities import FORCES, OF_LINE, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
 from fourbar.solution import Solution
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import COLUMNS, FORMULAS, IDENTITIES, Row
@@ -32,10 +32,10 @@ from tests.support.scenes import crank_rocker
 
 PAGE = (Path(__file__).parents[2] / "docs" / "results-format.md").read_text()
 NOT_QUANTITIES = (
-    *("title", "drive_bar", "status_code", "branch", "ground", "stopped_at"),
+    *("title", "drive", "drive_bar", "status_code", "branch", "ground", "stopped_at"),
     *("points", "velocity", "acceleration"),
 )
-OF_A_SCENE = ("assembled", "undecided", "torque_inertia")
+OF_A_SCENE = ("assembled", "undecided", "torque_inertia", "drive_force_inertia")
 """Of every engine, besides what it says of positions and of the linkage."""
 SHIPPED_RUN = baseline(ACCEPTED)
 TYPES = {"string": str, "double": float, "boolean": bool}
@@ -97,11 +97,10 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
 
 def test_the_fields_of_a_solution_are_the_rows_of_the_table() -> None:
     named = [field.name for field in dataclasses.fields(Solution)]
-    stored = [q.name for q in QUANTITIES if q.group != "product"]
-    assert [name for name in named if name not in NOT_QUANTITIES] == stored
+    assert [name for name in named if name not in NOT_QUANTITIES] == [q.name for q in QUANTITIES]
     assert set(NOT_QUANTITIES) <= set(named)
     assert {q.kind for q in QUANTITIES} == {"scalar", "vector"}
-    assert {q.group for q in QUANTITIES} == {"", "unknown", "product", "dry friction", "pin loads"}
+    assert {q.group for q in QUANTITIES} == {"", "unknown", "dry friction", "pin loads", "linear drive"}
     assert STAGES == ("position", "velocity", "acceleration", "force", "error")
 
 
@@ -109,13 +108,14 @@ def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity() -> None:
     solution = solve(crank_rocker(effects=(PinFriction.at(A=(0.1, 0.01)),)), "error")
     for q in QUANTITIES:
         values = getattr(solution, q.name)
-        assert (values is None) == (q.name == "time")
+        assert (values is None) == (q.name == "time" or q.name in OF_LINE)
         assert values is None or values.shape == ((len(solution), 2) if q.kind == "vector" else (len(solution),))
 
 
 def test_the_formulas_name_the_pin_forces_as_the_table_does() -> None:
     assert PinForces._fields == PIN_FORCES == ("F12", "F32", "F43", "F14")
-    assert tuple(name for name in UNKNOWNS if name not in FORCES) + FORCES == UNKNOWNS
+    assert tuple(name for name in UNKNOWNS if name not in FORCES) + FORCES[:5] == UNKNOWNS
+    assert FORCES[5:] == ("drive_force", "power")
 
 
 def test_the_parquet_file_holds_the_rows_of_the_table(results: Path) -> None:

@@ -29,7 +29,7 @@ function framed(p, bar, z) {
 }
 
 // Points that the picture has to hold: the ends of springs, and where loads act.
-const actingPoints = p => data.acting.flatMap(one => one.kind === "spring" ? [framed(p, one.bar, one.at), framed(p, ...one.end)] : one.kind === "force" ? [forceFoot(p, one)] : []);
+const actingPoints = p => data.acting.flatMap(one => one.end ? [framed(p, one.bar, one.at), framed(p, ...one.end)] : one.kind === "force" ? [forceFoot(p, one)] : []);
 
 function forceFoot(p, one) {
   const angle = one.turns ? { 2: p.theta2, 3: p.theta3, 4: p.theta4 }[one.bar] : 0, c = Math.cos(angle), s = Math.sin(angle);
@@ -79,6 +79,11 @@ function drawActing(p, i) {
       const teeth = Array.from({ length: COILS }, (_, n) => on(0.15 + 0.7 * (n + 0.5) / COILS, (n % 2 ? -0.6 : 0.6) * S));
       make(parts.under, "path", { class: "act act-spring", d: pathOf([a, on(0.15, 0), ...teeth, on(0.85, 0), b]) });
       for (const [x, y] of [a, b]) make(parts.acting, "circle", { class: "act-head act-spring", cx: x, cy: y, r: 3 });
+    } else if (one.kind === "cylinder") {
+      const a = toScreen(framed(p, one.bar, one.at)), b = toScreen(framed(p, ...one.end)), on = share => [0, 1].map(j => a[j] + share * (b[j] - a[j]));
+      make(parts.acting, "path", { class: "act act-drive", d: pathOf([a, b]) });
+      make(parts.acting, "path", { class: "act act-drive", style: "stroke-width:5", d: pathOf([on(0.1), on(0.6)]) });
+      for (const [x, y] of [a, b]) make(parts.acting, "circle", { class: "act-head act-drive", cx: x, cy: y, r: 3 });
     } else if (one.kind === "force") {
       const foot = forceFoot(p, one), angle = one.turns ? { 2: p.theta2, 3: p.theta3, 4: p.theta4 }[one.bar] : 0;
       const direction = Math.atan2(one.vector[1], one.vector[0]) + angle + (factor < 0 ? Math.PI : 0), [x, y] = toScreen(foot);

@@ -8,6 +8,7 @@ const QUANTITIES = [
   other("alpha_3", "\u03b1\u2083", "rad/s^2"), other("alpha_4", "\u03b1\u2084", "rad/s^2"),
   ...POINTS.flatMap(([name]) => [other(`v_${name}`, `speed of ${typeset(name)}`, "m/s"), other(`a_${name}`, `acceleration of ${typeset(name)}`, "m/s^2")]),
   other("energy", "kinetic energy", "J"), other("torque", `torque on bar ${data.drive_bar}`, "N m"),
+  other("drive_force", "force of the drive", "N"), other("stroke", "stroke", "m"),
   ...FORCES.map(name => other(name, `|${typeset(name)}|`, "N")),
 ];
 const chart = byId("chart");

@@ -4,7 +4,8 @@ const DEG = 180 / Math.PI, TURN = 2 * Math.PI, FORCES = ["F12", "F32", "F43", "F
 const REASONS = {   // why a position has no forces, or more than one set of them
   jammed: "Friction jams the linkage here: no forces, or none that begin a motion, are in balance.",
   several: "Friction allows several sets of forces here; shown are those of the least friction.",
-  no_direction: "Both ends of a spring meet here: its pull has no direction, and forces have no value.",
+  no_direction: "Both ends of a spring or of the drive meet here: its pull has no direction, and forces have no value.",
+  no_lever: "The line of the drive has no lever here: its stroke stands still, no force of it holds the linkage in balance.",
   wound: "A torsion spring is wound by more than half a turn here: forces have no value.",
   no_torque: "The two bars that are not driven are in line here: no torque of the drive holds them in balance.",
   overflow: "Numbers here are beyond the range of doubles: they have no value.",

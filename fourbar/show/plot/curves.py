@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.evaluation.case import Case, state_at
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
-from fourbar.show.duty import energies
+from fourbar.scene import Command
+from fourbar.show.duty import driving, energies
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,
@@ -92,6 +94,11 @@ def poles(view: View) -> Indices:
     s = view.sweep
     if view.scene.motion.free is not None:  # no drive, no pole
         return np.array([], dtype=np.intp)
+    if view.scene.drive is not None:
+        case = Case.of(view.scene)
+        state = state_at(view.scene, Command(s.theta_2, s.branch, 0.0, 0.0))
+        sine = view.scene.drive.leverage(state, case.sines(state.at))[0]
+        return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
     pair = {2: (s.theta_4, s.theta_3), 3: (s.theta_4, s.theta_2), 4: (s.theta_3, s.theta_2)}[view.scene.drive_bar]
     sine = np.sin(pair[0] - pair[1])
     return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
@@ -193,30 +200,37 @@ draw_speeds = partial(_of_points, letter="v", unit="m/s", title="Speeds of point
 draw_point_accelerations = partial(_of_points, letter="a", unit="m/s^2", title="Accelerations of points")
 
 
-def _of_drive(
-    axes: "Axes", view: View, of: Callable[[Solution], Array], letter: str, unit: str, title: str, what: str
-) -> None:
-    """Draw a quantity of the drive, with the poles of its torque."""
+def _of_drive(axes: "Axes", view: View, of: Callable[[Solution], Array], letter: str, unit: str, title: str) -> None:
+    """Draw a quantity of the drive, with its poles."""
     over, bar, where = bases(axes, view), view.scene.drive_bar, poles(view)
     values, everywhere = of(view.sweep), [of(other.sweep) for other in view.alike]
     limit = limit_of(everywhere)
     factor, shown_unit = unit_for(limit or largest(*everywhere), unit, view.units)
-    axes.plot(broken(over, where), factor * broken(values, where), color=INK, label=f"${letter}_{bar}$")
+    symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
+    axes.plot(broken(over, where), factor * broken(values, where), color=INK, label=symbol)
     for index in where:
         axes.axvline(0.5 * float(over[index] + over[index + 1]), color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
     if where.size:
-        note(view, f"Dotted: poles of the torque on bar {bar} ({POLE_REASON[bar]}).")
+        poles_of = f"torque on bar {bar} ({POLE_REASON[bar]})" if bar else "drive's force (its line has no lever)"
+        note(view, f"Dotted: poles of the {poles_of}.")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
-    axes.set(ylabel=f"${letter}_{bar}$ ({shown_unit})", title=f"{title} bar {bar}")
-    clip(axes, view, {f"{letter}{'₂₃₄'[bar - 2]}": values}, limit, what, unit)
+    axes.set(ylabel=f"{symbol} ({shown_unit})", title=title)
+    clip(axes, view, {f"{letter}{'₂₃₄'[bar - 2]}" if bar else letter: values}, limit, title.split(maxsplit=1)[0], unit)
 
 
-draw_torque = partial(
-    _of_drive, of=attrgetter("torque"), letter="T", unit="N m", title="Driving torque on", what="Torque"
-)
-draw_power = partial(
-    _of_drive, of=attrgetter("power"), letter="P", unit="W", title="Power of the drive on", what="Power"
-)
+def draw_drive(axes: "Axes", view: View) -> None:
+    """Draw the torque or force of the drive."""
+    drive, bar = driving(view.sweep), view.scene.drive_bar
+    title = f"Torque of the drive on bar {bar}" if bar else "Force of the drive"
+    _of_drive(axes, view, attrgetter(drive.keys.value), drive.symbol[0], drive.unit, title)
+
+
+def draw_power(axes: "Axes", view: View) -> None:
+    """Draw the power of the drive."""
+    bar = view.scene.drive_bar
+    _of_drive(
+        axes, view, attrgetter("power"), "P", "W", f"Power of the drive on bar {bar}" if bar else "Power of the drive"
+    )
 
 
 def force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:

@@ -48,8 +48,8 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     curves.draw_angles(panels["angles"], shown)
     curves.draw_velocities(panels["omega"], shown)
     curves.draw_accelerations(panels["alpha"], shown)
-    # what drives: torque and power, or in a free motion the work of loads and effects
-    (curves.draw_energy if free else curves.draw_torque)(panels["torque"], shown)
+    # what drives: torque or force, and power, or in a free motion the work of loads and effects
+    (curves.draw_energy if free else curves.draw_drive)(panels["torque"], shown)
     if not free:
         curves.draw_power(panels["power"], shown)
     curves.draw_forces(panels["forces"], shown)
@@ -97,7 +97,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "coupler": (lambda figure, *of: linkage.draw_coupler_curves(figure.subplots(), *of), (5.6, 5.4), False),
     "kinematics": (_kinematics, (5.6, 6.8), False),
     "points": (_points, (11.0, 5.6), True),
-    "torque": (_single(curves.draw_torque), (5.6, 3.2), True),
+    "torque": (_single(curves.draw_drive), (5.6, 3.2), True),
     "forces": (_single(curves.draw_forces), (5.6, 3.2), True),
     "hodograph": (_hodographs, (6.4, 6.6), True),
     "energy": (_single(curves.draw_energy), (5.6, 3.2), True),

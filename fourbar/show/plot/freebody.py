@@ -79,6 +79,10 @@ def free_body(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
 def _actions(view: View) -> Iterator[tuple[str, Recorder]]:
     """Collect loads and effects, each with what it puts on the bars."""
     state = view.state()
+    if view.scene.drive is not None and view.scene.motion.free is None:
+        recorder = Recorder(view.scene, state)
+        view.scene.drive.act(recorder, view.here.drive_force)
+        yield "$F$", recorder
     for count, load in enumerate(view.scene.loads, start=1):
         recorder = Recorder(view.scene, state)
         load.act(recorder, state)

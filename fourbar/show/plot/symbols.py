@@ -25,7 +25,7 @@ Point = tuple[float, float]
 LOAD, SPRING, PIN = "#8A3B78", "#6b5b00", "#4d5b70"
 COLOURS = {
     **{"force": LOAD, "moment": LOAD, "drive": INK, "gravity": MUTED, "spring": SPRING, "torsion": SPRING},
-    **{"flywheel": MUTED, "viscous": PIN, "friction": PIN, "pin_friction": PIN},
+    **{"cylinder": INK, "flywheel": MUTED, "viscous": PIN, "friction": PIN, "pin_friction": PIN},
 }
 LENGTHS = {"force": 7.0, "moment": 2.6, "drive": 3.2, "flywheel": 4.0, "torsion": 2.2}
 """Length of an arrow and radii, in sizes of a support; other rings around pins have RING."""
@@ -111,6 +111,12 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
         assert symbol.end is not None
         start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
         _line(axes, drawn, _zigzag(start, end, 0.6 * size), colour, 1.0)
+        drawn.artists += axes.plot([start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=8)
+    elif symbol.kind == "cylinder":
+        assert symbol.end is not None
+        start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
+        _line(axes, drawn, np.array([start, end]), colour, 1.2)
+        _line(axes, drawn, start + np.array([0.1, 0.6]) * (end - start), colour, 4.5)
         drawn.artists += axes.plot([start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=8)
     elif symbol.kind == "force":
         _force(axes, symbol, place, size, drawn)

@@ -71,7 +71,7 @@ def test_the_table_names_its_units(capsys: pytest.CaptureFixture[str]) -> None:
     heading = next(index for index, line in enumerate(lines) if line.startswith(" theta_2"))
     assert lines[1] == "ground 300 mm, input 100 mm, coupler 250 mm, output 220 mm"
     assert lines[heading + 1].split() == [
-        *["deg", "N", "mm", "N", "mm/s", *["kN"] * 4, "deg", "deg", *["rad/s"] * 2, *["rad/s^2"] * 2, "of", "T"]
+        *["deg", "N", "mm", "W", *["kN"] * 4, "deg", "deg", *["rad/s"] * 2, *["rad/s^2"] * 2, "of", "T"]
     ]
     most = float(next(line for line in lines if line.startswith("largest torque")).split()[2])
     assert most == pytest.approx(1000.0 * np.max(np.abs(fourbar.solve(fourbar.load(MODEL)).torque)), rel=1e-4)

@@ -48,7 +48,7 @@ def test_no_sample_lies_outside_and_the_enclosure_is_as_narrow_as_promised(rocke
     scene, found = rocker
     theta_2 = np.linspace(0, 2 * math.pi, 20_001)
     samples = sampled(fourbar.solve(scene, at=Command(theta_2, np.ones(20_001, np.int8), 10.0, 0.0)))
-    assert set(samples) == set(enclosure.NAMES) and found.distance == 0.0
+    assert set(samples) == set(enclosure.NAMES) - {"drive_force"} and found.distance == 0.0
     holds(found, samples)
     for name in found.least:
         values = samples[name]

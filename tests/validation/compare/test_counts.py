@@ -209,7 +209,7 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     out = tmp_path / "out"
     arguments = ["run", str(tmp_path / "scene.toml"), "--no-pictures", "--out", str(out)]
     assert status([*arguments, "--engines", "mujoco-simulated"]) == FAILED  # one position is no motion through time
-    sentence = "Nothing was compared on 1 scene: 7 of the formulas' own identities hold"
+    sentence = "Nothing was compared on 1 scene: 8 of the formulas' own identities hold"
     assert sentence in " ".join(capsys.readouterr().out.split())
     assert sentence in (out / "report.md").read_text()
     page = html.unescape((out / "report.html").read_text())
@@ -226,7 +226,7 @@ def test_every_form_of_a_report_says_the_same_counts() -> None:
     )
     summary = summary_of([good, bad])
     # the rows of the formulas themselves stand on both scenes; the others are of the free bodies
-    sentence = "All 52 comparisons on 1 of 2 scenes hold: 52 agree; not compared: 2 refuse"
+    sentence = "All 54 comparisons on 1 of 2 scenes hold: 54 agree; not compared: 2 refuse"
     assert summary.verdict == sentence == summary.counts.sentence() and summary.good
     assert sentence in markdown(summary)
     page = page_of(summary, {})

@@ -109,7 +109,7 @@ def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Com
         for text, change in BAR_MISTAKES:
             if (changed := change(bar)) is not None:
                 yield f"{name}: {text}", with_bars(scene, **{name: changed}), at
-    for drive in {2, 3, 4} - {scene.drive_bar}:
+    for drive in {2, 3, 4} - {scene.drive_bar} if scene.drive is None else ():
         yield f"the torque acts on bar {drive} instead of bar {scene.drive_bar}", replace(scene, drive_bar=drive), at
 
 

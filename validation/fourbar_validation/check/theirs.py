@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.files.reading import read_text
-from fourbar.quantities import UNITS, VECTORS
+from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS
 from fourbar_validation.compare.tolerance import EPS
 
 Array = NDArray[np.float64]
@@ -32,8 +32,10 @@ DECIMALS = 4
 """12.5 deg and 0.25 rad are positions that somebody chose, 0.1745 rad is one that was rounded."""
 NOT_JUDGED = {
     "time": "a row is found by its theta_2",
-    "power": "the torque is judged, and the speed",
-    **dict.fromkeys(("torque_error", "force_error", "friction_residual"), "an error of the formulas themselves"),
+    "power": "the torque or force of the drive is judged, and the speed",
+    **dict.fromkeys(
+        (COUPLE.error, LINE.error, "force_error", "friction_residual"), "an error of the formulas themselves"
+    ),
     **dict.fromkeys(("status", "branch", "drive_bar"), "stated by the scene"),
 }
 """Columns of `fourbar analyze --csv` that are no answer, and why."""

@@ -9,9 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.quantities import (
+    COUPLE,
     FORCES,
     JAMMED,
+    LINE,
     OF_DRY_FRICTION,
+    OF_LINE,
     OF_PIN_LOADS,
     OK,
     OVERFLOW,
@@ -51,10 +54,12 @@ Nearby = Callable[[Mask], dict[str, Array]]
 Scales = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
-OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, "torque_error", "force_error")
-"""What has judges of its own: the range in which dry friction holds, what it leaves, and the error bars."""
-COMPARED = tuple(name for name in STAGE_OF if name not in OF_THE_FORMULAS)
+OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, COUPLE.error, LINE.error, "force_error", "power")
+"""What has judges of its own: the range in which dry friction holds, what it leaves, error bars, a product."""
+COMPARED = tuple(name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *OF_LINE))
 """Every quantity that an exact engine is held to: all that is printed of a position."""
+OF_THE_LINE = {"stroke": "sin_mu", "drive_line": "sin_mu", "stroke_speed": "v_B", LINE.value: COUPLE.value}
+"""Where the drive is linear, who is held to the other quantity is held to this one too."""
 OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
@@ -103,11 +108,14 @@ class Comparison:
         if answer.assembled is None or len(answer.assembled) != len(self.formulas):
             what = "the engine did not say where the loop closes"
             return [Row.unmeasured(self.name, answer.engine, answer.setting, "assembled", FAILS, what)]
+        held = tuple(self.expected)
+        if self.scene.drive is not None:
+            held = (*held, *(name for name, other in OF_THE_LINE.items() if other in held))
         self.own = reference_of(self.scene, answer)
         if self.reference is None:
             self.reference, self.scales = self.own, {}
         rows = [self.assembled()]
-        rows += [row for quantity in STAGE_OF if quantity in self.expected for row in self.compared(quantity)]
+        rows += [row for quantity in STAGE_OF if quantity in held for row in self.compared(quantity)]
         rows += [self.row("watch", FAILS, alarm) for alarm in answer.alarms]
         return [*rows, *self.undecided()]
 

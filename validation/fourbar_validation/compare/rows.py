@@ -22,7 +22,7 @@ COMPARED = (*HELD, FAILS)
 
 FORMULAS = "formulas"
 IDENTITIES = (
-    *("closure", "force_sum", "moment_sum", "status", "blocks", "points", "law", "sweep"),
+    *("closure", "force_sum", "moment_sum", "power", "status", "blocks", "points", "law", "sweep"),
     *("torque", "torque_error", "force_error", "friction_residual"),
 )
 """Rows of the formulas that no engine answers: they do not count as compared."""

@@ -13,12 +13,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fourbar.effects import LinearDrive
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import OK, UNITS
+from fourbar.quantities import LINE, OK, UNITS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.effects import size as size_of
+from fourbar_validation.compare.line import line_of
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED, Array, K, condition_of, magnitude, of_length
 
 VANISHING = 1.0 / K
@@ -32,7 +34,7 @@ def scale_of(quantity: str, scene: Scene, formulas: Solution, values: Array) -> 
     size = magnitude(values)
     terms = term_sizes(quantity, scene, formulas)
     well = (formulas.condition >= WELL_CONDITIONED) & np.isfinite(size)
-    if UNITS[quantity] == "N m":  # its poles are not where sin_mu vanishes
+    if UNITS[quantity] in ("N m", "W") or quantity == LINE.value:  # its poles are not where sin_mu vanishes
         assert formulas.drive_condition is not None
         well &= formulas.drive_condition >= WELL_CONDITIONED
     own = np.where(size < VANISHING * terms, terms, size)
@@ -57,7 +59,8 @@ def _one(quantity: str, scene: Scene, formulas: Solution) -> Array:
 
 
 def _lengths(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    return np.full(len(formulas), of_length(scene.linkage) + sum(_arm(scene, number) for number in MOVING_BARS))
+    arms = sum(_arm(scene, number) for number in MOVING_BARS) + sum(_drive_arms(scene).values())
+    return np.full(len(formulas), of_length(scene.linkage) + arms)
 
 
 def _speeds(quantity: str, scene: Scene, formulas: Solution) -> Array:
@@ -80,9 +83,10 @@ def _angular_accelerations(quantity: str, scene: Scene, formulas: Solution) -> A
 
 
 def _velocities(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    total = np.zeros(len(formulas))
+    total, drive = np.zeros(len(formulas)), _drive_arms(scene)
     for number in MOVING_BARS:
-        total += (scene.linkage.bar(number).length + _arm(scene, number)) * np.abs(getattr(formulas, f"omega_{number}"))
+        arm = scene.linkage.bar(number).length + _arm(scene, number) + drive.get(number, 0.0)
+        total += arm * np.abs(getattr(formulas, f"omega_{number}"))
     return total
 
 
@@ -96,11 +100,21 @@ def _accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
 
 def _forces(quantity: str, scene: Scene, formulas: Solution) -> Array:
     assert formulas.drive_condition is not None
-    return np.asarray(_force_terms(scene, formulas) / formulas.drive_condition)
+    gain = 1.0
+    if scene.drive is not None:  # of a short lever the force is as many times larger
+        short = line_of(scene.linkage, scene.drive, {bar: np.zeros(1) for bar in MOVING_BARS}).most
+        gain = max(1.0, max(scene.linkage.lengths) / short)
+    return np.asarray(gain * _force_terms(scene, formulas) / formulas.drive_condition)
 
 
 def _torques(quantity: str, scene: Scene, formulas: Solution) -> Array:
     return np.asarray(max(scene.linkage.lengths[1:]) * _forces(quantity, scene, formulas))
+
+
+def _powers(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    if scene.drive is not None:
+        return np.asarray(_forces(quantity, scene, formulas) * _velocities(quantity, scene, formulas))
+    return np.asarray(_torques(quantity, scene, formulas) * np.abs(getattr(formulas, f"omega_{scene.drive_bar}")))
 
 
 TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
@@ -113,8 +127,15 @@ TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
     "m/s^2": _accelerations,
     "N": _forces,
     "N m": _torques,
+    "W": _powers,
 }
 """By the unit of a quantity, the sum of the terms of its equation."""
+
+
+def _drive_arms(scene: Scene) -> dict[int, float]:
+    """Distances of the ends of a linear drive from the first pins of their bars, m."""
+    ends = () if scene.drive is None else (scene.drive.start, scene.drive.end)
+    return {end.bar: abs(end.distance) for end in ends}
 
 
 def _arm(scene: Scene, number: int) -> float:
@@ -156,13 +177,27 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
         )
         if reference.omega_3 is not None and reference.omega_4 is not None:
             _add_velocities(scene.linkage, theta, reference)
-    one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
+    reference.drive = scene.drive
+    if scene.drive is not None:
+        _add_line(scene.linkage, scene.drive, theta, reference)
     reference.sin_mu = np.sin(theta[4] - theta[3])
     reference.condition = np.abs(reference.sin_mu)
     if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
+        one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits than its sine
         reference.drive_condition = np.abs(np.sin(other) * np.cos(one) - np.cos(other) * np.sin(one))
     return reference
+
+
+def _add_line(linkage: FourBar, drive: LinearDrive, theta: dict[int, Array], reference: Solution) -> None:
+    """Add stroke, direction, speed and leverage of a linear drive, from the answer's own angles and speeds."""
+    line = line_of(linkage, drive, theta)
+    reference.stroke, reference.drive_line = line.stroke, np.stack((line.unit.real, line.unit.imag), axis=1)
+    if reference.omega_2 is not None and reference.omega_3 is not None and reference.omega_4 is not None:
+        omega = {1: np.zeros(len(reference)), 2: reference.omega_2, 3: reference.omega_3, 4: reference.omega_4}
+        reference.stroke_speed = line.speed(omega)
+    if reference.drive_condition is None:
+        reference.drive_condition = line.condition
 
 
 def _add_velocities(linkage: FourBar, theta: dict[int, Array], reference: Solution) -> None:

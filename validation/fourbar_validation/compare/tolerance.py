@@ -87,7 +87,10 @@ FULL_ACCURACY = ErrorBound(
     conditioned=False,
 )
 
-POWER = {**dict.fromkeys(("rad", "m", "1"), 1), **dict.fromkeys(("rad/s", "m/s", "rad/s^2", "m/s^2", "N", "N m"), 2)}
+POWER = {
+    **dict.fromkeys(("rad", "m", "1"), 1),
+    **dict.fromkeys(("rad/s", "m/s", "rad/s^2", "m/s^2", "N", "N m", "W"), 2),
+}
 """By unit: angles and positions lose digits as 1/s, everything that follows from them as 1/s^2."""
 OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2"))
 """Quantities that the input alone decides: they lose none."""
@@ -120,7 +123,7 @@ def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
     if quantity in OF_THE_INPUT:
         return np.ones_like(s)
     condition = lever(linkage) * s ** POWER[unit]
-    if unit in ("N", "N m"):
+    if unit in ("N", "N m", "W"):
         assert formulas.drive_condition is not None
         condition = condition * formulas.drive_condition
     return np.asarray(condition, dtype=float)

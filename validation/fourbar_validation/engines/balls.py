@@ -182,6 +182,7 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     columns = {"F12": 0, "F32": 1, "F43": 3, "F14": 5}
     _put(y, {name: acb(solved[2 * column], solved[2 * column + 1]) for name, column in columns.items()})
     y["torque"] = solved[12]
+    y["power"] = solved[12] * y[f"omega_{drive_bar}"]
     return y
 
 

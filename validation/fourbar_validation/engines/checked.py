@@ -32,6 +32,8 @@ class Checked:
         try:
             with np.errstate():  # as it was before, for the engines that come after
                 engine: Engine = resolve_name(self._adapter)()
+                if scene.drive is not None and not getattr(engine, "linear_drive", False):
+                    return Answer(self.name, "exact", refusal="it does not declare linear_drive")
                 return self._read(engine.answer(given_scene, at), command)
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) != signal.SIG_IGN:

@@ -126,8 +126,15 @@ def speeds(at: Command) -> tuple[Array, Array]:
     return omega, alpha
 
 
-def unknown_effect(scene: Scene, table: Container[str]) -> str:
-    """Give the reason to refuse a scene with an effect that a table has no row for; empty where there is none."""
+def unknown_effect(scene: Scene, table: Container[str], *, linear: bool = False) -> str:
+    """Give the reason to refuse a scene with an effect that a table has no row for; empty where there is none.
+
+    Parameters
+    ----------
+    linear : whether a drive along a line is known.
+    """
+    if scene.drive is not None and scene.motion.free is None and not linear:
+        return "the linear drive (drive.from, drive.to) has no model here"
     return next(
         (f"the effect {effect.key!r} has no model here" for effect in scene.effects if effect.key not in table), ""
     )

@@ -3,8 +3,8 @@
 The two closure equations, closed by Newton's method, are once and twice differentiated linear in the
 speeds b omega_3, c omega_4 and in b alpha_3, c alpha_4. Forces and moments about the first pin of each bar
 and the two reactions at A and B are thirteen linear equations in F12, F32, F23, F43, F34, F14 and the
-torque (R. L. Norton, Design of Machinery, ch. 11, has them about the mass centres). Vectors of the plane
-are complex numbers, x + i y.
+torque, or the force of a linear drive (R. L. Norton, Design of Machinery, ch. 11, has them about the mass
+centres). Vectors of the plane are complex numbers, x + i y.
 """
 
 from dataclasses import replace
@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.quantities import COUPLE, LINE
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.line import DriveLine, line_of
 from fourbar_validation.engines.description import FORCE_AT, SHARED, about_first_pin, centre, speeds, unknown_effect
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
 from fourbar_validation.engines.free_body_effects import (
@@ -29,7 +31,8 @@ from fourbar_validation.engines.free_body_effects import (
 
 NAME = "free-body"
 COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
-TORQUE = 12
+DRIVE = 12
+"""The torque, or the force along a line."""
 ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34")}
 """First row of a bar, the force at its first pin and that at its second."""
 BLOCK = 4096
@@ -53,7 +56,7 @@ class FreeBody:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming an effect that it does not know."""
-        if reason := unknown_effect(scene, WRENCH_OF):
+        if reason := unknown_effect(scene, WRENCH_OF, linear=True):
             return Answer(NAME, "exact", refusal=reason)
         closed = close(scene.linkage, command.theta_2, command.branch)
         answer = Answer(
@@ -95,14 +98,14 @@ def _answered(
     """Motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
     motion = move(scene.linkage, theta_2, omega_2, alpha_2, theta_3, theta_4)
     unknowns, residual, from_jamming = balance(scene, motion)
-    one, other = (motion.unit[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
+    drive = COUPLE if scene.drive is None else LINE
     if (gone := wound(scene, motion)) is not None:
         unknowns[gone] = np.nan
     result = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
     for bar in MOVING_BARS:
         result |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
     a_A = motion.swing(2, motion.first_pin[3])
-    result["drive_condition"] = np.abs(cross(one, other)) * from_jamming
+    result["drive_condition"] = _drive_condition(scene, motion) * from_jamming
     result |= {"a_A": _plane(a_A), "a_B": _plane(motion.swing(4, scene.linkage.output.length * motion.unit[4]))}
     for bar in MOVING_BARS:
         result[f"a_G{bar}"] = _plane(motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0))
@@ -110,11 +113,25 @@ def _answered(
         ends = []
         for side in (1.0, -1.0):
             begins = move(scene.linkage, theta_2, np.full_like(theta_2, side), 0.0 * theta_2, theta_3, theta_4)
-            ends.append(balance(scene, motion._replace(beginning=begins.omega))[0][:, TORQUE])
-        result |= {"torque_low": np.minimum(*ends), "torque_high": np.maximum(*ends)}
+            ends.append(balance(scene, motion._replace(beginning=begins.omega))[0][:, DRIVE])
+        result |= {drive.low: np.minimum(*ends), drive.high: np.maximum(*ends)}
     if scene.loads or scene.effects:
-        result["torque_inertia"] = balance(replace(scene, loads=(), effects=()), motion)[0][:, TORQUE]
-    return result | {"torque": unknowns[:, TORQUE]}, residual
+        result[f"{drive.value}_inertia"] = balance(replace(scene, loads=(), effects=()), motion)[0][:, DRIVE]
+    return result | {drive.value: unknowns[:, DRIVE]}, residual
+
+
+def _drive_condition(scene: Scene, motion: BodyMotion) -> Array:
+    """Compute the sine between the bars that are not driven, or the leverage of a line."""
+    if (line := _line(scene, motion)) is not None:
+        return line.condition
+    one, other = (motion.unit[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
+    return np.asarray(np.abs(cross(one, other)))
+
+
+def _line(scene: Scene, motion: BodyMotion) -> DriveLine | None:
+    """Place the line of a linear drive."""
+    theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
+    return None if scene.drive is None else line_of(scene.linkage, scene.drive, theta)
 
 
 def move(
@@ -160,8 +177,9 @@ def _with_unit_couples(scene: Scene, motion: BodyMotion) -> tuple[Array, Complex
         unit = BodyWrenches(len(motion.theta_2))
         unit.twist_at(pin, -motion.sense(pin))
         columns.append(_right(motion.linkage, unit))
-    unknowns, residual = solved(_matrix(motion, scene.drive_bar), np.stack(columns, axis=-1))
-    unknowns[:, TORQUE] *= motion.linkage.bar(scene.drive_bar).length
+    unknowns, residual = solved(_matrix(scene, motion), np.stack(columns, axis=-1))
+    if scene.drive is None:
+        unknowns[:, DRIVE] *= motion.linkage.bar(scene.drive_bar).length
     first = [COLUMN[FORCE_AT[pin]] for pin in pins]
     loads = unknowns[:, first] + 1j * unknowns[:, [column + 1 for column in first]]
     return unknowns, loads, np.array(list(pins.values())), residual
@@ -203,10 +221,11 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
     wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.first_pin[3]), motion.to_centre(3))
 
 
-def _matrix(motion: BodyMotion, drive_bar: int) -> Array:
+def _matrix(scene: Scene, motion: BodyMotion) -> Array:
     """Rows: forces on bars 2, 3, 4 and moments over the bar's length, reactions at A and B; (n, 13, 13).
 
-    The last column is the torque over the driven bar's length, so that every number is 0, 1 or of a unit vector.
+    The last column is the torque over the driven bar's length, so that every number is 0, 1 or of a unit vector; of a
+    linear drive what 1 N of it does to the bars of its ends.
     """
     matrix = np.zeros((len(motion.theta_2), 13, 13))
     for bar, (row, first, second) in ROWS.items():
@@ -214,7 +233,13 @@ def _matrix(motion: BodyMotion, drive_bar: int) -> Array:
             matrix[:, row, COLUMN[force]] = matrix[:, row + 1, COLUMN[force] + 1] = 1.0
         u = motion.unit[bar]
         matrix[:, row + 2, COLUMN[second]], matrix[:, row + 2, COLUMN[second] + 1] = -u.imag, u.real
-    matrix[:, ROWS[drive_bar][0] + 2, TORQUE] = 1.0
+    if (line := _line(scene, motion)) is None:
+        matrix[:, ROWS[scene.drive_bar][0] + 2, DRIVE] = 1.0
+    else:
+        unit = BodyWrenches(len(motion.theta_2))
+        for sense, point, arm in zip((-1.0, 1.0), (line.drive.start, line.drive.end), line.arms, strict=True):
+            unit.push(point.bar, sense * line.unit, arm)
+        matrix[:, :, DRIVE] = -_right(motion.linkage, unit)
     for row, (force, reaction) in ((9, ("F32", "F23")), (11, ("F43", "F34"))):
         for axis in (0, 1):
             matrix[:, row + axis, COLUMN[force] + axis] = matrix[:, row + axis, COLUMN[reaction] + axis] = 1.0

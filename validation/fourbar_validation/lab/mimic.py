@@ -43,7 +43,7 @@ def lost(scene: Scene) -> list[Lost]:
     """Simulate the loop, and what follows by polynomials of degree 4 and 1, over the range of a scene."""
     if not scene.motion.omega_2:
         raise InputError("motion.omega_2", scene.motion.omega_2, "is needed, not zero: the models are driven")
-    scene = replace(scene, drive_bar=2)
+    scene = replace(scene, drive_bar=2, drive=None)
     gear, written = ratio(scene), mjcf(scene)
     low, high = float(gear.theta_2[0]), float(gear.theta_2[-1])
     models = {"the loop": written}

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.quantities import ANGLES, OK
+from fourbar.quantities import ANGLES, COUPLE, FORCES, LINE, OK
 from fourbar.scene import Command
 from fourbar.show.drawing import drawing
 from fourbar.solution import Solution
@@ -25,7 +25,6 @@ MARKS = 10
 """Marks of one engine on a curve. Every engine has its own positions, so no mark hides another."""
 STRETCHES = 24
 """Stretches of a sweep; the error shown in each is its largest."""
-TORQUE_AND_FORCE = ("torque", "F32")
 MOTION_AND_FORCE = ("theta_4", "F32")
 """Of a released linkage: its torque is rounding."""
 SUBSCRIPT = str.maketrans("234", "₂₃₄")
@@ -45,7 +44,8 @@ def scene_figure(record: Record) -> str | None:
 def _answers(record: Record, solution: Solution) -> str:
     """One SVG per quantity: values above, errors of the simulation and of the exact engines on axes of their own."""
     answers = [answer for answer in record.answers if answer.refusal is None and answer.quantities]
-    shown = TORQUE_AND_FORCE if solution.torque is not None else ANGLES
+    drive = COUPLE.value if solution.drive is None else LINE.value
+    shown = (drive, "F32") if solution.F32 is not None else ANGLES
     if record.scene is not None and record.scene.motion.free is not None:
         shown = MOTION_AND_FORCE
     return "".join(_picture(quantity, record, solution, answers) for quantity in shown)
@@ -63,7 +63,7 @@ def _picture(quantity: str, record: Record, solution: Solution, answers: list[An
     _draw_values(axes[0], quantity, solution, [*exact, *simulated], record.jumps)
     for below, group in zip(axes[1:], groups, strict=True):
         _draw_errors(below, quantity, record, solution, group)
-        below.set_ylabel("error / scale" if quantity in TORQUE_AND_FORCE else "error (rad)", fontsize=7.5)
+        below.set_ylabel("error / scale" if quantity in FORCES else "error (rad)", fontsize=7.5)
     axes[-1].set_xlabel("time (s)" if solution.time is not None else "θ₂ (°)")
     figure.align_ylabels(axes)
     for panel in axes:
@@ -159,6 +159,8 @@ def _plain(quantity: str, values: Array) -> Array:
 
 
 def _label(quantity: str, solution: Solution) -> str:
+    if quantity == LINE.value:
+        return "F (N)"
     if quantity == "torque":
         return f"T{solution.drive_bar} (N m)".translate(SUBSCRIPT)
     name = quantity.replace("theta_", "θ").translate(SUBSCRIPT)

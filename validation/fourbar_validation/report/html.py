@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from fourbar.quantities import UNKNOWNS
+from fourbar.quantities import LINE, UNKNOWNS
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows, to_csv
 from fourbar_validation.report.costs import cost_figure
@@ -15,7 +15,7 @@ from fourbar_validation.report.templating import count_or_size, number, rendered
 
 ALL_OPEN = 8
 """Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
-ORDER = (*UNKNOWNS, "torque_inertia")
+ORDER = (*UNKNOWNS, "torque_inertia", LINE.value, f"{LINE.value}_inertia")
 """Quantities in the order of the computation; others follow by name."""
 
 

@@ -8,7 +8,7 @@ from functools import partial
 from fourbar.errors import LimitError
 from fourbar.formulas import mobility
 from fourbar.mjcf.settings import LIGHT
-from fourbar.quantities import FORCES
+from fourbar.quantities import COUPLE, FORCES, LINE
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Answer, Engine
 from fourbar_validation.compare.compare import Comparison, Predicted
@@ -123,29 +123,34 @@ def compare_inertia(question: Question) -> Iterator[Row]:
         return
     bare = Question(question.name, replace(scene, loads=(), effects=()), question.at, output=question.output)
     for name, (answer, seconds) in question.answered.items():
-        if "torque_inertia" in answer.quantities:
-            bare.answered[name] = _of_inertia(answer), seconds
+        if f"{_driving(scene)}_inertia" in answer.quantities:
+            bare.answered[name] = _of_inertia(answer, _driving(scene)), seconds
     for witness in question.witnesses:
-        if "torque" in witness.expected and witness.name in question.answered:  # one that broke down has its row
+        if COUPLE.value in witness.expected and witness.name in question.answered:  # one that broke down has its row
             yield from question.attempt(partial(_inertia, question, bare, witness), witness.name, "inertia alone")
+
+
+def _driving(scene: Scene) -> str:
+    return COUPLE.value if scene.drive is None else LINE.value
 
 
 def _inertia(question: Question, bare: Question, witness: Witness) -> Iterator[Row]:
     answer, (loaded, _) = bare.answer(witness), question.answered.get(witness.name, (None, 0.0))
     if answer.refusal is not None and loaded is not None and loaded.refusal is not None:
         return  # which has its row
-    rows = compare_answer(bare, replace(witness, expected=("torque",)), answer)
-    rows = [row for row in rows if row.quantity == "torque" or row.verdict in (REFUSES, FAILS)]
+    drive = _driving(question.scene)
+    rows = compare_answer(bare, replace(witness, expected=(drive,)), answer)
+    rows = [row for row in rows if row.quantity == drive or row.verdict in (REFUSES, FAILS)]
     rows = [row for row in rows if row.quantity != "undecided"]
     if rows:  # what fails besides the torque, or stands in place of it, is not left out
         worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
-        reason = worst.reason if worst.quantity in ("torque", "all") else f"{worst.quantity}: {worst.reason}"
-        yield replace(worst, quantity="torque_inertia", reason=reason)
+        reason = worst.reason if worst.quantity in (drive, "all") else f"{worst.quantity}: {worst.reason}"
+        yield replace(worst, quantity=f"{drive}_inertia", reason=reason)
 
 
-def _of_inertia(answer: Answer) -> Answer:
+def _of_inertia(answer: Answer, drive: str) -> Answer:
     """Take the part of an answer that is of the bars' inertia."""
-    alone = {**answer.quantities, "torque": answer.quantities["torque_inertia"]}
+    alone = {**answer.quantities, drive: answer.quantities[f"{drive}_inertia"]}
     alone.pop("drive_condition", None)  # which holds how near loads and friction are to jamming
     return replace(answer, quantities=alone, evidence={}, alarms=[])
 

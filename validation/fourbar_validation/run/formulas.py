@@ -15,7 +15,7 @@ from fourbar.effects.actions import bodies
 from fourbar.evaluation.case import state_at
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
-from fourbar.quantities import NO_TORQUE, NOT_ASSEMBLED, OK, OVERFLOW, SEVERAL, SINGULAR
+from fourbar.quantities import COUPLE, LINE, NO_LEVER, NO_TORQUE, NOT_ASSEMBLED, OK, OVERFLOW, SEVERAL, SINGULAR
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.compare import CLOSURE, NOWHERE
@@ -41,7 +41,7 @@ from fourbar_validation.engines.free_body import solutions
 from fourbar_validation.engines.witnesses import not_installed
 from fourbar_validation.run.question import Question, select_positions
 
-STAGES = ("omega_3", "alpha_3", "torque")
+STAGES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)
 """One quantity of each stage that a position may lack."""
 LARGE = 1e75
 """Numbers beyond this, or their squares, may leave the range of doubles in between: 1e300 in a product of four."""
@@ -65,7 +65,7 @@ def check_identities(question: Question) -> Iterator[Row]:
     yield _row(question, "closure", CLOSURE, gap, closing)
     if question.scene.motion.theta_2 is None and question.scene.motion.law is None:
         yield _sweep(question)
-    if solution.torque is not None and (solution.status_code == OK).any():
+    if solution.F12 is not None and (solution.status_code == OK).any():
         yield from _sums(question)
 
 
@@ -96,7 +96,7 @@ def _row(question: Question, quantity: str, equation: str, error: Array, where: 
 def _sums(question: Question) -> Iterator[Row]:
     """F12 + F14 + sum of loads = sum of m a_G, and the moments of the same about O2 with the torque."""
     scene, at, solution = question.scene, question.at, question.solution
-    assert solution.F12 is not None and solution.F14 is not None and solution.torque is not None
+    assert solution.F12 is not None and solution.F14 is not None
     assert solution.F32 is not None and solution.F43 is not None
     state = state_at(scene, at)
     # what acts at the speeds that were answered, not at another evaluation of them
@@ -107,13 +107,19 @@ def _sums(question: Question) -> Iterator[Row]:
             term.act(actions, state)
             if term.loaded_pins:
                 term.act_known(actions, {name: getattr(solution, name) for name in PIN_FORCE.values()})
+    torque, drive = solution.torque, COUPLE.value
+    if solution.drive is not None:
+        torque, drive = np.zeros(len(solution)), LINE.value
+        with np.errstate(all="ignore"):
+            solution.drive.act(actions, solution.drive_force)
+    assert torque is not None
     acting = actions.wrenches(Wrenches())
     n, first_pin = len(solution), complex(np.ravel(state.foot(4))[0])
     O4 = np.array([first_pin.real, first_pin.imag])
     force = solution.F12 + solution.F14
     force_terms = magnitude(solution.F12) + magnitude(solution.F14)
-    moment = solution.torque + _cross(O4, solution.F14)
-    moment_terms = np.abs(solution.torque) + np.hypot(*O4) * magnitude(solution.F14)
+    moment = torque + _cross(O4, solution.F14)
+    moment_terms = np.abs(torque) + np.hypot(*O4) * magnitude(solution.F14)
     # the moments of the forces inside, which cancel
     moment_terms = moment_terms + _reach(solution.A) * magnitude(solution.F32)
     moment_terms = moment_terms + _reach(solution.B) * magnitude(solution.F43)
@@ -140,10 +146,12 @@ def _sums(question: Question) -> Iterator[Row]:
     assert solution.drive_condition is not None
     with np.errstate(divide="ignore", invalid="ignore"):
         force_terms = force_terms / (lever(scene.linkage) * solution.drive_condition)
-        moment_terms = moment_terms / condition_of("torque", scene.linkage, solution)
+        moment_terms = moment_terms / condition_of(drive, scene.linkage, solution)
     where = solution.status_code == OK
     # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
     where &= ~question.reversing(IDENTITY.factor)
+    works = getattr(solution, drive) * getattr(solution, f"omega_{scene.drive_bar}", solution.stroke_speed)
+    yield _row(question, "power", "of the drive", relative(np.abs(solution.power - works), np.abs(works)), where)
     forces, moments = relative(magnitude(force), force_terms), relative(np.abs(moment), moment_terms)
     yield _row(question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, where)
     yield _row(question, "moment_sum", "moments about O2, with the torque", moments, where)
@@ -210,7 +218,7 @@ def compare_status(
         moves = np.isfinite(np.hstack([a for a in own if a is not None])).all(axis=1)
         in_line = reference.drive_condition < IN_ONE_LINE
         differ |= (formulas.status_code == OVERFLOW) & moves & in_line
-        differ |= (formulas.status_code == NO_TORQUE) & (reference.drive_condition > NEAR)
+        differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (reference.drive_condition > NEAR)
     if sines is not None and len(near := np.flatnonzero(_near(scene, formulas, reference))):
         sine = np.abs(sines(near))
         closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR

@@ -143,13 +143,14 @@ def _forces(question: Question) -> Iterator[Row]:
     They are given theta_2, omega_2 and alpha_2; that these balance without a torque is the equation of motion.
     """
     name, scene, solution = question.name, question.scene, question.solution
-    assert solution.omega_2 is not None and solution.alpha_2 is not None and solution.torque is not None
-    driven = worst(np.abs(solution.torque))
-    torque = float(np.abs(solution.torque[driven]))
+    none = solution.torque if solution.drive is None else solution.drive_force
+    assert solution.omega_2 is not None and solution.alpha_2 is not None and none is not None
+    driven = worst(np.abs(none))
+    torque = float(np.abs(none[driven]))
     what = "a released linkage has no drive"
     place = float(solution.theta_2[driven])
     yield Row(name, FORMULAS, "exact", "torque", torque, 0.0, FAILS if torque else AGREES, what, place, 1.0)
-    held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2)
+    held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2, drive=None)
     at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
     driven_ones = [
         (Question(name, own, select_positions(at, where), output=question.output), member(solution, where))

@@ -225,12 +225,15 @@ EFFECTS = (
 )
 
 
-@pytest.mark.parametrize("drive_bar", (2, 3, 4))
+CYLINDER = fourbar.LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7))
+
+
+@pytest.mark.parametrize("drive_bar", (2, 3, 4, None))
 @pytest.mark.parametrize(
     "effects", [EFFECTS, *((one,) for one in EFFECTS)], ids=lambda some: "+".join(e.key for e in some)
 )
-def test_free_bodies_balance(drive_bar: int, effects: tuple[Effect, ...]) -> None:
-    shown = view(crank_rocker(drive_bar=drive_bar, effects=effects))
+def test_free_bodies_balance(drive_bar: int | None, effects: tuple[Effect, ...]) -> None:
+    shown = view(crank_rocker(drive_bar=drive_bar, drive=None if drive_bar else CYLINDER, effects=effects))
     for bar in (2, 3, 4):
         arrows, couples = free_body(shown, bar)
         forces = np.array([arrow.force for arrow in arrows])
@@ -238,6 +241,18 @@ def test_free_bodies_balance(drive_bar: int, effects: tuple[Effect, ...]) -> Non
         moments = [(a.at.conjugate() * a.force).imag for a in arrows] + [c.moment for c in couples]
         assert abs(sum(moments)) <= BALANCE * max(map(abs, moments))
         assert any(c.text == f"$T_{bar}$" for c in couples) == (bar == drive_bar)
+
+
+def test_a_linear_drive_is_drawn_with_its_force_and_the_poles_of_that(tmp_path: Path) -> None:
+    scene = crank_rocker(drive=CYLINDER)
+    for figure in ("overview", "torque", "freebody"):
+        plot.draw(scene, tmp_path / f"{figure}.svg", figure)
+    assert "Force of the drive" in "".join(
+        drawn(scene, "torque").figure.axes[0].get_title(loc=at) for at in ("left", "center")
+    )
+    shown = view(scene)
+    stands = np.flatnonzero(np.diff(np.sign(shown.sweep.stroke_speed)))
+    assert len(stands) and np.array_equal(poles(shown), stands)
 
 
 def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:

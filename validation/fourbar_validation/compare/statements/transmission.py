@@ -55,7 +55,8 @@ def _over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator
     state = state_of(linkage, at.theta_2, at.branch)
     half = state.at.half
     theta = {2: at.theta_2, **{bar: answer.quantities[f"theta_{bar}"] for bar in (3, 4)}}
-    one, other = (theta[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
+    drive = scene.drive_bar or 2  # the leverage of a line is compared as a quantity
+    one, other = (theta[bar] for bar in MOVING_BARS if bar != drive)
     driven = np.abs(np.sin(other - one))
     angle = np.abs(wrapped(theta[4] - theta[3]))
     sine = np.abs(np.sin(angle))
@@ -75,7 +76,7 @@ def _over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator
     for what, error, bound, counts in (
         # what divides every tolerance is not to be had from the formulas alone
         ("condition", np.abs(state.at.sin_mu - np.sin(theta[4] - theta[3])), allowed, where),
-        ("drive condition", np.abs(np.abs(drive_sine(state.at, scene.drive_bar)) - driven), allowed, where),
+        ("drive condition", np.abs(np.abs(drive_sine(state.at, drive)) - driven), allowed, where),
         ("transmission angle", np.abs(transmission.transmission_angle(state) - acute), allowed, where),
         ("beyond the extremes", outside, allowed, where),
         ("mechanical advantage", np.abs(gained), allowed_gain, moving & ~(allowed_gain >= NOTHING_TO_TELL)),
@@ -92,7 +93,7 @@ def _over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator
             most = np.flatnonzero(counts)[worst(used(error[counts], bound[counts]))]
             yield Finding(float(error[most]), float(bound[most]), float(at.theta_2[most]), what)
     branch = at.branch.astype(float)
-    nearest = transmission.distance_to_singular(linkage, at.theta_2, scene.drive_bar, branch)
+    nearest = transmission.distance_to_singular(linkage, at.theta_2, drive, branch)
     result = _to_singular(scene, at.theta_2, branch)
     error = np.where(np.isinf(nearest) == np.isinf(result), 0.0, math.inf)
     finite = np.isfinite(nearest) & np.isfinite(result)
@@ -110,7 +111,7 @@ def _always(linkage: FourBar) -> list[float]:
 
 def _to_singular(scene: Scene, theta_2: Array, branch: Array) -> Array:
     """Compute the angle to the nearest position where bars must not be collinear and are; inf where there is none."""
-    drive, always = scene.drive_bar, _always(scene.linkage)
+    drive, always = scene.drive_bar or 2, _always(scene.linkage)
     dead = mobility.limit_positions(scene.linkage, drive) if drive != 2 else ()
     nearest = np.full(theta_2.shape, math.inf)
     for point, side in [*((point, 0) for point in always), *((limit.theta_2, limit.branch) for limit in dead)]:

@@ -16,7 +16,7 @@ from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines.description import speeds
+from fourbar_validation.engines.description import speeds, unknown_effect
 from fourbar_validation.engines.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from fourbar_validation.engines.loaded import Values
 from fourbar_validation.engines.loop import MADE, Assembler, as_made, blank
@@ -71,6 +71,8 @@ def _refusal(scene: Scene, command: Command) -> str | None:
     """Say why this scene is not simulated, or None."""
     if scene.motion.free is not None:
         return "a free motion has no commanded sweep"
+    if unknown := unknown_effect(scene, [effect.key for effect in scene.effects]):
+        return unknown
     if command.omega_2 is None or not np.any(command.omega_2):
         return "omega_2 is 0 or not stated: nothing to simulate through time"
     law = scene.motion.law if command.time is not None else None

@@ -7,6 +7,7 @@ import numpy as np
 
 import fourbar
 from fourbar.errors import InputError, LimitError
+from fourbar.quantities import COUPLE, LINE
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.rows import REFUSES, Row
@@ -14,7 +15,6 @@ from fourbar_validation.compare.tolerance import ErrorBound
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import at_free_bodies, moved, row_of
 
-TORQUE = "torque"
 GIVEN = 1e-4
 """Of a length: the tolerance that the run gives it."""
 INSIDE = 1.0 - 1e-12
@@ -38,44 +38,43 @@ def extremes(question: Question) -> list[Row]:
     """Judge the proven extremes of the torque: with tolerances, the scene's own or some that the run gives it."""
     scene = replace(question.scene, points=(), title="", source="", pictures=())
     _require_conditioned(scene)
+    drive = COUPLE.value if scene.drive is None else LINE.value
     if not scene.tolerances:
         lengths = {name: getattr(scene.linkage, name).length for name in ("input", "coupler")}
         scene = replace(
             scene, tolerances=tuple(fourbar.Tolerance(f"lengths.{k}", GIVEN * x) for k, x in lengths.items())
         )
     try:
-        result = fourbar.extremes(scene, [TORQUE])
+        result = fourbar.extremes(scene, [drive])
     except (InputError, LimitError) as limit:
-        return [Row.unmeasured(question.name, "extremes", "exact", TORQUE, REFUSES, str(limit))]
+        return [Row.unmeasured(question.name, "extremes", "exact", drive, REFUSES, str(limit))]
     assert result.nominal is not None
-    ends = [each[TORQUE] for of in (result, result.nominal) for each in (of.least, of.greatest)]
+    ends = [each[drive] for of in (result, result.nominal) for each in (of.least, of.greatest)]
     theta_2 = np.concatenate(
         [*(np.linspace(low, high, POSITIONS) for low, high in result.parts), [each.theta_2 for each in ends]]
     )
     reach = {each.key: each.reach for each in scene.tolerances[:MOST]}
     bare = replace(scene, tolerances=(), motion=replace(scene.motion, theta_2=theta_2, through="sign"))
     corners = [dict(zip(reach, signs, strict=True)) for signs in product((-INSIDE, INSIDE), repeat=len(reach))]
-    torque = np.array(
+    values = np.array(
         [
-            at_free_bodies(moved(bare, {key: sign * reach[key] for key, sign in corner.items()})).quantities[TORQUE]
+            at_free_bodies(moved(bare, {key: sign * reach[key] for key, sign in corner.items()})).quantities[drive]
             for corner in ({}, *corners)
         ]
     )
     size = max(abs(end) for each in ends for end in each[:2])
     error = np.zeros_like(theta_2)
-    for of, values, within in (
-        (result, torque, len(reach) == len(scene.tolerances)),
-        (result.nominal, torque[:1], True),
-    ):
-        for sign, each in ((-1.0, of.least[TORQUE]), (1.0, of.greatest[TORQUE])):
+    whole = len(reach) == len(scene.tolerances)
+    for of, own, within in ((result, values, whole), (result.nominal, values[:1], True)):
+        for sign, each in ((-1.0, of.least[drive]), (1.0, of.greatest[drive])):
             proven, reached = (each.high, each.low) if sign > 0 else (-each.low, -each.high)
-            beyond = (sign * values).max(axis=0) - proven  # NaN where a linkage has no torque: nothing holds there
+            beyond = (sign * own).max(axis=0) - proven  # NaN where a linkage has no torque: nothing holds there
             if within:
                 at = int(np.flatnonzero(theta_2 == each.theta_2)[0])
-                beyond[at] = max(beyond[at], reached - float((sign * values[:, at]).max()))
+                beyond[at] = max(beyond[at], reached - float((sign * own[:, at]).max()))
             error = np.maximum(error, beyond / size)
-    reason = f"{len(torque)} linkages at {len(theta_2)} positions"
-    return [row_of(question, "extremes", TORQUE, error, BOUNDS, theta_2, reason)]
+    reason = f"{len(values)} linkages at {len(theta_2)} positions"
+    return [row_of(question, "extremes", drive, error, BOUNDS, theta_2, reason)]
 
 
 def _require_conditioned(scene: Scene) -> None:

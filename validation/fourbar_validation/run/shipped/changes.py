@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 import fourbar
-from fourbar.quantities import FORCES, UNKNOWNS
+from fourbar.quantities import FORCES, LINE, UNKNOWNS
 from fourbar.scene import Scene
 from fourbar.studies.spread import Spread
 from fourbar_validation.compare.answer import Array
@@ -61,7 +61,7 @@ def sensitivity(question: Question) -> list[Row]:
 
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
     rows = []
-    for name in (name for name in UNKNOWNS if name in result.by):
+    for name in (name for name in (*UNKNOWNS, LINE.value) if name in result.by):
         first, second = (_less(name, up[name], down[name]) for up, down in (near, far))
         slope = (8.0 * first - second) / (12.0 * STEP)
         terms = np.array([step * result.of(name, key) for key, step in directions.items()])
@@ -82,8 +82,10 @@ def tolerances(question: Question) -> list[Row]:
     scene = replace(scene, tolerances=(scene.tolerances or tuple(given))[:MOST])
     result, expected = fourbar.tolerances(scene, SAMPLES), _expected(scene)
     errors: dict[str, Array] = {}
-    for name in UNKNOWNS:
+    for name in (*UNKNOWNS, LINE.value):
         own = [part for part in expected if part in (name, f"{name}_x", f"{name}_y", f"|{name}|")]
+        if not own:
+            continue
         slight = SLIGHT * max(float(np.max(expected[part].worst)) for part in own)
         errors[name] = np.max([_off(result.spreads[part], expected[part], slight) for part in own], axis=0)
     reason = ", ".join(each.key for each in scene.tolerances)

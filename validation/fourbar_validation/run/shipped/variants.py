@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
-from fourbar.quantities import OK, UNKNOWNS, is_scalar
+from fourbar.quantities import LINE, OK, UNKNOWNS, is_scalar
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
@@ -44,8 +44,12 @@ def sampled(question: Question) -> Scene:
     if scene.motion.law is not None:
         raise NotAskedError("a motion law has no positions of its own choice")
     reference = question.reference
-    assert reference is not None and reference.drive_condition is not None and reference.torque is not None
-    fit = (solution.status_code == OK) & (reference.condition >= WELL_CONDITIONED) & np.isfinite(reference.torque)
+    assert reference is not None and reference.drive_condition is not None and reference.F12 is not None
+    fit = (
+        (solution.status_code == OK)
+        & (reference.condition >= WELL_CONDITIONED)
+        & np.isfinite(reference.F12).all(axis=1)
+    )
     fit &= (reference.drive_condition >= WELL_CONDITIONED) & (at.branch == scene.motion.branch)
     fit &= ~reversing(scene, solution, NOT_AT_REST) & (solution.omega_2 != 0.0)
     for load in scene.loads:
@@ -169,13 +173,14 @@ def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
 
     one = replace(study, **{field.name: own(getattr(study, field.name)) for field in fields(study) if field.init})
     one.points, one.velocity, one.acceleration = (own(of) for of in (study.points, study.velocity, study.acceleration))
+    one.drive = study.drive
     return one
 
 
 def parts(answer: Answer) -> dict[str, Array]:
     """Split the unknowns of a position: vectors as components, pin forces also as their magnitudes."""
     result = {}
-    for name in UNKNOWNS:
+    for name in (name for name in (*UNKNOWNS, LINE.value) if name in answer.quantities):
         values = answer.quantities[name]
         if is_scalar(name):
             result[name] = values

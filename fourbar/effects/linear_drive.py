@@ -1,0 +1,123 @@
+"""A drive along the line between two points of two bars: a cylinder, a spindle, a linear actuator.
+
+Per newton that it pushes its ends apart the bars get the unit vector of the line at one end, its opposite at the other.
+The power of that over the speed of the independent angle q is ds/dq, s the stroke, and virtual work gives the force,
+    F ds/dq = J q'' + J'/2 q'^2 - Q,
+as it gives the torque on a bar k, where h_k stands for ds/dq. There is no force where
+    P = (ds/dtheta_2) sin(theta_4 - theta_3) = 0,
+which is of the same form, with (theta_2', theta_3', theta_4') = (sin(theta_4 - theta_3), (a/b) sin(theta_2 - theta_4),
+(a/c) sin(theta_2 - theta_3)) for the coefficients h_k, and so is finite where these are not.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects.actions import Actions, as_it_is
+from fourbar.effects.spring import COINCIDE, SpringEnd, require_ends
+from fourbar.errors import InputError
+from fourbar.formulas.arithmetic import Number, anywhere, dot
+from fourbar.formulas.motion import State
+from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.linkage import ENDS, MOVING_BARS, PINS, FourBar
+from fourbar.quantities import NO_DIRECTION, NO_LEVER, OK
+
+
+@dataclass(frozen=True, slots=True)
+class LinearDrive:
+    """A force along the line between two points, N, positive where it pushes them apart.
+
+    Parameters
+    ----------
+    start, end : points on two different bars, one of them the ground perhaps.
+    """
+
+    start: SpringEnd
+    end: SpringEnd
+
+    def __post_init__(self) -> None:
+        for name, point in zip(("start", "end"), require_ends("drive", self.start, self.end), strict=True):
+            object.__setattr__(self, name, point)
+
+    @property
+    def ends(self) -> tuple[tuple[float, SpringEnd], tuple[float, SpringEnd]]:
+        """Both, with the sense in which it pushes them along its line."""
+        return (-1.0, self.start), (1.0, self.end)
+
+    @property
+    def apart(self) -> tuple[int, ...]:
+        """Bars of which one may be left out so that the moments of the other two give the force between them.
+
+        From the ground to bar 2 or 4 it is in the moment of that bar alone, as a couple is; else it is in any pair's.
+        """
+        bars = {self.start.bar, self.end.bar}
+        return (*bars - {1},) if bars in ({1, 2}, {1, 4}) else MOVING_BARS
+
+    def require_stroke(self, linkage: FourBar) -> None:
+        """InputError where no motion changes the distance of the ends: a bar holds both, or the pins that they are."""
+        if common := _bars(linkage, self.start) & _bars(linkage, self.end):
+            allowed = f"keeps its distance from `from` at every position: bar {min(common)} holds both"
+            raise InputError("drive.to", f"bar {self.end.bar} at {self.end.distance:g} m", allowed)
+
+    def line(self, state: State, rounded: Callable[..., Number] = as_it_is) -> tuple[Number, Number]:
+        """Compute the stroke, m, and the unit vector from `start` to `end`, no number where they coincide."""
+        start, end = (rounded(point.place(state)) for _, point in self.ends)
+        across = end - start
+        stroke = rounded(np.abs(across))
+        return stroke, across / stroke
+
+    def speed(self, state: State) -> Number:
+        """ds/dt, m/s."""
+        one, other = (state.velocity(point.bar, point.in_bar) for _, point in self.ends)
+        return dot(self.line(state)[1], other - one)
+
+    def act(self, actions: Actions, force: Number) -> None:
+        """Push its ends apart."""
+        push = force * self.line(actions.state, actions.rounded)[1]
+        for sense, point in self.ends:
+            actions.force(point.bar, sense * push, point.in_bar * actions.state.direction(point.bar))
+
+    def per_newton(self, actions: Actions) -> Actions:
+        """Make what 1 N of it does to the bars, with the roundings of other actions."""
+        single = Actions(actions.state, actions.bodies, rounded=actions.rounded)
+        self.act(single, 1.0)
+        return single
+
+    def leverage(self, state: State, sines: dict[int, Number]) -> tuple[Number, Number]:
+        """P, and what of it there could be at most: L, the sum of what each end could move, m.
+
+        That is r on bar 2, a + r a/b on bar 3, r a/c on bar 4, r its distance from the bar's first pin.
+
+        Parameters
+        ----------
+        sines : of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2, as of a drive on bar 2, 3, 4.
+        """
+        _, a, b, c, _, _ = state.lengths
+        turning = {"h2": sines[2], "h3": (-a / b) * sines[3], "h4": (-a / c) * sines[4]}
+        turned = state._replace(k=state.k._replace(**turning))
+        one, other = (turned.point_coefficient(point.bar, point.in_bar) for _, point in self.ends)
+        reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
+        most = sum(reach[p.bar][0] + reach[p.bar][1] * abs(p.distance) for _, p in self.ends)
+        return dot(self.line(state)[1], other - one), most
+
+    def status(self, state: State, sines: dict[int, Number]) -> NDArray[np.uint8] | None:
+        """NO_DIRECTION where the ends coincide, NO_LEVER where P lies within its rounding; None: nowhere.
+
+        Places are rounded by the lengths over which they are reached, the line's direction by that over the stroke.
+        """
+        stroke, (lever, most) = self.line(state)[0], self.leverage(state, sines)
+        away = sum(state.lengths[:4]) + abs(self.start.distance) + abs(self.end.distance)
+        none, meet = abs(lever) * stroke <= NO_DIGIT_LEFT * most * away, stroke <= COINCIDE * away
+        if not anywhere(none | meet):
+            return None
+        return np.where(meet, NO_DIRECTION, np.where(none, NO_LEVER, OK)).astype(np.uint8)
+
+
+def _bars(linkage: FourBar, point: SpringEnd) -> set[int]:
+    """Bars that hold a point: its own, and at one of its pins the other one too."""
+    length = linkage.lengths[point.bar - 1]
+    places = zip({1: ("O2", "O4"), **ENDS}[point.bar], (0.0, length), strict=True)
+    pins = [pin for pin, along in places if abs(point.in_bar - along) <= COINCIDE * length]
+    return {point.bar}.union(*(PINS[pin] for pin in pins))

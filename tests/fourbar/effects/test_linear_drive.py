@@ -1,0 +1,418 @@
+"""The drive along a line: against free bodies in 40 digits, limiting cases, symmetry, power, and what is refused."""
+
+import math
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpc, mpf
+
+import fourbar
+from fourbar.effects import SpringEnd
+from fourbar.files.scene_file import loads
+from fourbar.files.scene_text import dump
+from fourbar.mjcf import mjcf
+from fourbar.mjcf.sdf import sdf
+from fourbar.mjcf.usd import usd
+from fourbar.show.duty import motor_duty, motor_entry, shaking_force, shaking_moment
+from fourbar.solution import json_text
+from tests.support.scenes import crank_rocker
+
+PAIRS = list(combinations((1, 2, 3, 4), 2))
+BARS = 10.0
+"""Of an error bar, 0.64 standard deviations wide: 2 in ten billion normal errors are beyond."""
+ROUND_OFF = 2e-11
+"""Relative to the largest value of the sweep: eps over the conditions that the scenes below come down to, 1e-4."""
+DIFFERENCES = 1e-7
+"""Relative: truncation and rounding of central differences at a step of 1e-5."""
+STEP = 1e-5
+WIDE, SHORT, KITE = (0.3, 0.1, 0.25, 0.22), (0.05, 0.3, 0.28, 0.31), (0.2, 0.3, 0.24, 0.33)
+
+
+def ends(one: int, other: int) -> fourbar.LinearDrive:
+    return fourbar.LinearDrive(SpringEnd(one, 0.17, -1.1), SpringEnd(other, 0.09, 0.7))
+
+
+def driven(one: int, other: int, **changes: Any) -> fourbar.Scene:
+    return crank_rocker(drive=ends(one, other), **changes)
+
+
+def cross(p: Any, q: Any) -> Any:
+    return (mp.conj(p) * q).imag
+
+
+def motion_of(scene: fourbar.Scene, theta_2: Any, branch: int) -> tuple[Any, Any, Any]:
+    """Directions, angular velocities and accelerations by the closed loop's vectors, in 40 digits."""
+    with mp.workdps(40):
+        d, a, b, c = map(mpf, scene.linkage.lengths)
+        w2, a2 = mpf(scene.motion.omega_2), mpf(scene.motion.alpha_2)
+        u = {1: mp.expj(mpf(scene.linkage.ground_angle)), 2: mp.expj(mpf(theta_2))}
+        D = d * u[1] - a * u[2]
+        e = abs(D)
+        cosine = (e * e + b * b - c * c) / (2 * b * e)
+        u[3] = D / e * mpc(cosine, branch * mp.sqrt(1 - cosine**2))
+        u[4] = (b * u[3] - D) / c
+
+        def rates(known: Any) -> tuple[Any, Any]:
+            """x and y of known + i b u3 x - i c u4 y = 0."""
+            p, q = 1j * b * u[3], 1j * c * u[4]
+            det = cross(p, q)
+            return -cross(known, q) / det, -cross(known, p) / det
+
+        w = {1: mpf(0), 2: w2}
+        w[3], w[4] = rates(1j * a * w2 * u[2])
+        turned = -a * w2**2 * u[2] - b * w[3] ** 2 * u[3] + c * w[4] ** 2 * u[4]
+        al = {2: a2}
+        al[3], al[4] = rates(1j * a * a2 * u[2] + turned)
+        return u, w, al
+
+
+def exact(scene: fourbar.Scene, theta_2: Any, branch: int) -> dict[str, Any]:
+    """Nine equations of three free bodies, in 40 digits."""
+    u, w, al = motion_of(scene, theta_2, branch)
+    with mp.workdps(40):
+        d, a, b, c = map(mpf, scene.linkage.lengths)
+        foot = {1: mpf(0), 2: mpf(0), 3: a * u[2], 4: d * u[1]}
+        tip = {2: a * u[2], 3: b * u[3], 4: c * u[4]}
+        a_A = (1j * al[2] - w[2] ** 2) * a * u[2]
+        R, M = dict.fromkeys((2, 3, 4), mpc(0)), dict.fromkeys((2, 3, 4), mpf(0))
+        (gravity,) = scene.effects
+        for bar in (2, 3, 4):
+            own = scene.linkage.bar(bar)
+            r, phi = own.mass_centre
+            arm = mpf(r) * mp.expj(mpf(phi)) * u[bar]
+            acceleration = (1j * al[bar] - w[bar] ** 2) * arm + (a_A if bar == 3 else 0)
+            force = mpf(own.mass) * (mpf(gravity.magnitude) * mp.expj(mpf(gravity.angle)) - acceleration)
+            R[bar] += force
+            M[bar] += cross(arm, force) - mpf(own.moment_of_inertia) * al[bar]
+            for load in scene.loads:
+                if load.bar == bar:
+                    F, at = load.force or (0.0, 0.0), load.at
+                    push = mpf(F[0]) * mp.expj(mpf(F[1]))
+                    R[bar] += push
+                    M[bar] += cross(arm + mpf(at[0]) * mp.expj(mpf(at[1])), push) + mpf(load.moment)
+        arms = [mpf(p.distance) * mp.expj(mpf(p.angle)) * u[p.bar] for p in (scene.drive.start, scene.drive.end)]
+        across = foot[scene.drive.end.bar] + arms[1] - foot[scene.drive.start.bar] - arms[0]
+        line = across / abs(across)
+        matrix, right = mp.zeros(9, 9), mp.zeros(9, 1)  # F12, F32, F43, F14 and F
+        at_ends = {2: ((0, 1), (2, 1)), 3: ((2, -1), (4, 1)), 4: ((6, 1), (4, -1))}
+        for row, bar in ((0, 2), (3, 3), (6, 4)):
+            for (column, sign), arm in zip(at_ends[bar], (0, tip[bar]), strict=True):
+                matrix[row, column] += sign
+                matrix[row + 1, column + 1] += sign
+                matrix[row + 2, column] -= sign * mp.im(arm)
+                matrix[row + 2, column + 1] += sign * mp.re(arm)
+            for sense, point, arm in zip((-1, 1), (scene.drive.start, scene.drive.end), arms, strict=True):
+                if point.bar == bar:
+                    matrix[row, 8] += sense * line.real
+                    matrix[row + 1, 8] += sense * line.imag
+                    matrix[row + 2, 8] += sense * cross(arm, line)
+            right[row], right[row + 1], right[row + 2] = -R[bar].real, -R[bar].imag, -M[bar]
+        x = mp.lu_solve(matrix, right)
+        v = {p.bar: 1j * w[p.bar] * arm for p, arm in zip((scene.drive.start, scene.drive.end), arms, strict=True)}
+        if 3 in v:
+            v[3] += 1j * w[2] * a * u[2]
+        speed = (mp.conj(line) * (v[scene.drive.end.bar] - v[scene.drive.start.bar])).real
+        pins = {
+            name: np.array([float(x[i]), float(x[i + 1])])
+            for i, name in enumerate(("F12", "F32", "F43", "F14"))
+            for i in (2 * i,)
+        }
+        found = {"drive_force": x[8], "stroke": abs(across), "stroke_speed": speed, "power": x[8] * speed}
+        return pins | {name: float(value) for name, value in found.items()}
+
+
+@pytest.mark.parametrize("lengths", [WIDE, SHORT, KITE])
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_forces_are_those_of_nine_equations_in_40_digits_within_their_error_bars(
+    one: int, other: int, lengths: tuple[float, ...]
+) -> None:
+    d, a, b, c = lengths
+    scene = driven(one, other)
+    link = scene.linkage
+    link = fourbar.FourBar(
+        d, replace(link.input, length=a), replace(link.coupler, length=b), replace(link.output, length=c), 0.2
+    )
+    for branch in (1, -1):
+        motion = fourbar.Motion(np.linspace(0.25, 6.2, 7), 10.0, 5.0, branch)
+        scene = replace(scene, linkage=link, motion=motion)
+        s = fourbar.solve(scene, "error")
+        ok = np.flatnonzero(s.status_code == 0)
+        assert len(ok) >= 3 and set(s.status) <= {"ok", "not_assembled"}
+        for i in ok:
+            true = exact(scene, s.theta_2[i], branch)
+            assert abs(s.drive_force[i] - true["drive_force"]) <= BARS * s.drive_force_error[i]
+            for name in ("F12", "F32", "F43", "F14"):
+                assert np.hypot(*(getattr(s, name)[i] - true[name])) <= BARS * s.force_error[i], name
+            for name in ("stroke", "stroke_speed", "power"):
+                size = np.nanmax(np.abs(getattr(s, name)))
+                assert abs(getattr(s, name)[i] - true[name]) <= ROUND_OFF * size, name
+        assert np.nanmax(s.drive_force_error / np.abs(s.drive_force)) < 1e-9  # no bar is wide enough to hide anything
+
+
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(one: int, other: int) -> None:
+    """At rest nothing grows without end there but for a line that has no lever on bars 3 and 4 in line, bar 2's."""
+    link, offset = fourbar.uniform(0.2, 0.48, 0.55, 0.2), 1e-10
+    near = fourbar.Motion(fourbar.FromLimit(1, offset), 0.0)
+    scene = fourbar.Scene(link, near, effects=(fourbar.Gravity(),), drive=ends(one, other))
+    s = fourbar.solve(scene, "error")
+    with mp.workdps(40):
+        d, a, b, c = map(mpf, link.lengths)
+        limits = [
+            sign * mp.acos((a * a + d * d - (b + side * c) ** 2) / (2 * a * d))
+            for side in (1, -1)
+            for sign in (1, -1)
+            if abs(a * a + d * d - (b + side * c) ** 2) < 2 * a * d
+        ]
+        theta_2 = min(limits, key=lambda angle: abs(angle - mpf(float(s.theta_2[0])))) + mpf(offset)
+        true = exact(scene, theta_2, 1)
+    assert s.status == ["ok"] and s.condition[0] < 1e-4
+    assert abs(s.drive_force[0] - true["drive_force"]) <= BARS * s.drive_force_error[0]
+    for name in ("F12", "F32", "F43", "F14"):
+        assert np.hypot(*(getattr(s, name)[0] - true[name])) <= BARS * s.force_error[0], name
+    if (one, other) != (1, 2):
+        assert s.drive_force_error[0] < 1e-13 * abs(s.drive_force[0])
+        largest = max(np.hypot(*getattr(s, name)[0]) for name in ("F12", "F32", "F43", "F14"))
+        assert s.force_error[0] < 1e-13 * largest  # of bars 3 and 4, so nearly in line, 1e-11 would be left
+
+
+@pytest.mark.parametrize("bar", [2, 4])
+def test_from_the_ground_to_a_bar_it_is_the_torque_over_its_lever(bar: int) -> None:
+    """The other pin forces are those of the torque, and only the ground's pin of the bar bears the push."""
+    torque, s = fourbar.solve(crank_rocker(drive_bar=bar)), fourbar.solve(driven(1, bar))
+    foot = {2: np.zeros((61, 2)), 4: 0.3 * np.column_stack((np.cos(np.full(61, 0.2)), np.sin(np.full(61, 0.2))))}[bar]
+    angle = getattr(s, f"theta_{bar}") + 0.7
+    arm = 0.09 * np.column_stack((np.cos(angle), np.sin(angle)))
+    lever = arm[:, 0] * s.drive_line[:, 1] - arm[:, 1] * s.drive_line[:, 0]
+    np.testing.assert_allclose(s.drive_force * lever, torque.torque, rtol=0, atol=1e-12 * np.abs(torque.torque).max())
+    pin = {2: "F12", 4: "F14"}[bar]
+    for name in {"F12", "F32", "F43", "F14"} - {pin}:
+        assert np.array_equal(getattr(s, name), getattr(torque, name)), name
+    push = s.drive_force[:, None] * s.drive_line
+    np.testing.assert_allclose(getattr(s, pin) + push, getattr(torque, pin), rtol=0, atol=1e-12 * np.abs(push).max())
+    assert np.all(np.abs(s.drive_condition - torque.drive_condition * np.abs(lever) / 0.09) < 1e-13)
+    # the ground's end lies where it was stated, against the ground's line
+    start = 0.17 * np.array([math.cos(0.2 - 1.1), math.sin(0.2 - 1.1)])
+    np.testing.assert_allclose(start + s.stroke[:, None] * s.drive_line, foot + arm, atol=1e-15)
+
+
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(one: int, other: int) -> None:
+    s, torque = fourbar.solve(driven(one, other)), fourbar.solve(crank_rocker())
+    np.testing.assert_allclose(s.power, torque.power, rtol=0, atol=ROUND_OFF * np.abs(torque.power).max())
+    back = fourbar.solve(crank_rocker(drive=fourbar.LinearDrive(ends(one, other).end, ends(one, other).start)))
+    for name in ("drive_force", "stroke", "stroke_speed", "drive_condition", "F12", "F43"):
+        np.testing.assert_allclose(getattr(back, name), getattr(s, name), rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(back.drive_line, -s.drive_line)
+    assert s.torque is None and s.drive_bar is None and torque.drive_force is None and torque.stroke is None
+
+
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(one: int, other: int) -> None:
+    """In [0, 1] for linkages of every type; ds/dtheta_2 here from differences of the stroke."""
+    rng = np.random.default_rng(one + 10 * other)
+    seen = 0
+    for _ in range(40):
+        d, a, b, c = rng.uniform(0.1, 1.0, 4)
+        if max(d, a, b, c) * 2 >= d + a + b + c:
+            continue
+        at = rng.uniform(0.05, 0.6, 2), rng.uniform(-3.0, 3.0, 2)
+        drive = fourbar.LinearDrive(SpringEnd(one, at[0][0], at[1][0]), SpringEnd(other, at[0][1], at[1][1]))
+        theta_2 = rng.uniform(0.0, 6.0)
+        own = fourbar.Motion(theta_2 + STEP * np.array([0.0, 1.0, -1.0]), 1.0, branch=int(rng.choice([1, -1])))
+        s = fourbar.solve(fourbar.Scene(fourbar.uniform(d, a, b, c), own, drive=drive))
+        if s.status != ["ok"] * 3 or s.condition[0] < 0.1:
+            continue
+        most = sum(
+            {1: 0.0, 2: r, 3: a + r * a / b, 4: r * a / c}[bar] for bar, r in zip((one, other), at[0], strict=True)
+        )
+        slope = (s.stroke[1] - s.stroke[2]) / (2.0 * STEP)
+        assert abs(s.stroke_speed[0] - slope) < DIFFERENCES * most / s.condition[0] ** 3
+        assert abs(s.drive_condition[0] - abs(slope * s.sin_mu[0]) / most) < DIFFERENCES / s.condition[0] ** 3
+        assert 0.0 <= s.drive_condition[0] <= 1.0
+        seen += 1
+    assert seen >= 5
+
+
+def test_where_it_has_no_lever_or_no_direction_there_are_no_forces() -> None:
+    link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    motion = fourbar.Motion(np.array([0.0, 0.5, math.pi]), 1.0)
+    s = fourbar.solve(
+        fourbar.Scene(link, motion, drive=fourbar.LinearDrive(SpringEnd(1, 0.2, 0.0), SpringEnd(2, 0.1, 0.0))), "error"
+    )
+    assert s.status == ["no_lever", "ok", "no_lever"]
+    assert np.isnan(s.drive_force[[0, 2]]).all() and np.isnan(s.F12[0]).all() and s.drive_condition[0] < 1e-15
+    assert s.stroke[0] == pytest.approx(0.1) and abs(s.stroke_speed[0]) < 1e-15
+    one = fourbar.solve(fourbar.Scene(link, fourbar.Motion(0.0, 1.0), drive=s.drive))
+    assert one.status == ["no_lever"] and np.isnan(one.power).all()
+    meet = fourbar.LinearDrive(SpringEnd(1, 0.1, 0.5), SpringEnd(2, 0.1, 0.0))
+    assert fourbar.solve(fourbar.Scene(link, motion, drive=meet)).status == ["ok", "no_direction", "ok"]
+    # the parallelogram's cranks keep their distance while they are parallel, and only then
+    parallel = fourbar.LinearDrive(SpringEnd(2, 0.05, 0.3), SpringEnd(4, 0.05, 0.3))
+    for branch, status in ((1, "no_lever"), (-1, "ok")):
+        scene = fourbar.Scene(
+            fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(1.0, 1.0, branch=branch), drive=parallel
+        )
+        assert fourbar.solve(scene).status == [status]
+
+
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [
+        ((1, 0.0, 0.0), (2, 0.05, 0.3)),  # O2
+        ((1, 0.3, 0.0), (4, 0.05, 0.3)),  # O4
+        ((2, 0.1, 0.0), (3, 0.1, 1.0)),  # A
+        ((3, 0.25, 0.0), (4, 0.1, 1.0)),  # B
+        ((1, 0.1, 1.0), (4, 0.0, 1.0)),
+        ((1, 0.0, 0.0), (3, 0.0, 0.0)),  # O2 to A: bar 2 holds both
+        ((2, 0.1, 0.0), (4, 0.22, 0.0)),
+        ((2, 0.0, 0.0), (4, 0.0, 0.0)),
+    ],
+)
+def test_ends_that_keep_their_distance_are_refused_in_one_line(start: Any, end: Any) -> None:
+    drive = fourbar.LinearDrive(SpringEnd(*start), SpringEnd(*end))
+    with pytest.raises(fourbar.InputError, match=r"^drive\.to = .*keeps its distance from `from`"):
+        fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), drive=drive)
+
+
+TEXT = """[lengths]
+ground = "30 cm"
+input = "10 cm"
+coupler = "25 cm"
+output = "22 cm"
+[motion]
+theta_2 = "1 rad"
+omega_2 = "2 rad/s"
+[drive]
+"""
+FROM, TO = 'from = { bar = 1, at = ["21 cm", "-60 deg"] }\n', 'to = { bar = 4, at = ["9 cm", "0 deg"] }\n'
+
+
+@pytest.mark.parametrize(
+    ("drive", "says"),
+    [
+        ("bar = 4\n" + FROM + TO, r"drive\.bar = 4: a drive acts on a bar or along a line"),
+        (FROM, r"drive\.to"),
+        (FROM + TO.replace("4", "1", 1), r"drive\.to\.bar = 1: must be another bar"),
+        (FROM.replace("21 cm", "30 cm").replace("-60", "0") + TO, r"drive\.to = .*keeps its distance"),
+        (FROM + TO.replace("9 cm", "9 kg"), r"drive\.to\.at"),
+        (FROM + TO + "force = 1\n", r"drive\.force"),
+    ],
+)
+def test_a_file_with_a_wrong_drive_is_refused_in_one_line(drive: str, says: str) -> None:
+    with pytest.raises(fourbar.InputError, match=says) as caught:
+        loads(TEXT + drive, "scene.toml")
+    assert "\n" not in str(caught.value) and str(caught.value).startswith("scene.toml: ")
+
+
+def test_it_reads_back_as_it_was_written_and_is_carried_by_studies() -> None:
+    scene = loads(TEXT + FROM + TO + '[tolerances]\n"drive.from.at.0" = "1 mm"\n')
+    again = loads(dump(scene))
+    assert again.drive == scene.drive
+    assert again.drive.start.bar == 1 and again.drive.end == SpringEnd(4, 0.09, 0.0)
+    assert again.drive.start[1:] == pytest.approx((0.21, math.radians(-60)))
+    assert again.drive_bar is None and '"drive_bar": null' in json_text(fourbar.solve(again))
+    with pytest.raises(fourbar.InputError, match="a drive acts on a bar or along a line"):
+        replace(scene, drive_bar=3)
+    with pytest.raises(fourbar.InputError, match="out = 'torque'"):
+        fourbar.solve(scene, out={"torque": np.empty(1)})
+    with pytest.raises(fourbar.InputError, match=r"drive\.from\.bar = .*same for every member"):
+        fourbar.vary(scene, {"drive.from.bar": [2]})
+
+
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_derivatives_by_its_ends_are_those_of_differences(one: int, other: int) -> None:
+    scene = driven(one, other, motion=fourbar.Motion(np.array([0.4, 2.0, 4.5]), 10.0, 5.0))
+    found = fourbar.sensitivity(scene)
+    for key in ("drive.from.at.0", "drive.from.at.1", "drive.to.at.0", "drive.to.at.1", "lengths.coupler"):
+        value = found.numbers[list(found.keys).index(key)]
+        s = fourbar.solve(fourbar.vary(scene, {key: value + STEP * np.array([-1.0, 1.0])}), compiled=True)
+        for name in ("drive_force", "stroke", "power", "F43", "drive_condition"):
+            slope = (getattr(s, name)[1] - getattr(s, name)[0]) / (2.0 * STEP)
+            size = np.abs(slope).max() + np.abs(getattr(s, name)).max() / 0.1
+            # the truncation grows with the cube of what divides
+            assert np.abs(found.of(name, key) - slope).max() < DIFFERENCES / s.drive_condition.min() ** 3 * size, (
+                name,
+                key,
+            )
+
+
+def test_extremes_hold_every_sample() -> None:
+    link, motion = fourbar.uniform(0.5, 0.3, 0.15, 0.15), fourbar.Motion(0.1, 3.0)
+    across = fourbar.LinearDrive(SpringEnd(1, 0.4, 1.5), SpringEnd(2, 0.2, 0.1))
+    scene = crank_rocker(linkage=link, loads=(), motion=motion, drive=across)
+    with pytest.raises(fourbar.InputError, match="quantity = 'torque'"):
+        fourbar.extremes(scene, ["torque"])
+    found = fourbar.extremes(scene, ["drive_force"])
+    ((low, high),) = found.parts
+    s = fourbar.solve(replace(scene, motion=fourbar.Motion(np.linspace(low, high, 2001), 3.0)))
+    least, greatest = found.least["drive_force"], found.greatest["drive_force"]
+    assert least.low <= s.drive_force.min() <= least.high + 1e-3 * abs(least.high)
+    assert greatest.low - 1e-3 * abs(greatest.low) <= s.drive_force.max() <= greatest.high
+
+
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_the_frame_bears_what_changes_the_momentum_of_the_bars(one: int, other: int) -> None:
+    scene = driven(one, other, loads=(), effects=())
+    s = fourbar.solve(scene)
+    force, moment = np.zeros((61, 2)), np.zeros(61)
+    for number in (2, 3, 4):
+        bar, G, a = scene.linkage.bar(number), getattr(s, f"G{number}"), getattr(s, f"a_G{number}")
+        force -= bar.mass * a
+        alpha = getattr(s, f"alpha_{number}")
+        moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0]) + bar.moment_of_inertia * alpha
+    pins = np.abs(s.F12).max() + np.abs(s.F14).max()
+    assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * pins
+    assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * pins
+    duty, entry = motor_duty(s), motor_entry(s, {})
+    assert duty.peak_force == np.abs(s.drive_force).max() and duty.peak_torque is None
+    assert duty.peak_speed == np.abs(s.stroke_speed).max() and entry["units"]["peak_speed"] == "m/s"
+
+
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(one: int, other: int) -> None:
+    """P = power without friction + sum of mu r |F| |slip|, with the pin forces that the drive itself makes."""
+    pins = {"O2": (0.1, 0.004), "A": (0.15, 0.005), "B": (0.2, 0.003), "O4": (0.1, 0.006)}
+    motion = fourbar.Motion(np.array([0.4, 1.3, 2.0, 4.5]), 10.0, 5.0)
+    scene = driven(one, other, motion=motion)
+    bare, s = (
+        fourbar.solve(scene),
+        fourbar.solve(
+            replace(scene, effects=(*scene.effects, fourbar.PinFriction(tuple((p, *n) for p, n in pins.items()))))
+        ),
+    )
+    ok = s.status_code == 0
+    assert np.count_nonzero(ok) >= 2
+    slip = {"O2": s.omega_2, "A": s.omega_3 - s.omega_2, "B": s.omega_4 - s.omega_3, "O4": s.omega_4}
+    lost = sum(
+        mu * r * np.hypot(*getattr(s, f).T) * np.abs(slip[p])
+        for (p, (mu, r)), f in zip(pins.items(), ("F12", "F32", "F43", "F14"), strict=True)
+    )
+    np.testing.assert_allclose(s.power[ok], (bare.power + lost)[ok], rtol=0, atol=ROUND_OFF * np.abs(s.power[ok]).max())
+    rest = fourbar.solve(
+        replace(
+            scene,
+            effects=(*scene.effects, fourbar.Friction.at(O2=0.05)),
+            motion=replace(motion, omega_2=0.0, alpha_2=0.0),
+        )
+    )
+    wide = 0.05 / np.abs(bare.stroke_speed / 10.0)
+    np.testing.assert_allclose(rest.drive_force_high - rest.drive_force_low, 2.0 * wide, rtol=1e-9)
+
+
+def test_files_of_simulators_refuse_it_by_name() -> None:
+    scene = driven(1, 4, loads=())
+    for write in (mjcf, sdf, usd):
+        with pytest.raises(fourbar.FourBarError, match=r"linear drive \(drive\.from, drive\.to\)"):
+            write(scene)
+
+
+def test_a_released_linkage_has_a_stroke_and_no_force() -> None:
+    scene = driven(1, 4, loads=(), motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.05, 50)))
+    s = fourbar.solve(scene, "error")
+    assert not s.drive_force.any() and not s.power.any() and np.isfinite(s.stroke_speed).all() and s.torque is None
+    slope = np.gradient(s.stroke, s.time)
+    assert np.abs(slope[1:-1] - s.stroke_speed[1:-1]).max() < 1e-3 * np.abs(s.stroke_speed).max()

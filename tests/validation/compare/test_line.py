@@ -1,0 +1,103 @@
+"""A drive along a line before the free bodies: every pair of bars holds, faults show, who cannot do it says so."""
+
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import LinearDrive, SpringEnd
+from fourbar.scene import Scene
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES
+from fourbar_validation.engines.checked import Checked
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
+from tests.support.scenes import crank_rocker
+
+FREE_BODY = [witness for witness in WITNESSES if witness.name == "free-body"]
+PAIRS = list(combinations((1, 2, 3, 4), 2))
+PINS = fourbar.PinFriction.at(A=(0.1, 0.005), O4=(0.2, 0.004))
+
+
+def driven(one: int, other: int, **changes: Any) -> Scene:
+    ends = SpringEnd(one, 0.17, -1.1), SpringEnd(other, 0.09, 0.7)
+    motion = fourbar.Motion(np.linspace(0.1, 6.2, 25), 10.0, 5.0)
+    return crank_rocker(motion=motion, drive=LinearDrive(*ends), **changes)
+
+
+@pytest.mark.parametrize(("one", "other"), PAIRS)
+def test_every_pair_of_bars_agrees_with_thirteen_equations(one: int, other: int) -> None:
+    for effects in ((fourbar.Gravity(), fourbar.Viscous.at(B=0.02)), (fourbar.Gravity(), PINS)):
+        for branch in (1, -1):
+            scene = driven(one, other, effects=effects)
+            rows = judge("", replace(scene, motion=replace(scene.motion, branch=branch)), FREE_BODY).rows
+            assert not [row for row in rows if row.failed]
+            known = {row.quantity for row in rows if row.engine == "free-body" and row.verdict == AGREES}
+            assert known >= {"drive_force", "stroke", "drive_line", "stroke_speed", "drive_condition", "F12"}
+            assert "drive_force_inertia" in known and "torque" not in known
+
+
+def test_positions_alone_have_a_stroke_that_is_judged() -> None:
+    scene = driven(3, 4)
+    rows = judge("", replace(scene, motion=replace(scene.motion, omega_2=None)), FREE_BODY).rows
+    assert not [row for row in rows if row.failed]
+    assert {"stroke", "drive_line"} <= {row.quantity for row in rows if row.verdict == AGREES}
+
+
+def test_statics_and_friction_at_rest_agree_too() -> None:
+    scene = driven(1, 3, effects=(fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02)))
+    rows = judge("", replace(scene, motion=replace(scene.motion, omega_2=0.0, alpha_2=0.0)), FREE_BODY).rows
+    assert not [row for row in rows if row.failed]
+    assert {"drive_force_low", "drive_force_high"} <= {row.quantity for row in rows if row.verdict == AGREES}
+
+
+def _reversed(self: LinearDrive) -> Any:
+    return (1.0, self.start), (-1.0, self.end)
+
+
+def _of_one_end(self: LinearDrive, actions: Any, force: Any) -> None:
+    push = force * self.line(actions.state, actions.rounded)[1]
+    actions.force(self.end.bar, push, self.end.in_bar * actions.state.direction(self.end.bar))
+
+
+def _of_the_wrong_bar(self: LinearDrive, actions: Any, force: Any) -> None:
+    push = force * self.line(actions.state, actions.rounded)[1]
+    actions.force(2, -push, self.start.in_bar * actions.state.direction(2))
+    actions.force(3, push, self.end.in_bar * actions.state.direction(3))
+
+
+FAULTS = {
+    "line reversed": ("ends", property(_reversed)),
+    "one of its two ends": ("act", _of_one_end),
+    "lever of the wrong bar": ("act", _of_the_wrong_bar),
+    "sign of the speed": ("speed", lambda self, state, of=LinearDrive.speed: -of(self, state)),
+    "half the leverage": ("leverage", lambda *given, of=LinearDrive.leverage: (0.5 * of(*given)[0], of(*given)[1])),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_in_the_drive_is_caught(monkeypatch: pytest.MonkeyPatch, fault: str) -> None:
+    monkeypatch.setattr(LinearDrive, *FAULTS[fault])
+    rows = judge("", driven(2, 4), FREE_BODY).rows
+    assert [row for row in rows if row.verdict == FAILS]
+
+
+class Outside:
+    """A witness from outside that does not know of lines."""
+
+    name = "outside"
+
+    def answer(self, scene: Any, command: Any) -> Any:
+        raise AssertionError("it is not asked")
+
+
+def test_who_cannot_do_it_refuses_in_one_line_that_names_it() -> None:
+    rows = judge("", driven(1, 4, loads=()), WITNESSES).rows
+    refused = {row.engine: row.reason for row in rows if row.verdict == REFUSES}
+    assert set(refused) == {witness.name for witness in WITNESSES} - {"free-body"}
+    assert all("the linear drive (drive.from, drive.to)" in reason for reason in refused.values())
+    scene = driven(1, 4)
+    answer = Checked("outside", f"{__name__}:Outside").answer(scene, fourbar.command(scene))
+    assert answer.refusal == "it does not declare linear_drive"

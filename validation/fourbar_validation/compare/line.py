@@ -1,0 +1,76 @@
+"""The line of a linear drive from the angles of the bars alone: its stroke, its speed, and its leverage."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.linkage import FourBar
+from fourbar_validation.compare.answer import Array
+
+if TYPE_CHECKING:
+    from fourbar.effects import LinearDrive
+
+Complex = NDArray[np.complex128]
+
+
+class DriveLine(NamedTuple):
+    """The line at n positions."""
+
+    linkage: FourBar
+    drive: "LinearDrive"
+    directions: dict[int, Complex]
+    """e^{i theta} of bars 1 to 4."""
+    arms: tuple[Complex, Complex]
+    """From the first pins of their bars to the ends, m."""
+    across: Complex
+    """From the one end to the other, m."""
+
+    @property
+    def stroke(self) -> Array:
+        """Distance of the ends, m."""
+        return np.hypot(self.across.real, self.across.imag)
+
+    @property
+    def unit(self) -> Complex:
+        """Direction; no number where the ends coincide."""
+        with np.errstate(all="ignore"):
+            return self.across / self.stroke
+
+    def speed(self, omega: dict[int, Array]) -> Array:
+        """Rate of the stroke at angular velocities of bars 1 to 4, m/s: each arm swings across itself."""
+        swung = []
+        for point, arm in zip((self.drive.start, self.drive.end), self.arms, strict=True):
+            velocity = 1j * omega[point.bar] * arm
+            if point.bar == 3:
+                velocity = velocity + 1j * omega[2] * self.linkage.input.length * self.directions[2]
+            swung.append(velocity)
+        return np.asarray((np.conj(self.unit) * (swung[1] - swung[0])).real)
+
+    @property
+    def most(self) -> float:
+        """What its ends could move at most, as `condition` counts, m."""
+        _, a, b, c = self.linkage.lengths
+        reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
+        return sum(reach[p.bar][0] + reach[p.bar][1] * abs(p.distance) for p in (self.drive.start, self.drive.end))
+
+    @property
+    def condition(self) -> Array:
+        """Compute the rate of the stroke over the most, at speeds that close the loop and are finite at its limits."""
+        _, a, b, c = self.linkage.lengths
+        u2, u3, u4 = (self.directions[bar] for bar in (2, 3, 4))
+        zero = np.zeros(len(u2))
+        omega = {1: zero, 2: (np.conj(u3) * u4).imag, 3: a / b * (np.conj(u4) * u2).imag}
+        omega[4] = a / c * (np.conj(u3) * u2).imag
+        return np.abs(self.speed(omega)) / self.most
+
+
+def line_of(linkage: FourBar, drive: "LinearDrive", theta: dict[int, Array]) -> DriveLine:
+    """Place the ends at angles of bars 2, 3, 4, each (n,)."""
+    directions = {bar: np.exp(1j * angle) for bar, angle in theta.items()}
+    directions[1] = np.full(len(theta[2]), np.exp(1j * linkage.ground_angle))
+    feet = {1: 0.0, 2: 0.0, 3: linkage.input.length * directions[2], 4: linkage.ground * directions[1]}
+    ends = (drive.start, drive.end)
+    arms = [point.distance * np.exp(1j * point.angle) * directions[point.bar] for point in ends]
+    across = feet[drive.end.bar] + arms[1] - feet[drive.start.bar] - arms[0]
+    return DriveLine(linkage, drive, directions, (arms[0], arms[1]), across)
