@@ -12,7 +12,7 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.pins import checked, rows_of
 from fourbar.errors import expect
-from fourbar.formulas.arithmetic import Number
+from fourbar.formulas.arithmetic import Number, conjugate, namespace, nearest
 from fourbar.formulas.motion import State
 from fourbar.linkage import PINS
 from fourbar.quantities import OK, WOUND
@@ -56,7 +56,8 @@ class Torsion(Effect):
         """M on bar j = -(preload + k (theta_j - theta_i - rest)), its opposite on bar i."""
         for pin, k, rest, preload in self.springs:
             i, j = PINS[pin]
-            angle = actions.rounded(np.angle(state.direction(j) * np.conj(state.direction(i))))
+            turned = state.direction(j) * conjugate(state.direction(i))
+            angle = actions.rounded(namespace(turned).atan2(turned.imag, turned.real))
             actions.couple(pin, -(preload + k * _wound(actions.rounded(angle - rest))))
 
     def counted_from(self, start: State, branch: Number) -> "Torsion":
@@ -107,4 +108,4 @@ def _continuous(state: State, branch: Number) -> dict[int, Array]:
 
 def _wound(angle: Array | float) -> Array:
     """Wrap the angle into [-pi, pi]; an angle that lies there stays as it is."""
-    return angle - math.tau * np.rint(angle / math.tau)
+    return angle - math.tau * nearest(angle / math.tau)
