@@ -67,6 +67,9 @@ class Solution(Quantities):
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached a limit position or change point, s; None: it did not."""
 
+    commanded: str = field(default="theta_2", init=False)
+    """Name of the angle that was commanded."""
+
     def __len__(self) -> int:
         return len(self.theta_2)
 

@@ -12,9 +12,20 @@ from fourbar.errors import InputError, expect
 from fourbar.evaluation.blocks import each, evaluation, is_compiled, keep, positions_at_once
 from fourbar.evaluation.case import BLOCK, Case
 from fourbar.evaluation.stages import FORCE, Part, commanded, freely
-from fourbar.linkage import A_BRANCH, require, require_whole
-from fourbar.quantities import ANGLES, COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, STAGE_OF, STAGES, is_scalar
+from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
+from fourbar.quantities import (
+    ANGLES,
+    COUPLE,
+    OF_DRY_FRICTION,
+    OF_LINE,
+    OF_PIN_LOADS,
+    STAGE_OF,
+    STAGES,
+    UNITS,
+    is_scalar,
+)
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, unwrap
 
@@ -46,11 +57,11 @@ def solve(
     ----------
     stage : "position", "velocity", "acceleration", "force" or "error"; each includes those before
         it. Left out: "force", or "position" where the scene states no omega_2.
-    at : other positions, velocities and accelerations of the input than the scene's own.
+    at : other positions, velocities and accelerations than the scene's own, of a bar of its own.
     out : arrays to write into, by name, (n,) or (n, 2), of a study (m, n) or (m, n, 2), which share no memory; only the
         quantities named are evaluated, with the stages they need, and the others are None in the result.
-    side : in which sense pins at rest are about to turn where dry friction acts: +1 as theta_2 grows, -1 as it falls, 0
-        neither.
+    side : in which sense pins at rest are about to turn where dry friction acts: +1 as the commanded angle grows, -1 as
+        it falls, 0 neither.
     compiled : False: by NumPy. True: by the compiled formulas (numba, extra "fast"), as far as they carry the scene;
         left out: likewise, where numba is installed and the work is at least WORTH_COMPILING.
 
@@ -66,19 +77,19 @@ def solve(
         if not hasattr(scene, "solved"):
             raise InputError("scene", scene, "must be a Scene, or a Study of `vary`")
         if at is not None:
-            raise InputError("at", "a command", "a study states its own positions: vary motion.theta_2")
+            raise InputError("at", "a command", "a study states its own positions: vary the commanded angle")
         return scene.solved(stage, out=out, side=side, compiled=compiled)
     if at is not None:
         _refuse(at)
     moved = _released(scene) if scene.motion.free is not None and at is None else None
     where = moved.command if moved is not None else command(scene) if at is None else at
-    n = len(where.theta_2)
-    wanted, names = requested(scene, (n,), where.omega_2, stage, out)
+    n = len(where.angle)
+    wanted, names = requested(scene, (n,), where, stage, out)
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
-        case = Case.of(scene)._replace(side=side)
+        case = Case.of(scene, where.bar)._replace(side=side)
         if wanted >= FORCE and scene.counts_turns:
-            case = case.with_start(command(scene))
+            case = case.with_start(_beginning(scene, where, moved))
         quick = moved is None and where.remainder is None and is_compiled(case, wanted, n, compiled)
         result = None
         if n == 1 and moved is None and out is None and not quick:
@@ -87,9 +98,7 @@ def solve(
         result = arrays(names, (n,), out)
         _by_parts(case, where, moved, wanted, names, result, code, quick)
 
-    for name in ANGLES:
-        if name in result:
-            unwrap(result[name])
+    unwrap_angles(result, where.bar)
     solution = solved(scene, where, code, result)
     solution.time, solution.stopped_at = where.time, None if moved is None else moved.stopped_at
     return solution
@@ -98,22 +107,25 @@ def solve(
 def _refuse(at: Command) -> None:
     """Raise an InputError where a command is none."""
     expect("at", at, Command)
-    for name in ("theta_2", "branch"):
+    require_bar("at.bar", at.bar)
+    named = dict(zip(("angle", "speed", "acceleration", "branch"), (*COMMANDS[at.bar], "branch"), strict=True))
+    for name in ("angle", "branch"):
         value = getattr(at, name)
-        expect(f"at.{name}", value, np.ndarray)
-        if value.ndim != 1 or value.shape != at.theta_2.shape or value.dtype.kind not in "iuf":
-            raise InputError(f"at.{name}", value, "must be numbers, shape (n,), as many of theta_2 as of branch")
+        expect(f"at.{named[name]}", value, np.ndarray)
+        if value.ndim != 1 or value.shape != at.angle.shape or value.dtype.kind not in "iuf":
+            allowed = f"must be numbers, shape (n,), as many of {at.commanded} as of branch"
+            raise InputError(f"at.{named[name]}", value, allowed)
     branch = at.branch
     if not (branch.item() in (1, -1) if branch.size == 1 else (np.abs(branch) == 1).all()):
         raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
-    for name in ("alpha_2",) if at.omega_2 is None else ("omega_2", "alpha_2"):
-        value = getattr(at, name)
+    for name in ("acceleration",) if at.speed is None else ("speed", "acceleration"):
+        value, key = getattr(at, name), f"at.{named[name]}"
         if isinstance(value, np.ndarray):
-            if value.shape not in ((), at.theta_2.shape) or value.dtype.kind not in "iuf":
-                raise InputError(f"at.{name}", value, f"must be numbers, shape () or {at.theta_2.shape}")
+            if value.shape not in ((), at.angle.shape) or value.dtype.kind not in "iuf":
+                raise InputError(key, value, f"must be numbers, shape () or {at.angle.shape}")
         elif not isinstance(value, float):
-            expect(f"at.{name}", value, float, int, np.integer, np.floating)
-            require(f"at.{name}", value)
+            expect(key, value, float, int, np.integer, np.floating)
+            require(key, value)
     if at.remainder is not None:
         require("at.remainder", at.remainder)
     expect("at.time", at.time, np.ndarray, type(None))
@@ -122,22 +134,22 @@ def _refuse(at: Command) -> None:
 def last_stage(scene: Scene) -> str:
     """Return the last stage that a scene states enough for: error bars and all, or positions only."""
     motion = scene.motion
-    return "position" if motion.omega_2 is None and motion.law is None and motion.free is None else STAGES[-1]
+    return "position" if motion.speed is None and motion.law is None and motion.free is None else STAGES[-1]
 
 
 def requested(
-    scene: Scene, shape: tuple[int, ...], omega_2: Any, stage: str | None, out: Mapping[str, Array] | None
+    scene: Scene, shape: tuple[int, ...], at: Command, stage: str | None, out: Mapping[str, Array] | None
 ) -> tuple[int, KeysView[str]]:
     """Return the number of the last stage evaluated, and the names of the quantities; an InputError as of `solve`.
 
     Parameters
     ----------
     shape : of the positions.
-    omega_2 : None where the scene states none.
+    at : the command; of a bar other than the input theta_2 and sin_mu, whose sign is the branch, are found too.
     """
     if out is None:
         if stage is None:
-            stage = "position" if omega_2 is None else "force"
+            stage = "position" if at.speed is None else "force"
         if not isinstance(stage, str) or stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted = STAGES.index(stage)
@@ -147,16 +159,17 @@ def requested(
         names = out.keys()
         stages = _stages(tuple(point.name for point in scene.points))
         wanted = _highest_stage(out, shape, {name: of for name, of in stages.items() if name not in _foreign(scene)})
-    if wanted > 0 and omega_2 is None:
-        raise InputError("motion.omega_2", None, f"is needed for the stage {STAGES[wanted]!r}")
-    return wanted, names
+    if wanted > 0 and at.speed is None:
+        raise InputError(f"motion.omega_{at.bar}", None, f"is needed for the stage {STAGES[wanted]!r}")
+    return wanted, names if at.bar == 2 else {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
 
 
 def arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None) -> dict[str, Array]:
     """To write into: new ones, or those given."""
-    if out is not None:
-        return dict(out)
-    return {name: np.empty(shape if is_scalar(name) else (*shape, 2)) for name in names}
+    given = {} if out is None else out
+    return {
+        name: given[name] if name in given else np.empty(shape if is_scalar(name) else (*shape, 2)) for name in names
+    }
 
 
 def _stages(points: tuple[str, ...]) -> dict[str, str]:
@@ -180,12 +193,25 @@ def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[s
                 arrays[point.name] = array
     known: Mapping[str, Any] = result
     if scene.points:
-        known = {name: array for name, array in result.items() if name in STAGE_OF}
-    solution = Solution(scene.title, scene.drive_bar, code, np.asarray(at.branch), theta_2=at.theta_2, **known)
-    solution.drive = scene.drive
+        known = {name: array for name, array in result.items() if name in UNITS}
+    branch, theta_2 = np.asarray(at.branch), at.angle
+    if at.bar != 2:
+        theta_2, sine = known["theta_2"], known["sin_mu"]
+        known = {name: array for name, array in known.items() if name != "theta_2"}
+        branch = np.where(np.abs(sine) > 0.0, np.sign(sine), branch).astype(np.int8)
+    solution = Solution(scene.title, scene.drive_bar, code, branch, theta_2=theta_2, **known)
+    solution.drive, solution.commanded = scene.drive, at.commanded
     solution.points, solution.velocity, solution.acceleration = own[""], own["v_"], own["a_"]
     solution.ground = (scene.linkage.ground, scene.linkage.ground_angle)
     return solution
+
+
+def unwrap_angles(result: Mapping[str, Array], bar: int) -> None:
+    """Make every angle that was found continuous along its sweep; the commanded one is as it is stated."""
+    commanded = COMMANDS[bar][0]
+    for name in ("theta_2", *ANGLES):
+        if name in result and name != commanded:
+            unwrap(result[name])
 
 
 def _by_parts(
@@ -241,21 +267,30 @@ def _released(scene: Scene) -> "FreeMotion":
 
     free, start = scene.motion.free, command(scene)
     assert free is not None
-    if len(start.theta_2) != 1:
-        raise InputError("motion.theta_2", scene.motion.theta_2, "a free motion is released at one angle")
+    if len(start.angle) != 1:
+        raise InputError(f"motion.{start.commanded}", scene.motion.angle, "a free motion is released at one angle")
     moved = release(
         scene.linkage,
         (*scene.loads, *scene.effects),
-        float(start.theta_2[0]),
-        scene.motion.omega_2 or 0.0,
+        float(start.angle[0]),
+        scene.motion.speed or 0.0,
         int(start.branch[0]),
         np.linspace(0.0, free.duration, free.steps + 1),
         follow=scene.motion.through == "follow",
+        bar=start.bar,
     )
     if scene.counts_turns:
         with np.errstate(all="ignore"):
-            Case.of(scene).with_start(start).refuse_wound(moved.command)
+            Case.of(scene).with_start(_beginning(scene, moved.command, moved)).refuse_wound(moved.command)
     return moved
+
+
+def _beginning(scene: Scene, where: Command, moved: "FreeMotion | None") -> Command:
+    """Return the positions among which effects that count turns find where the motion begins, of the bar of `where`."""
+    if moved is not None:
+        return Command(where.angle[:1], where.branch[:1], 0.0, 0.0)
+    own = command(scene)
+    return own if own.bar == where.bar else where
 
 
 def _foreign(scene: Scene) -> tuple[str, ...]:

@@ -118,7 +118,9 @@ def analyze(
     with opened(scene) as described, waiting(described):
         solution = solve(described, last_stage(described))
     if not solution.assembled.any():
-        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions requested")
+        raise NotAssembledError(
+            f"{scene}: motion.{described.motion.names[0]}: the linkage assembles at none of the positions requested"
+        )
     if as_json:
         found = between(described, solution)
         text = json_text(solution, shown, motor=motor_entry(solution, shown, found and found.solution))
@@ -138,7 +140,9 @@ def _sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
     with opened(scene) as stated:
         found = sensitivity(stated)
     if not found.solution.assembled.any():
-        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
+        raise NotAssembledError(
+            f"{scene}: motion.{stated.motion.names[0]}: the linkage assembles at none of the positions"
+        )
     if as_json:
         text = influence.json_text(found)
     else:
@@ -170,7 +174,9 @@ def tolerance(
     with opened(scene) as stated, running("samples are solved") as progress:
         found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
     if (found.without == found.samples).all():
-        raise NotAssembledError(f"{scene}: motion.theta_2: the linkage assembles at none of the positions")
+        raise NotAssembledError(
+            f"{scene}: motion.{stated.motion.names[0]}: the linkage assembles at none of the positions"
+        )
     if out is not None:
         draw_tolerances(found, out, units)
     if as_json:

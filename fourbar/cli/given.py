@@ -52,7 +52,7 @@ def opened(path: Path) -> Iterator["Scene"]:
     scene, out = load(path), click.get_current_context().params.get("out")
     if out is not None:
         require_file(out, path)
-    for key, described in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
+    for key, described in ((f"motion.{scene.motion.names[0]}", scene.motion.angle), ("motion.free", scene.motion.free)):
         if isinstance(described, (Sweep, Free)) and described.steps >= MOST_POSITIONS:
             raise InputError(f"{key}.steps", described.steps, f"must be below {MOST_POSITIONS} here", str(path))
     try:

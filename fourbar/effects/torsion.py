@@ -14,6 +14,8 @@ from fourbar.effects.pins import checked, rows_of
 from fourbar.errors import expect
 from fourbar.formulas.arithmetic import Number, conjugate, namespace, nearest
 from fourbar.formulas.motion import State
+from fourbar.formulas.path import ROLES
+from fourbar.formulas.position import lengths_read_from
 from fourbar.linkage import PINS
 from fourbar.quantities import OK, WOUND
 from fourbar.solution import Array
@@ -29,7 +31,7 @@ class Torsion(Effect):
     With beta = theta_j - theta_i (theta_1 for the ground) the couple on bar j is
     -(preload + stiffness (beta - rest)). Where the motion begins beta - rest is within half a turn, whatever
     whole turns the scene's angles count; where the pin then turns beyond half a turn from rest, followed
-    continuously along theta_2, the status is "wound" and there are no forces.
+    continuously along the commanded angle, the status is "wound" and there are no forces.
     """
 
     springs: tuple[tuple[str, float, float, float], ...]
@@ -78,34 +80,39 @@ class Torsion(Effect):
         return np.where(wound, WOUND, OK).astype(np.uint8)
 
     def _along(self, state: State, branch: Number) -> list[Array]:
-        """theta_j - theta_i of each sprung pin, continuous in theta_2 on one branch."""
+        """theta_j - theta_i of each sprung pin, continuous in the commanded angle on one branch."""
         angles = _continuous(state, branch)
         return [angles[PINS[pin][1]] - angles[PINS[pin][0]] for pin, *_ in self.springs]
 
 
 def _continuous(state: State, branch: Number) -> dict[int, Array]:
-    """theta_1 .. theta_4 without jumps at a whole turn, on one branch.
+    """theta_1 .. theta_4 without jumps at a whole turn, on one branch, as the loop is read from the commanded bar.
 
     The diagonal from A to O4 swings about the ground's line where a < d, and otherwise about the input's, never by
     more than a quarter turn; bars 3 and 4 make angles with it that stay between 0 and half a turn.
     """
-    theta_1, theta_2 = state.theta_1, state.theta_2
-    theta_3, theta_4, phi = (np.angle(u) for u in (state.at.u3, state.at.u4, state.at.diagonal))
-    line = np.where(state.lengths.a < state.lengths.d, theta_1, theta_2 + math.pi)
+    bar, theta_1, theta_2 = state.bar, state.theta_1, state.theta_2 if state.q is None else state.q
+    d, a, *_ = lengths_read_from(bar, state.lengths[:4])
+    turned = math.pi if bar == 4 else 0.0  # of the ground, and with it of the coupler
+    u2, u3, u4 = (state.direction(each) for each in ROLES[bar])
+    theta_3, theta_4 = np.angle(u3) + turned, np.angle(u4)
+    theta_1 = theta_1 + turned
+    phi = np.angle(state.at.diagonal if bar == 2 else d * np.exp(1j * theta_1) - a * u2)
+    line = np.where(a < d, theta_1, theta_2 + math.pi)
     phi = line + _wound(phi - line)
 
     def beyond(angle: Array) -> Array:
         """Wrap the angle into half a turn, or as far outside as rounding puts it."""
         return _wound(angle - 0.5 * math.pi) + 0.5 * math.pi
 
-    return {
-        1: np.full_like(theta_2, theta_1),
-        2: theta_2,
-        3: phi + branch * beyond(branch * (theta_3 - phi)),
-        4: phi + math.pi - branch * beyond(branch * (phi + math.pi - theta_4)),
-    }
+    own = (
+        theta_2,
+        phi + branch * beyond(branch * (theta_3 - phi)) - turned,
+        phi + math.pi - branch * beyond(branch * (phi + math.pi - theta_4)),
+    )
+    return {1: np.full_like(theta_2, theta_1 - turned), **dict(zip(ROLES[bar], own, strict=True))}
 
 
-def _wound(angle: Array | float) -> Array:
+def _wound(angle: Number) -> Number:
     """Wrap the angle into [-pi, pi]; an angle that lies there stays as it is."""
     return angle - math.tau * nearest(angle / math.tau)

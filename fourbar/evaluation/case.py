@@ -11,10 +11,18 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions, as_it_is, bodies
 from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import LimitError
-from fourbar.formulas.arithmetic import anywhere, polar, select, vector
+from fourbar.formulas.arithmetic import angle, anywhere, polar, select, vector
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, path
-from fourbar.formulas.pin_forces import Bodies, PinForces, Wrenches, coupler_about_B, inertia_wrenches, pin_forces
+from fourbar.formulas.pin_forces import (
+    Bodies,
+    PinForces,
+    Wrenches,
+    about_first_pin,
+    coupler_about_B,
+    inertia_wrenches,
+    pin_forces,
+)
 from fourbar.formulas.position import HalfAngle, Loop, Position
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
@@ -99,10 +107,10 @@ class Case(NamedTuple):
     """In place of a couple on the driven bar."""
 
     @classmethod
-    def of(cls, scene: Scene) -> "Case":
-        """Collect the numbers that stay the same over the positions."""
+    def of(cls, scene: Scene, bar: int = 2) -> "Case":
+        """Collect the numbers that stay the same over the positions, for a command of bar 2, 3 or 4."""
         terms, linkage = (*scene.loads, *scene.effects), scene.linkage
-        own = path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle)
+        own = path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
         square = own.unit * own.unit
         lengths = Loop(*linkage.lengths, own.lengths.E1 * square, own.lengths.E2 * square)
         points = tuple((point.name, point.bar, polar(*point.from_pin)) for point in scene.points)
@@ -137,18 +145,20 @@ class Case(NamedTuple):
         ----------
         at : in the order in which the path reads the loop.
         """
-        theta_1 = self.linkage.ground_angle
-        if not moving:
-            return State(self.lengths, theta_1, q, at, NO_MOTION, 0.0, rates(NO_MOTION, 0.0, 0.0))
-        at, k = path.motion(at, branch)
-        return State(self.lengths, theta_1, q, at, k, speed, rates(k, speed, acceleration))
+        k = NO_MOTION
+        if moving:
+            at, k = path.motion(at, branch)
+        else:
+            at, speed, acceleration = path.in_order(at), 0.0, 0.0
+        state = State(self.lengths, self.linkage.ground_angle, q, at, k, speed, rates(k, speed, acceleration))
+        return state if path.bar == 2 else state._replace(theta_2=angle(at.u2), bar=path.bar, q=q)
 
     def at(self, where: Command) -> State:
-        """Compute the positions of a command to the input, and their motion."""
-        half, _ = self.half_angle(where.theta_2, where.remainder)
-        found = self.path.position(where.theta_2, half, where.branch)
-        omega_2 = 0.0 if where.omega_2 is None else where.omega_2
-        return self.state(self.path, where.theta_2, found, where.branch, omega_2, where.alpha_2)
+        """Compute the positions of a command, and their motion."""
+        half, _ = self.half_angle(where.angle, where.remainder)
+        found = self.path.position(where.angle, half, where.branch)
+        speed = 0.0 if where.speed is None else where.speed
+        return self.state(self.path, where.angle, found, where.branch, speed, where.acceleration)
 
     def started(self, at: Command) -> "Case":
         """With effects that know that the motion begins at a position, of as many linkages as there are."""
@@ -157,12 +167,12 @@ class Case(NamedTuple):
 
     def with_start(self, motion: Command) -> "Case":
         """Let the effects begin where the linkage first assembles in a motion, if that keeps its branch."""
-        half, _ = self.half_angle(motion.theta_2, motion.remainder)
+        half, _ = self.half_angle(motion.angle, motion.remainder)
         assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
         if not assembled.any() or np.ptp(motion.branch) != 0:
             return self
         first = int(np.argmax(assembled))
-        return self.started(Command(motion.theta_2[first], motion.branch[first], 0.0, 0.0, motion.remainder))
+        return self.started(Command(motion.angle[first], motion.branch[first], 0.0, 0.0, motion.remainder))
 
     def refuse_wound(self, at: Command) -> None:
         """Raise a LimitError where a free motion winds a spring: from there on it is no longer the spring's."""
@@ -176,9 +186,9 @@ class Case(NamedTuple):
                     "by more than half a turn from the rest of its spring, which is not modelled"
                 )
 
-    def half_angle(self, theta_2: Array, remainder: Any) -> tuple[HalfAngle, NDArray[np.intp]]:
+    def half_angle(self, q: Array, remainder: Any) -> tuple[HalfAngle, NDArray[np.intp]]:
         """Compute the half angles, and the indices of those evaluated in many digits."""
-        lengths, half = self.path.lengths, self.path.half_angle(theta_2)
+        lengths, half = self.path.lengths, self.path.half_angle(q)
         close: Any = remainder is not None
         if remainder is None:
             for factor, constant in ((half.outer, lengths.E1), (half.inner, lengths.E2)):
@@ -188,9 +198,21 @@ class Case(NamedTuple):
             return half, NOWHERE
         from fourbar.formulas.many_digits import decided
 
-        index = np.flatnonzero(np.broadcast_to(close, np.shape(theta_2)))
-        half = decided(self.linkage, self.path.unit, half, index, theta_2, remainder)
+        index = np.flatnonzero(np.broadcast_to(close, np.shape(q)))
+        half = decided(self.linkage, self.path.unit, half, index, q, remainder, self.path.bar)
         return half, index
+
+    def _inertial(self, state: State, acceleration: Any) -> tuple[Any, Any]:
+        """J q'' + J'/2 q'^2 of all bars, and of bars 3 and 4."""
+        a, at, k, square = self.lengths.a, state.at, state.k, state.speed * state.speed
+        inertial = others = half_slope(a, self.bodies, at, k) * square
+        if anywhere(acceleration != 0.0):
+            of_input, of_others = inertia(a, self.bodies, at, k)
+            others = others + of_others * acceleration
+            inertial = others + of_input * acceleration
+        if self.path.bar != 2:  # bar 2 has inertia of its own
+            others = others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
+        return inertial, others
 
     def dynamics(
         self, state: State, acceleration: Any, side: Any = 0, rounded: Callable[..., Any] = as_it_is
@@ -206,12 +228,7 @@ class Case(NamedTuple):
         for term in self.terms:
             term.act(actions, state)
         own, mass_at_A = inertia_wrenches(a, self.bodies, at, state.moving)
-        # J q'' + J'/2 q'^2 of all bars, and of bars 3 and 4
-        inertial = others = half_slope(a, self.bodies, at, k) * (state.speed * state.speed)
-        if anywhere(acceleration != 0.0):
-            of_input, of_others = inertia(a, self.bodies, at, k)
-            others = others + of_others * acceleration
-            inertial = others + of_input * acceleration
+        inertial, others = self._inertial(state, acceleration)
         if rounded is not as_it_is:
             own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))
             inertial, others = rounded(inertial), rounded(others)
@@ -230,7 +247,7 @@ class Case(NamedTuple):
             if bar == 4:
                 moment = -(acting.about_B() + rest[1])
             elif bar == 2 and short:
-                moment = acting.work()[1] - rest[0]
+                moment = (acting.work()[1] - rest[0]) / k.h2  # of bars 3 and 4 over the turn of bar 2
             return pin_forces(self.lengths, at, bar, sines[bar], acting.wrenches(w), mass, moment)
 
         def eliminate(acting: Actions, *, with_inertia: bool = True) -> PinForces:
@@ -246,7 +263,7 @@ class Case(NamedTuple):
                 solved = term.solve_friction(actions, solved.pins, eliminate)
         return Dynamics(*solved, (inertial - actions.work()[0]) / by)
 
-    def drive_interval(self, state: State, alpha_2: Any, drive: Any) -> tuple[Any, Any, Any]:
+    def drive_interval(self, state: State, acceleration: Any, drive: Any) -> tuple[Any, Any, Any]:
         """Least and greatest torque or force of the drive where dry friction holds a pin at rest, elsewhere it twice.
 
         The third is where one of them is NaN because friction jams the motion that would begin; None: nowhere.
@@ -257,7 +274,7 @@ class Case(NamedTuple):
         pins = {pin for term in self.terms for pin in term.dry_pins}
         if np.all(state.speed) and all(np.all(actions.turning(pin)) for pin in pins):
             return drive, drive, None
-        ahead, back = (self.dynamics(state, alpha_2, side) for side in (1, -1))
+        ahead, back = (self.dynamics(state, acceleration, side) for side in (1, -1))
         jammed = [found.status == JAMMED for found in (ahead, back) if found.status is not None]
         low, high = np.minimum(ahead.drive, back.drive), np.maximum(ahead.drive, back.drive)
         return low, high, np.any(jammed, axis=0) if jammed else None
@@ -274,4 +291,4 @@ def steadiest(sines: dict[int, Any], of: dict[int, PinForces]) -> PinForces:
 def state_at(scene: Scene, at: Command) -> State:
     """Compute the positions of a command and their motion, for what shows them."""
     with np.errstate(all="ignore"):
-        return Case.of(scene).at(at)
+        return Case.of(scene, at.bar).at(at)

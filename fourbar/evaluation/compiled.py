@@ -263,7 +263,7 @@ def scatter(
 
 LEAVES: tuple[tuple[Any, str], ...] = (
     (arithmetic, "two_sum cross dot"),
-    (position, "direction_of_tangent half_angle_of_tangent close_loop"),
+    (position, "direction_of_tangent half_angle_of_tangent with_factors close_loop"),
     (motion, "side_may_turn_fast side_turns_fast coefficients with_sines_of_rates rates"),
     (pin_forces, "about_first_pin inertia_wrenches coupler_about_B between pin_forces"),
     (torque, "inertia half_slope driving_torque"),

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.evaluation.case import Case, Dynamics
-from fourbar.formulas.arithmetic import anywhere, select, two_sum
+from fourbar.formulas.arithmetic import angle, anywhere, select, two_sum
 from fourbar.formulas.motion import Coefficients, State, rates, side_may_turn_fast, side_turns_fast
-from fourbar.formulas.path import read_backwards
+from fourbar.formulas.path import read_from
 from fourbar.formulas.position import HalfAngle, Loop, Position
 
 EVALUATIONS = 14
@@ -88,17 +88,18 @@ def error_bars(
     exact : indices of the positions whose half angle is known in many digits.
     """
     rounded, path = Roundings(state.at.u1), case.path
-    q = state.theta_2 if path.bar == 2 else np.angle(state.at.u4)
+    q = state.theta_2 if state.q is None else state.q
     lost = two_sum(q, -path.theta_1)[1]
     known = exact.size > 0 and np.isin(np.arange(np.size(state.at.half.ss)), exact)
     half = rounded_half_angle(path.lengths, state.at.half, lost, known, rounded.next(6))
     near, k = path.motion(path.position(q, half, sign), sign)
     near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
-    k = k if path.bar == 2 else read_backwards(k)
-    k = rounded_coefficients(path.lengths, near, k, rounded.next(13))
-    k = k if path.bar == 2 else read_backwards(k)
+    k = read_from(path.bar, rounded_coefficients(path.lengths, near, read_from(path.bar, k), rounded.next(13)))
     nearby = state._replace(at=near, k=k, moving=rates(k, state.speed, acceleration))
+    if path.bar != 2:  # there both are found from the directions
+        to_O4, to_A = rounded(case.lengths.d * near.u1), case.lengths.a * near.u2
+        nearby = nearby._replace(at=near._replace(diagonal=rounded(to_O4 - to_A)), theta_2=rounded(angle(near.u2)))
     other = case.dynamics(nearby, acceleration, case.side, rounded)
     values, others = (*found.pins, found.drive), (*other.pins, other.drive)
     spread = root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))

@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, bodies
 from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, installing
-from fourbar.formulas.arithmetic import sine
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import Path, path, smooth_branch
+from fourbar.formulas.path import Path, drive_sine, path, smooth_branch
 from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Loop, Position, loop
 from fourbar.formulas.torque import half_slope, inertia
-from fourbar.linkage import FourBar
+from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command
 from fourbar.solution import Array
 
@@ -102,7 +101,10 @@ class _Reading:
 
     def branch(self, q: float) -> float:
         """Sign of the root at q."""
-        return float(smooth_branch(self.path.lengths, q - self.path.theta_1, self.sign)) if self.changes else self.sign
+        if not self.changes:
+            return self.sign
+        psi = q - self.path.theta_1 - (math.pi if self.bar == 4 else 0.0)
+        return float(smooth_branch(self.path.lengths, psi, self.sign))
 
     def at(self, q: float) -> tuple[Position, Coefficients]:
         """Compute the position and its coefficients by q; what is wanted again is kept."""
@@ -124,19 +126,20 @@ class _Reading:
 
 
 def _sines(at: Position) -> dict[int, float]:
-    """sin(theta_4 - theta_3) and sin(theta_3 - theta_2): zero at the limits of theta_2 and of theta_4."""
-    return {2: float(sine(at.u3, at.u4)), 4: float(sine(at.u2, at.u3))}
+    """sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2): zero at the limits of bars 2, 3, 4."""
+    return {bar: float(drive_sine(at, bar)) for bar in MOVING_BARS}
 
 
 def release(
     linkage: FourBar,
     terms: "Iterable[Effect]",
-    theta_2: float,
-    omega_2: float,
+    theta: float,
+    omega: float,
     branch: int,
     times: Array,
     *,
     follow: bool = False,
+    bar: int = 2,
 ) -> FreeMotion:
     """Integrate the motion from theta_2 with omega_2 under the effects, with no driving torque.
 
@@ -145,9 +148,10 @@ def release(
     Parameters
     ----------
     terms : loads and effects.
-    branch : +1 or -1, of the start.
+    theta, omega, branch : +1 or -1, of the bar that is released, at the start.
     times : (n,) rising from 0, s.
-    follow : run through limit positions and change points; otherwise the motion stops there.
+    follow : run through limit positions and change points of that bar; otherwise the motion stops there.
+    bar : 2, or 3 or 4.
 
     Raises
     ------
@@ -160,33 +164,40 @@ def release(
     if any(term.loaded_pins for term in terms):
         raise LimitError("a free motion cannot carry friction that depends on the pin forces")
     with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        return _Run(linkage, terms, theta_2, omega_2, branch, follow).through(times)
+        return _Run(linkage, terms, theta, omega, branch, follow, bar).through(times)
 
 
 class _Run:
     """One integration: its angle, and what has been reported so far."""
 
     def __init__(
-        self, linkage: FourBar, terms: "tuple[Effect, ...]", theta_2: float, omega_2: float, branch: int, follow: bool
+        self,
+        linkage: FourBar,
+        terms: "tuple[Effect, ...]",
+        theta: float,
+        omega: float,
+        branch: int,
+        follow: bool,
+        bar: int,
     ) -> None:
-        self.linkage, self.terms, self.follow, self.branch = linkage, terms, follow, branch
+        self.linkage, self.terms, self.follow, self.branch, self.bar = linkage, terms, follow, branch, bar
         self.lengths = _plain(loop(*linkage.lengths))
         two, three, four = (_plain(body) for body in bodies(linkage, terms))
         self.bodies: tuple[Body, Body, Body] = two, three, four
-        self.readings = {bar: _Reading(linkage, bar) for bar in (2, 4)}
-        self.reading = self.readings[2]
+        self.readings = {each: _Reading(linkage, each) for each in (2, 4)}
+        self.reading = self.readings[bar] if bar != 3 else _Reading(linkage, 3)
         # the sign of the path is that of the branch just after the start, should that be a change point
-        ahead = theta_2 + math.copysign(1e-8, omega_2)
-        for near in (theta_2, ahead, 2.0 * theta_2 - ahead):
-            sine = _sines(self.reading.at(near)[0])[2]
+        ahead = theta + math.copysign(1e-8, omega)
+        for near in (theta, ahead, 2.0 * theta - ahead):
+            sine = _sines(self.reading.at(near)[0])[bar]
             if sine != 0.0 and math.isfinite(sine):
                 self.reading.sign = branch * math.copysign(1.0, sine)
                 break
-        at, k = self.reading.at(theta_2)
+        at, k = self.reading.at(theta)
         if not np.isfinite(at.u3):
-            raise InputError("motion.theta_2", theta_2, "the linkage does not assemble there")
-        self.theta = {2: theta_2, 4: float(np.angle(at.u4))}
-        self.y = np.array([theta_2, omega_2, 0.0])
+            raise InputError(f"motion.theta_{bar}", theta, "the linkage does not assemble there")
+        self.theta = {2: float(np.angle(at.u2)), 4: float(np.angle(at.u4)), bar: theta}
+        self.y = np.array([theta, omega, 0.0])
         if not float(self._inertia(at, k)) > 0.0:
             raise FourBarError("nothing that moves has inertia: the free motion is undetermined")
         self._change_over()
@@ -235,7 +246,9 @@ class _Run:
         """Take the other angle where it is further from its limit; keeps position, velocity and work."""
         at, k = self._at()
         sines, bar = _sines(at), 6 - self.reading.bar
-        if abs(sines[self.reading.bar]) >= CHANGE_OVER * abs(sines[bar]):
+        if self.reading.bar == 3:  # of the start alone
+            bar = max((2, 4), key=lambda each: abs(sines[each]))
+        elif abs(sines[self.reading.bar]) >= CHANGE_OVER * abs(sines[bar]):
             return False
         q, reading = self.theta[bar], self.readings[bar]
         reading.sign *= math.copysign(1.0, _sines(reading.at(q)[0])[bar] * sines[bar])
@@ -335,11 +348,11 @@ class _Run:
         return float(y[1])
 
     def _sine(self, y: Array) -> float:
-        """sin(theta_4 - theta_3): zero where bars 3, 4 lie in one line."""
-        return _sines(self.reading.at(float(y[0]))[0])[2]
+        """sin(theta_4 - theta_3), or that of the bar that was released: zero at its limits."""
+        return _sines(self.reading.at(float(y[0]))[0])[self.bar]
 
     def _past(self, y: Array) -> bool:
-        """Whether bars 3, 4 have gone through their common line."""
+        """Whether the two other moving bars have gone through their common line."""
         return self.branch * self._sine(y) < 0.0
 
     def _row(self, y: Array) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from fourbar.evaluation.withheld import no_value
 from fourbar.formulas.arithmetic import angle, anywhere
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.position import HalfAngle
+from fourbar.formulas.position import HalfAngle, Position
 from fourbar.quantities import (
     ANGLES,
     JAMMED,
@@ -47,32 +47,46 @@ WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 
 
 def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """Evaluate some positions of a command to the input.
+    """Evaluate some positions of a command.
 
     Parameters
     ----------
     wanted : number of the last stage that the quantities named need.
     """
-    theta_2: Any = where.theta_2[part]
-    if theta_2.ndim == 0:
-        theta_2 = theta_2.item()  # with Python's own numbers a formula takes half the time
+    q: Any = where.angle[part]
+    if q.ndim == 0:
+        q = q.item()  # with Python's own numbers a formula takes half the time
     branch = sign_of(where.branch[part])
-    half, exact = case.half_angle(theta_2, where.remainder)
-    of_angles = len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
+    half, exact = case.half_angle(q, where.remainder)
+    of_angles = where.bar == 2 and len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
     if of_angles and where.remainder is None and not case.path.may_stay_parallel:
         return _angles(case, half, branch, names)
-    at = case.path.position(theta_2, half, branch)
+    at = case.path.position(q, half, branch)
     codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
     if anywhere(codes):  # velocities are 0/0
         at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
-    omega_2, alpha_2 = piece(where.omega_2, part), piece(where.alpha_2, part)
-    state = case.state(case.path, theta_2, at, branch, omega_2, alpha_2, moving=wanted > 0)
+    speed, acceleration = piece(where.speed, part), piece(where.acceleration, part)
+    state = case.state(case.path, q, at, branch, speed, acceleration, moving=wanted > 0)
     values = kinematics(case, state, names)
+    if where.bar != 2:
+        values |= {name: value for name, value in of_command(case, at, state, q).items() if name in names}
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
-        codes, forces = _forces(case, state, alpha_2, branch, branch, codes, names, known)
+        codes, forces = _forces(case, state, acceleration, branch, branch, codes, names, known)
         values |= forces
-    return codes, values, at
+    return codes, values, state.at
+
+
+def of_command(case: Case, at: Position, state: State, q: Any) -> dict[str, Any]:
+    """Quantities that a command of bar 3 or 4 has in the place of others: its angle as commanded, theta_2, its sine.
+
+    Parameters
+    ----------
+    at : in the order in which the path reads the loop.
+    """
+    if case.path.bar == 2:
+        return {}
+    return {f"theta_{case.path.bar}": q, "theta_2": state.theta_2, "condition": abs(at.sin_mu)}
 
 
 def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:
@@ -112,7 +126,7 @@ def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Keys
     free = case._replace(drive_bar=bar, drive=None, path=moved.paths[bar], side=moved.side[part])
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
     at = free.path.position(q, free.path.half_angle(q), branch)
-    state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.theta_2[part])
+    state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.angle[part])
     values = kinematics(case, state, names)
     if wanted >= FORCE:
         exact = NOWHERE if wanted == ERROR else None
@@ -125,7 +139,7 @@ def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Keys
 def _forces(
     case: Case,
     state: State,
-    alpha_2: Any,
+    acceleration: Any,
     branch: NDArray[np.int8] | None,
     sign: Any,
     codes: Any,
@@ -140,7 +154,7 @@ def _forces(
     sign : of the path's root.
     exact : indices of the positions known in many digits; None: no error bars.
     """
-    found = case.dynamics(state, alpha_2, case.side)
+    found = case.dynamics(state, acceleration, case.side)
     values: dict[str, Any] = {**found.pins._asdict(), case.names.value: found.drive}
     if "power" in names:
         values["power"] = found.drive * case.drive_speed(state)
@@ -150,14 +164,14 @@ def _forces(
     if "friction_residual" in names:
         values["friction_residual"] = 0.0 if found.residual is None else found.residual
     if case.names.low in names or case.names.high in names:
-        *ends, held = case.drive_interval(state, alpha_2, found.drive)
+        *ends, held = case.drive_interval(state, acceleration, found.drive)
         values |= zip(case.names[2:], ends, strict=True)
         if held is not None and found.status is not None:
             found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
     if exact is not None:
         from fourbar.evaluation.error_bars import error_bars
 
-        values |= error_bars(case, state, alpha_2, sign, found, exact)
+        values |= error_bars(case, state, acceleration, sign, found, exact)
     without: list[Any] = [status for term in case.terms if (status := term.status(state, branch)) is not None]
     if found.status is not None:
         without.append(found.status)

@@ -23,7 +23,7 @@ from fourbar.files.tolerances import read_tolerances
 from fourbar.linkage import BAR_NAMES, MOST_STEPS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Free, FromLimit, Motion, Sweep
-from fourbar.scene.motion_law import ENDS, Law
+from fourbar.scene.motion_law import COMMANDS, ENDS, Law
 from fourbar.scene.point import Point
 from fourbar.solution import Array
 
@@ -168,39 +168,47 @@ def _bar(read: Reader, key: str, value: object, length: float) -> Bar:
 
 
 def _motion(read: Reader, value: object) -> Motion:
-    entry = read.table("motion", value, ("theta_2", "omega_2", "alpha_2", "branch", "through", "free", "law"))
+    numbers = [name for names in COMMANDS.values() for name in names]
+    entry = read.table("motion", value, (*numbers, "branch", "through", "free", "law"))
+    stated = [name for name in numbers if name in entry]
+    bar = int(stated[0][-1]) if stated else 2
+    for name in stated:
+        if int(name[-1]) != bar:
+            raise read.refuse(f"motion.{name}", entry[name], f"{stated[0]} commands bar {bar}; one bar is commanded")
+    theta, omega, alpha = COMMANDS[bar]
     free = None
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
         duration = read.quantity("motion.free.duration", released.get("duration"), "s", positive=True)
         free = Free(duration, read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS))
-    omega_2 = None
-    if "omega_2" in entry:
-        omega_2 = read.quantity("motion.omega_2", entry["omega_2"], "rad/s")
+    commanded: dict[str, Any] = {alpha: read.quantity(f"motion.{alpha}", entry.get(alpha, "0 rad/s^2"), "rad/s^2")}
+    if theta in entry:
+        commanded[theta] = _angle(read, f"motion.{theta}", entry[theta])
+    if omega in entry:
+        commanded[omega] = read.quantity(f"motion.{omega}", entry[omega], "rad/s")
     return Motion(
-        _theta_2(read, entry["theta_2"]) if "theta_2" in entry else None,
-        omega_2,
-        read.quantity("motion.alpha_2", entry.get("alpha_2", "0 rad/s^2"), "rad/s^2"),
-        BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
-        read.choice("motion.through", entry.get("through", "sign"), THROUGH),
-        free,
-        _law(read, entry["law"]) if "law" in entry else None,
+        branch=BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
+        through=read.choice("motion.through", entry.get("through", "sign"), THROUGH),
+        free=free,
+        law=_law(read, entry["law"]) if "law" in entry else None,
+        **commanded,
     )
 
 
 def _law(read: Reader, value: object) -> Law:
     key = "motion.law"
-    entry = read.table(key, value, ("time", "theta_2", "steps", "ends"))
+    angles = [names[0] for names in COMMANDS.values()]
+    entry = read.table(key, value, ("time", *angles, "steps", "ends"))
+    stated = [name for name in angles if name in entry] or angles[:1]
     return Law(
         read.quantities(f"{key}.time", entry.get("time"), "s"),
-        read.quantities(f"{key}.theta_2", entry.get("theta_2"), "rad"),
-        read.whole(f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS),
-        read.choice(f"{key}.ends", entry.get("ends", "free"), ENDS),
+        steps=read.whole(f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS),
+        ends=read.choice(f"{key}.ends", entry.get("ends", "free"), ENDS),
+        **{name: read.quantities(f"{key}.{name}", entry.get(name), "rad") for name in stated},
     )
 
 
-def _theta_2(read: Reader, value: object) -> float | Array | Sweep | FromLimit:
-    key = "motion.theta_2"
+def _angle(read: Reader, key: str, value: object) -> float | Array | Sweep | FromLimit:
     if isinstance(value, str):
         return read.quantity(key, value, "rad")
     if isinstance(value, list) and value:
@@ -212,7 +220,7 @@ def _theta_2(read: Reader, value: object) -> float | Array | Sweep | FromLimit:
     if "limit" in value or "offset" in value:
         start = read.table(key, value, ("limit", "offset"))
         offset = read.quantity(f"{key}.offset", start.get("offset", "0 rad"), "rad")
-        # four bars have at most four limit positions of the input; how many these have is not known here
+        # four bars have at most four limit positions of a bar; how many these have is not known here
         return FromLimit(read.whole(f"{key}.limit", start.get("limit"), 1, 4), offset)
     sweep = read.table(key, value, ("from", "to", "steps"))
     ends = [read.quantity(f"{key}.{end}", sweep.get(end), "rad") for end in ("from", "to")]

@@ -78,7 +78,8 @@ def _bar_entry(scene: Scene, number: int) -> dict[str, Any]:
 
 
 def _motion_entry(motion: Motion) -> dict[str, Any]:
-    law, free, wanted = motion.law, motion.free, motion.theta_2
+    law, free, wanted = motion.law, motion.free, motion.angle
+    theta, omega, alpha = motion.names
     angles: Any = wanted
     if isinstance(wanted, Sweep):
         ends = {"from": quantity(wanted.start, "rad"), "to": quantity(wanted.stop, "rad")}
@@ -90,9 +91,9 @@ def _motion_entry(motion: Motion) -> dict[str, Any]:
     elif wanted is not None:
         angles = quantity(wanted, "rad")
     entry = {
-        "theta_2": angles,
-        "omega_2": None if motion.omega_2 is None else quantity(motion.omega_2, "rad/s"),
-        "alpha_2": quantity(motion.alpha_2, "rad/s^2") if law is None else None,
+        theta: angles,
+        omega: None if motion.speed is None else quantity(motion.speed, "rad/s"),
+        alpha: quantity(motion.acceleration, "rad/s^2") if law is None else None,
         "law": None if law is None else _law_entry(law),
         "branch": BRANCH_NAMES[motion.branch],
         "through": motion.through,
@@ -102,8 +103,8 @@ def _motion_entry(motion: Motion) -> dict[str, Any]:
 
 
 def _law_entry(law: Law) -> dict[str, Any]:
-    times, angles = ([quantity(x, unit) for x in of] for of, unit in ((law.time, "s"), (law.theta_2, "rad")))
-    return {"time": times, "theta_2": angles, "steps": law.steps, "ends": law.ends}
+    times, angles = ([quantity(x, unit) for x in of] for of, unit in ((law.time, "s"), (law.angle, "rad")))
+    return {"time": times, f"theta_{law.bar}": angles, "steps": law.steps, "ends": law.ends}
 
 
 def _load_entry(load: Load) -> dict[str, Any]:

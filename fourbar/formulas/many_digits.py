@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.formulas.position import HalfAngle
+from fourbar.formulas.position import HalfAngle, lengths_read_from
 from fourbar.linkage import FourBar
 
 DIGITS = 120
@@ -16,7 +16,9 @@ TOUCHING = 2.0**-53
 was itself rounded by up to that, so the linkage meant closes there as well as not."""
 
 
-def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: Any = 1.0, member: int = 0) -> HalfAngle:
+def half_angle(
+    linkage: FourBar, theta_2: float, offset: Any = None, unit: Any = 1.0, member: int = 0, bar: int = 2
+) -> HalfAngle:
     """Compute the five numbers of `formulas.position.half_angle`, each rounded once.
 
     Parameters
@@ -26,6 +28,7 @@ def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: Any =
         beyond the limit then does not assemble, however near.
     unit : of the lengths, m.
     member : index into numbers of the linkage that are arrays.
+    bar : from which the loop is read; theta_2 is its angle.
     """
     from mpmath import mp, mpf
 
@@ -33,8 +36,10 @@ def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: Any =
         return mpf(float(number[member] if np.ndim(number) else number))
 
     with mp.workdps(DIGITS):
-        d, a, b, c = (own(length) / own(unit) for length in linkage.lengths)
+        d, a, b, c = (own(length) / own(unit) for length in lengths_read_from(bar, linkage.lengths))
         h = (mpf(theta_2) - own(linkage.ground_angle) + (0 if offset is None else offset)) / 2
+        if bar == 4:
+            h -= mp.pi / 2
         s, k = mp.sin(h), mp.cos(h)
         e2 = (d - a) ** 2 + 4 * a * d * s * s
         whole = 2 * (a + b + c + d) * mp.sqrt(e2)
@@ -44,26 +49,29 @@ def half_angle(linkage: FourBar, theta_2: float, offset: Any = None, unit: Any =
         return HalfAngle(float(s * s), float(k * k), float(s * k), outer, inner)
 
 
-def decided(linkage: FourBar, unit: float, half: HalfAngle, index: Any, theta_2: Any, offset: Any = None) -> HalfAngle:
+def decided(
+    linkage: FourBar, unit: float, half: HalfAngle, index: Any, theta_2: Any, offset: Any = None, bar: int = 2
+) -> HalfAngle:
     """Replace the half angles of some positions (an index)."""
     flat, shape = np.ravel(theta_2), np.shape(theta_2)
     numbers = [np.array(np.broadcast_to(number, shape)).ravel() for number in half]
     for i in index:
-        for number, value in zip(numbers, half_angle(linkage, float(flat[i]), offset, unit, i), strict=True):
+        for number, value in zip(numbers, half_angle(linkage, float(flat[i]), offset, unit, i, bar), strict=True):
             number[i] = value
     return HalfAngle(*(number.reshape(shape)[()] for number in numbers))
 
 
-def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: float) -> Any:
+def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: float, bar: int = 2) -> Any:
     """(limit position + offset) - theta_2 in many digits, for the limit position whose double is `limit`.
 
-    Where bars 3, 4 are collinear cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a d).
+    Where bars 3, 4 are collinear cos(theta_2 - theta_1) = (a^2 + d^2 - (b +- c)^2)/(2 a d); likewise as the loop is
+    read from another bar, whose angle theta_2 then is.
     """
     from mpmath import mp, mpf
 
     with mp.workdps(DIGITS):
-        d, a, b, c = map(mpf, linkage.lengths)
-        theta_1 = mpf(linkage.ground_angle)
+        d, a, b, c = map(mpf, lengths_read_from(bar, linkage.lengths))
+        theta_1 = mpf(linkage.ground_angle) + (mp.pi if bar == 4 else 0)
         exact = []
         for side in (b + c, b - c):
             cosine = (a * a + d * d - side * side) / (2 * a * d)

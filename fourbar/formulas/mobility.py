@@ -164,26 +164,37 @@ def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
     return reach.beyond_folded <= 0.0 and reach.beyond_stretched <= 0.0
 
 
-def default_range(linkage: FourBar) -> tuple[float, float]:
-    """Choose the range of theta_2 that is swept where a scene names none, rad.
+def default_range(linkage: FourBar, bar: int = 2) -> tuple[float, float]:
+    """Choose the range of a commanded bar's angle that is swept where a scene names none, rad.
 
-    0..2 pi where the input turns fully; otherwise the first of `intervals`, shrunk by MARGIN at each end.
+    0..2 pi where the bar turns fully; otherwise the first of `intervals`, shrunk by MARGIN at each end.
     """
-    if turns_fully(linkage):
+    if turns_fully(linkage, bar):
         return 0.0, TURN
-    start, stop = intervals(linkage)[0]
+    start, stop = intervals(linkage, bar)[0]
     margin = min(MARGIN, (stop - start) / NARROW)
     return start + margin, stop - margin
 
 
-def change_points(linkage: FourBar) -> tuple[float, ...]:
-    """theta_2 of the positions in which all bars are collinear and both branches cross, rad.
+def limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
+    """Find the angles at which a bar reverses, rad, counter-clockwise from theta_1."""
+    theta_1 = linkage.ground_angle
+    if bar == 2:
+        return tuple(limit.theta_2 for limit in limit_positions(linkage))
+    return tuple(sorted(theta_1 + (limit[bar - 2] - theta_1) % TURN for limit in limit_positions(linkage, bar)))
 
-    theta_1 where |a - d| = |b - c|, theta_1 + pi where a + d = b + c, within the rounding of the lengths.
+
+def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
+    """Angles of a bar (theta_2 if none is named) at which all bars are collinear and both branches cross, rad.
+
+    theta_1 where |a - d| = |b - c|, theta_1 + pi where a + d = b + c, within the rounding of the lengths; likewise of
+    the lengths as they are read from another bar, from bar 4 with the ground reversed.
     """
-    reach, theta_1 = reach_of(linkage), linkage.ground_angle
-    folded = (theta_1,) if reach.beyond_folded == 0.0 else ()
-    return (*folded, theta_1 + math.pi) if reach.beyond_stretched == 0.0 else folded
+    reach, theta_1 = reach_of(linkage, bar), linkage.ground_angle
+    folded, stretched = reach.beyond_folded == 0.0, reach.beyond_stretched == 0.0
+    if bar == 4:
+        folded, stretched = stretched, folded
+    return (theta_1,) * folded + (theta_1 + math.pi,) * stretched
 
 
 def swing(linkage: FourBar, bar: int = 4) -> float:
@@ -209,7 +220,7 @@ def time_ratio(linkage: FourBar) -> float | None:
     return (TURN - delta) / delta
 
 
-def on_smooth_path(linkage: FourBar, theta_2: Array, branch: int) -> NDArray[np.int8]:
+def on_smooth_path(linkage: FourBar, theta_2: Array, branch: int, bar: int = 2) -> NDArray[np.int8]:
     """Choose the branch of each position of a sweep that runs smoothly through the change points, (n,).
 
     At a change point sin(theta_4 - theta_3) passes through zero with its slope, so the smooth path
@@ -220,6 +231,7 @@ def on_smooth_path(linkage: FourBar, theta_2: Array, branch: int) -> NDArray[np.
     ----------
     theta_2 : (n,), rad, in the order of the sweep; the input turns from each to the next without detour.
     branch : +1 or -1, of the first position.
+    bar : whose angles and branches they are, where it is not the input that is commanded.
     """
     psi = np.asarray(theta_2, dtype=float) - linkage.ground_angle
     crossed = np.zeros(psi.shape, dtype=np.int64)
@@ -231,7 +243,7 @@ def on_smooth_path(linkage: FourBar, theta_2: Array, branch: int) -> NDArray[np.
         latest = np.maximum.accumulate(np.where(heading != 0, np.arange(psi.size), moving[0]))
         heading = heading[latest]
     rounding = AT_CHANGE_POINT * (np.abs(theta_2) + abs(linkage.ground_angle))
-    for point in change_points(linkage):
+    for point in change_points(linkage, bar):
         at = 0.0 if point == linkage.ground_angle else math.pi
         turns = (psi - at) / TURN
         nearest = np.rint(turns)

@@ -166,6 +166,10 @@ class State(NamedTuple):
     speed: Number
     """q' of the independent angle, rad/s."""
     moving: Rates
+    bar: int = 2
+    """Whose angle is the independent one."""
+    q: Number = None
+    """That angle, rad; None: theta_2."""
 
     def direction(self, bar: int) -> Number:
         """e^{i theta} of bar 1 (from O2 to O4), 2, 3 or 4."""

@@ -1,7 +1,12 @@
-"""The path of a linkage in one independent angle: theta_2, or theta_4 where the input stands at a limit.
+"""The path of a linkage in one independent angle: theta_2, or that of another bar which is commanded or free.
 
-Read backwards, from O4 over B and A to O2, the loop is one of the same kind whose input is bar 4:
+The loop is a sum of four vectors, in any order. Read from bar 3 or from bar 4 it is one of the same kind, whose input
+is that bar, and every formula of position and motion holds as it stands:
+    b e^{i theta_3} + a e^{i theta_2} = d e^{i theta_1} + c e^{i theta_4},
     c e^{i theta_4} + b e^{i (theta_3 + pi)} = d e^{i (theta_1 + pi)} + a e^{i theta_2}.
+The sine between its coupler and its output is sin(theta_4 - theta_2) read from bar 3 and sin(theta_3 - theta_2) read
+from bar 4: the sign of the root, zero at the limits of that bar, and by it what is singular at the limits of theta_2 is
+not.
 """
 
 from typing import NamedTuple
@@ -11,7 +16,6 @@ import numpy as np
 from fourbar.formulas.arithmetic import (
     Number,
     anywhere,
-    dot,
     is_zero,
     namespace,
     polar,
@@ -22,25 +26,37 @@ from fourbar.formulas.arithmetic import (
 )
 from fourbar.formulas.motion import Coefficients, State, coefficients, rates, with_sines_of_rates
 from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
-from fourbar.formulas.position import HalfAngle, Loop, Position, close_loop, direction, half_angle, loop, parallel_pairs
+from fourbar.formulas.position import (
+    HalfAngle,
+    Loop,
+    Position,
+    close_loop,
+    direction,
+    half_angle,
+    lengths_read_from,
+    loop,
+    parallel_pairs,
+)
 from fourbar.formulas.position import with_parallel_pairs as parallel_position
 from fourbar.linkage import FourBar
 
 NO_DIGIT_LEFT = 16.0 * 2.0**-53
 """|sin mu| at or below this: the directions of bars 3 and 4 are the same in doubles."""
+ROLES = {2: (2, 3, 4), 3: (3, 2, 4), 4: (4, 3, 2)}
+"""The bars that are input, coupler and output of the loop read from a bar; and back."""
 
 
 class Path(NamedTuple):
     """The loop as it is read from the bar whose angle is independent."""
 
     bar: int
-    """2 or 4."""
+    """2, 3 or 4."""
     lengths: Loop
     """In the order of the reading: ground, the bar itself, coupler, the other one."""
     theta_1: Number
-    """Direction of the ground in the order of the reading, rad."""
+    """Direction of the ground from O2 to O4, rad."""
     u1: Number
-    """e^{i theta_1}."""
+    """e^{i theta_1}, its opposite where the loop is read from bar 4."""
     unit: Number = 1.0
     """Of the lengths, a power of two near the longest, m: no product of them leaves the range of doubles."""
     may_stay_parallel: bool = False
@@ -48,7 +64,7 @@ class Path(NamedTuple):
 
     def half_angle(self, q: Number) -> HalfAngle:
         """Of the independent angle q (rad) against the ground."""
-        return half_angle(self.lengths, q - self.theta_1)
+        return half_angle(self.lengths, q - self.theta_1, opposite=self.bar == 4)
 
     def position(self, q: Number, half: HalfAngle, branch: Number) -> Position:
         """Positions with the bars in the order of the reading.
@@ -57,10 +73,12 @@ class Path(NamedTuple):
         ----------
         q : rad.
         half : of q.
-        branch : sign of the root in that order: for bar 2 the branch, for bar 4 that of sin(theta_3 - theta_2).
+        branch : sign of the root in that order, which is that of `drive_sine` for a drive on the bar itself.
         """
         turned, along = self.theta_1 != 0.0, anywhere(is_zero(self.theta_1))
         u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
+        if along and self.bar == 4:
+            u2 = -u2
         if along and anywhere(turned):  # of linkages
             u2 = select(turned, direction(q), u2)
         at = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
@@ -94,28 +112,44 @@ class Path(NamedTuple):
             first, second = parallel_pairs(self.lengths, at.half, branch)
             known = ~namespace(at.root).isnan(at.root)
             k = parallel_motion(k, first & known, second & known)
-        return (at, k) if self.bar == 2 else (_turned_round(self, at), read_backwards(k))
+        return (at, k) if self.bar == 2 else (self.in_order(at), read_from(self.bar, k))
+
+    def in_order(self, at: Position) -> Position:
+        """Put the bars in their usual order; the triangle stays that of the reading."""
+        if self.bar == 2:
+            return at
+        d, _, b, c, _, _ = self.lengths
+        if self.bar == 3:
+            u1, u2, u3, u4, a = at.u1, at.u3, at.u2, at.u4, b
+        else:
+            u1, u2, u3, u4, a = -at.u1, at.u4, -at.u3, at.u2, c
+        diagonal = (d * self.unit) * u1 - (a * self.unit) * u2
+        # a root that is withheld, for speeds that are 0/0, is that of the sine
+        known = at._replace(root=at.sin_mu * (2.0 * self.lengths.b * self.lengths.c))
+        return Position(u1, u2, u3, u4, self.drive_sine(known, 2), diagonal, at.e2, at.root, at.half)
 
     def drive_sine(self, at: Position, drive_bar: int) -> Number:
-        """Sine between the two bars that are not driven; positions as `motion` returns them."""
-        if self.bar == 4:
+        """Sine between the two bars that are not driven; positions as `motion` returns them, or without a triangle."""
+        if at.half is None:
             return drive_sine(at, drive_bar)
-        sine = drive_sine_of_triangle(self.lengths, at, drive_bar)
-        if self.may_stay_parallel:  # whose directions are exact
+        role = ROLES[self.bar][drive_bar - 2]
+        if role == 2:
+            return at.sin_mu if self.bar == 2 else at.root * (0.5 / (self.lengths.b * self.lengths.c))
+        found = drive_sine_of_triangle(self.lengths, at, role)
+        if self.may_stay_parallel:  # with the sine of the angle that all of them make
             first, second = parallel_pairs(self.lengths, at.half, namespace(at.root).sign(at.root))
-            sine = select(first | second, drive_sine(at, drive_bar), sine)
-        return sine
+            with_first, with_second = (0.0, 2.0 * at.half.sk) if role == 3 else (-2.0 * at.half.sk, 0.0)
+            found = select(first, with_first, select(second, with_second, found))
+        return -found if self.bar + drive_bar == 7 else found  # there the two bars have changed places
 
 
 def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
-    """Prepare the path in the angle of bar 2 or 4."""
+    """Prepare the path in the angle of bar 2, 3 or 4."""
     d, a, b, c, _, _ = lengths
     unit = power_of_two(0.25 * (d + a + b + c))
-    d, a, b, c = d / unit, a / unit, b / unit, c / unit
-    if bar == 4:
-        a, c, theta_1 = c, a, theta_1 + np.pi
-    own = loop(d, a, b, c)
-    return Path(bar, own, theta_1, polar(1.0, theta_1), unit, anywhere(is_zero(own.E1) & is_zero(own.E2)))
+    own, u1 = loop(*lengths_read_from(bar, (d / unit, a / unit, b / unit, c / unit))), polar(1.0, theta_1)
+    meets = anywhere(is_zero(own.E1) & is_zero(own.E2))
+    return Path(bar, own, theta_1, -u1 if bar == 4 else u1, unit, meets)
 
 
 def singular(at: Position, margin: float = NO_DIGIT_LEFT) -> Number:
@@ -181,15 +215,8 @@ def smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
     return sign * at_stretched * at_folded
 
 
-def _turned_round(reading: Path, at: Position) -> Position:
-    """Return a position of the loop read backwards, in the usual order of the bars."""
-    d, c, b, a, _, _ = reading.lengths
-    u1, u2, u3, u4 = -at.u1, at.u4, -at.u3, at.u2
-    diagonal = d * u1 - a * u2
-    sin_mu, e2 = sine(u3, u4), dot(diagonal, diagonal)
-    return Position(u1, u2, u3, u4, sin_mu, diagonal * reading.unit, e2, 2.0 * b * c * sin_mu, at.half)
-
-
-def read_backwards(k: Coefficients) -> Coefficients:
-    """Return the coefficients of the loop read backwards, in the usual order of the bars."""
-    return Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2)
+def read_from(bar: int, k: Coefficients) -> Coefficients:
+    """Return the coefficients of the loop read from bar 2, 3 or 4, in the usual order of the bars; and back."""
+    if bar == 3:
+        return Coefficients(k.h3, k.h2, k.h4, -k.h23, k.h43 - k.h23, k.dh3, k.dh2, k.dh4)
+    return Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2) if bar == 4 else k

@@ -12,7 +12,7 @@ exactly and nothing cancels near it; nothing passes through zero at theta = 180 
 Source: R. L. Norton, Design of Machinery, ch. 4 (the loop and its two branches).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -70,6 +70,12 @@ class Position(NamedTuple):
     half: HalfAngle
 
 
+def lengths_read_from(bar: int, lengths: tuple[Number, Number, Number, Number]) -> tuple[Any, Any, Any, Any]:
+    """Return the lengths of ground, the bar itself, coupler and output, as the loop is read from bar 2, 3 or 4."""
+    d, a, b, c = lengths
+    return (d, b, a, c) if bar == 3 else (d, c, b, a) if bar == 4 else (d, a, b, c)
+
+
 def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
     """Return the lengths with E1 = (b + c - a - d)(a + b + c + d) and E2 = (d - a - b + c)(d - a + b - c).
 
@@ -92,9 +98,22 @@ def direction_of_tangent(t: Number) -> Number:
     return vector((1.0 - t * t) * kk, 2.0 * t * kk)
 
 
-def half_angle(lengths: Loop, psi: Number) -> HalfAngle:
-    """Compute the half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula."""
-    return half_angle_of_tangent(lengths, tangent(0.5 * psi))
+def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAngle:
+    """Compute the half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula.
+
+    Parameters
+    ----------
+    opposite : h of psi - pi, from the same tangent: there the ground is read from O4 to O2.
+    """
+    if not opposite:
+        return half_angle_of_tangent(lengths, tangent(0.5 * psi))
+    t = tangent(0.5 * psi)
+    meets = lengths.E1 == 0.0
+    if anywhere(meets):
+        t = select(meets, t + hair(t), t)
+    kk = 1.0 / (1.0 + t * t)
+    sk = t * kk
+    return with_factors(lengths, kk, t * sk, -sk)
 
 
 def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
@@ -104,7 +123,11 @@ def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
         t = select(meets, t + hair(t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
-    ss = t * sk
+    return with_factors(lengths, t * sk, kk, sk)
+
+
+def with_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAngle:
+    """Compute the factors of Heron's formula from sin^2 h, cos^2 h and sin h cos h."""
     four_ad, four_bc = 4.0 * lengths.a * lengths.d, 4.0 * lengths.b * lengths.c
     outer, inner = lengths.E1 + four_ad * kk, lengths.E2 + four_ad * ss
     short = four_ad > four_bc

@@ -9,7 +9,7 @@ from fourbar.linkage import FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.document import Start, at_start
 from fourbar.mjcf.model import carriable
 from fourbar.mjcf.notes import NOTES
-from fourbar.scene import Scene
+from fourbar.scene import Scene, require_input
 
 PARENT = {2: 1, 3: 2, 4: 1}
 """The bar that carries each bar's first pin."""
@@ -46,6 +46,7 @@ def assemble(
     Raises LimitError for a load, a motion law or an effect without a counterpart there, InputError for a bar without
     mass or inertia, NotAssembledError where the linkage closes at none of the scene's positions.
     """
+    require_input(scene, "the drive of an SDF or a USD")
     if scene.motion.law is not None:
         raise LimitError(f"a motion law has no counterpart in {form}; apply it in the simulator")
     if scene.loads and not without_loads:

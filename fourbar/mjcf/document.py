@@ -16,7 +16,7 @@ from fourbar.mjcf.model import Model, carriable, constant, motor, servo, text
 from fourbar.mjcf.notes import NOTES
 from fourbar.mjcf.settings import FULL_TURN, RECIPE, Settings, WindowMotion, fitted_pad
 from fourbar.quantities import OK
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, require_input
 from fourbar.solution import Array
 from fourbar.solve import solve
 
@@ -104,6 +104,7 @@ def mjcf(
 
 def _require_carried(scene: Scene) -> None:
     """LimitError or InputError for what of a motion, a drive or a linkage MJCF does not carry."""
+    require_input(scene, "the drive of an MJCF")
     if scene.motion.law is not None:
         raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
     if scene.drive is not None and scene.motion.free is None:

@@ -3,3 +3,4 @@
 from fourbar.scene.scene import Command as Command
 from fourbar.scene.scene import Scene as Scene
 from fourbar.scene.scene import command as command
+from fourbar.scene.scene import require_input as require_input

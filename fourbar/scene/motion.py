@@ -1,14 +1,14 @@
-"""The command to the input bar: angles, a sweep, a limit position, a law over time, or release."""
+"""The command to one moving bar: angles, a sweep, a limit position, a law over time, or release."""
 
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import A_BRANCH, require, require_numbers, require_whole
-from fourbar.scene.motion_law import STEPS, Law
+from fourbar.scene.motion_law import COMMANDS, STEPS, Law, the_bar
 from fourbar.solution import Array
 
 OPEN, CROSSED = 1, -1
@@ -21,7 +21,7 @@ DEFAULT_STEPS = 360
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """theta_2 from `start` to `stop` (rad) in `steps` equal intervals, both ends included."""
+    """The commanded angle from `start` to `stop` (rad) in `steps` equal intervals, both ends included."""
 
     start: float
     stop: float
@@ -38,7 +38,7 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class FromLimit:
-    """theta_2 = limit position number `limit` of the input (1, 2, ... from theta_1 on) + `offset` (rad)."""
+    """Limit position number `limit` of the commanded bar (1, 2, ... from theta_1 on) + `offset` (rad)."""
 
     limit: int
     offset: float = 0.0
@@ -65,17 +65,21 @@ class Free:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """The command to the input bar; each number may be a text with a unit instead, like "60 rpm".
+    """The command to one moving bar, the input unless numbers of bar 3 or 4 are stated.
+
+    Each number may be a text with a unit instead, like "60 rpm".
 
     Parameters
     ----------
     theta_2 : one angle, an array of them (n,), a Sweep, a FromLimit, or None (the default range), rad.
     omega_2 : rad/s; None: positions only.
     alpha_2 : rad/s^2.
-    branch : "open" or +1 (B left of the diagonal A to O4), "crossed" or -1.
+    branch : "open" or +1 (B left of the diagonal A to O4), "crossed" or -1: the sign of sin(theta_4 - theta_3); where
+        bar 3 or 4 is commanded that of sin(theta_4 - theta_2) or sin(theta_3 - theta_2), +1 "open".
     through : at a change point keep the "sign" of the branch, or "follow" the smooth path.
     free : released motion instead of a prescribed one.
-    law : theta_2 over time instead of theta_2, omega_2 and alpha_2.
+    law : an angle over time instead of theta_2, omega_2 and alpha_2.
+    theta_3, omega_3, alpha_3, theta_4, omega_4, alpha_4 : of the coupler or the output instead.
     """
 
     theta_2: float | Array | Sweep | FromLimit | None = None
@@ -85,39 +89,50 @@ class Motion:
     through: str = "sign"
     free: Free | None = None
     law: Law | None = None
+    theta_3: float | Array | Sweep | FromLimit | None = None
+    omega_3: float | None = None
+    alpha_3: float = 0.0
+    theta_4: float | Array | Sweep | FromLimit | None = None
+    omega_4: float | None = None
+    alpha_4: float = 0.0
+    bar: int = field(default=2, init=False)
+    """Which is commanded: 2, 3 or 4."""
 
     def __post_init__(self) -> None:
-        if self.theta_2 is not None and not isinstance(self.theta_2, (Sweep, FromLimit)):
-            angles = require_numbers("motion.theta_2", self.theta_2, "must be finite angles", "rad")
+        expect("motion.law", self.law, Law, type(None))
+        stated = the_bar("motion", self, COMMANDS)
+        object.__setattr__(self, "bar", (stated or 2) if self.law is None else self.law.bar)
+        theta, omega, alpha = self.names
+        if self.law is not None and (stated is not None or self.free is not None):
+            allowed = f"stands alone: it gives {theta}, {omega} and {alpha}"
+            raise InputError("motion.law", self.law.ends, allowed)
+        if self.angle is not None and not isinstance(self.angle, (Sweep, FromLimit)):
+            angles = require_numbers(f"motion.{theta}", self.angle, "must be finite angles", "rad")
             if angles.size == 0:
-                raise InputError("motion.theta_2", self.theta_2, "must be one angle or more")
+                raise InputError(f"motion.{theta}", self.angle, "must be one angle or more")
             angles.flags.writeable = False
-            object.__setattr__(self, "theta_2", float(angles) if angles.ndim == 0 else angles)
-        if self.omega_2 is not None:
-            object.__setattr__(self, "omega_2", require("motion.omega_2", self.omega_2, "rad/s"))
-            if not math.isfinite(self.omega_2 * self.omega_2):
+            object.__setattr__(self, theta, float(angles) if angles.ndim == 0 else angles)
+        if self.speed is not None:
+            object.__setattr__(self, omega, speed := require(f"motion.{omega}", self.speed, "rad/s"))
+            if not math.isfinite(speed * speed):
                 allowed = f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
-                raise InputError("motion.omega_2", self.omega_2, allowed)
-        object.__setattr__(self, "alpha_2", require("motion.alpha_2", self.alpha_2, "rad/s^2"))
+                raise InputError(f"motion.{omega}", speed, allowed)
+        object.__setattr__(self, alpha, require(f"motion.{alpha}", self.acceleration, "rad/s^2"))
         if isinstance(self.branch, str):
             words = {name: number for number, name in BRANCH_NAMES.items()}
             object.__setattr__(self, "branch", words.get(self.branch, self.branch))
         for name, kinds in (("branch", (int, np.integer, str)), ("through", (str,))):
             expect(f"motion.{name}", getattr(self, name), *kinds)
         expect("motion.free", self.free, Free, type(None))
-        expect("motion.law", self.law, Law, type(None))
         if self.branch not in (OPEN, CROSSED):
             raise InputError("motion.branch", self.branch, A_BRANCH)
-        given = (self.free, self.theta_2, self.omega_2, self.alpha_2 or None)
-        if self.law is not None and any(value is not None for value in given):
-            raise InputError("motion.law", self.law.ends, "stands alone: it gives theta_2, omega_2 and alpha_2")
         if self.through not in ("sign", "follow"):
             raise InputError("motion.through", self.through, 'must be "sign" or "follow"')
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Motion):
             return NotImplemented
-        one, two = self.theta_2, other.theta_2
+        one, two = self.angle, other.angle
         if isinstance(one, np.ndarray) or isinstance(two, np.ndarray):
             return bool(np.array_equal(one, two)) and self._rest() == other._rest()  # type: ignore[arg-type]
         return one == two and self._rest() == other._rest()
@@ -127,4 +142,24 @@ class Motion:
 
     def _rest(self) -> tuple[object, ...]:
         """Everything but the angles."""
-        return (self.omega_2, self.alpha_2, self.branch, self.through, self.free, self.law)
+        return (self.bar, self.speed, self.acceleration, self.branch, self.through, self.free, self.law)
+
+    @property
+    def names(self) -> tuple[str, str, str]:
+        """Of what is commanded: theta_2, omega_2 and alpha_2, or those of bar 3 or 4."""
+        return COMMANDS[self.bar]
+
+    @property
+    def angle(self) -> float | Array | Sweep | FromLimit | None:
+        """Of the commanded bar, as it is stated."""
+        return getattr(self, self.names[0])  # type: ignore[no-any-return]
+
+    @property
+    def speed(self) -> float | None:
+        """Of the commanded bar, rad/s."""
+        return getattr(self, self.names[1])  # type: ignore[no-any-return]
+
+    @property
+    def acceleration(self) -> float:
+        """Of the commanded bar, rad/s^2."""
+        return getattr(self, self.names[2])  # type: ignore[no-any-return]

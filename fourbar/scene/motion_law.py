@@ -1,12 +1,13 @@
-"""The drive's motion as a table of theta_2 over time, smoothly interpolated: each position has its own speed."""
+"""The motion as a table of an angle over time, smoothly interpolated: each position has its own speed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError, expect, installing
-from fourbar.linkage import MOST_STEPS, require_numbers, require_whole
+from fourbar.linkage import MOST_STEPS, MOVING_BARS, require_numbers, require_whole
 from fourbar.solution import Array
 
 ENDS = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
@@ -18,6 +19,26 @@ STEPS = (range(1, MOST_STEPS + 1), f"must be a whole number from 1 to {MOST_STEP
 """Intervals of any motion."""
 
 
+COMMANDS = {bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS}
+"""What commands a bar: its angle, speed and acceleration."""
+ANGLES = {bar: names[:1] for bar, names in COMMANDS.items()}
+
+
+def the_bar(key: str, stated: object, commands: Mapping[int, tuple[str, ...]]) -> int | None:
+    """Return the bar of which numbers are stated, None where none is; InputError where there are two."""
+    found = [
+        bar
+        for bar, names in commands.items()
+        for name in names
+        if (value := getattr(stated, name)) is not None and not (name[0] == "a" and type(value) is float and not value)
+    ]
+    found = list(dict.fromkeys(found))
+    if len(found) > 1:
+        named = " and ".join(f"of bar {bar}" for bar in found)
+        raise InputError(key, named, "is the command of one bar: theta, omega and alpha of bar 2, 3 or 4")
+    return found[0] if found else None
+
+
 @dataclass(frozen=True, slots=True)
 class Law:
     """theta_2(t) through the points of a table: piecewise cubic, its acceleration continuous.
@@ -25,41 +46,55 @@ class Law:
     Parameters
     ----------
     time : rising, s.
-    theta_2 : one angle for each time, rad.
+    theta_2, theta_3, theta_4 : one angle of the commanded bar for each time, rad; the others are left out.
     steps : the law is evaluated at the ends of so many equal intervals of time.
     ends : "free", "rest" (speed 0 at both ends) or "periodic" (the speed and acceleration at the end
-        are those at the start; theta_2 may have gained whole turns).
+        are those at the start; the angle may have gained whole turns).
     """
 
     time: tuple[float, ...]
-    theta_2: tuple[float, ...]
+    theta_2: tuple[float, ...] | None = None
     steps: int = 360
     ends: str = "free"
+    theta_3: tuple[float, ...] | None = None
+    theta_4: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         key = "motion.law"
         expect(f"{key}.ends", self.ends, str)
         if self.ends not in ENDS:
             raise InputError(f"{key}.ends", self.ends, "must be one of " + ", ".join(ENDS))
-        time, theta_2 = (
+        angle = f"theta_{self.bar}"
+        time, angles = (
             tuple(require_numbers(f"{key}.{name}", getattr(self, name), unit=unit).ravel().tolist())
-            for name, unit in (("time", "s"), ("theta_2", "rad"))
+            for name, unit in (("time", "s"), (angle, "rad"))
         )
-        if len(time) != len(theta_2) or not LEAST[self.ends] <= len(time) <= MOST_POINTS:
+        if len(time) != len(angles) or not LEAST[self.ends] <= len(time) <= MOST_POINTS:
             allowed = f"needs {LEAST[self.ends]} to {MOST_POINTS} times and as many angles"
-            raise InputError(key, (len(time), len(theta_2)), allowed)
+            raise InputError(key, (len(time), len(angles)), allowed)
         if any(b <= a for a, b in pairwise(time)):
             raise InputError(f"{key}.time", time, "must rise")
         object.__setattr__(self, "steps", require_whole(f"{key}.steps", self.steps, *STEPS))
         object.__setattr__(self, "time", time)
-        object.__setattr__(self, "theta_2", theta_2)
+        object.__setattr__(self, angle, angles)
+
+    @property
+    def bar(self) -> int:
+        """Whose angle it gives: 2, 3 or 4."""
+        return the_bar("motion.law", self, ANGLES) or 2
+
+    @property
+    def angle(self) -> tuple[float, ...]:
+        """That angle, rad."""
+        found: tuple[float, ...] = getattr(self, f"theta_{self.bar}")
+        return found
 
     def times(self) -> Array:
         """Where it is evaluated, (steps + 1,), s."""
         return np.linspace(self.time[0], self.time[-1], self.steps + 1)
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
-        """theta_2, omega_2 and alpha_2 at times within the table, each (n,).
+        """Angle, speed and acceleration of its bar at times within the table, each (n,).
 
         Raises DependencyError where SciPy is not installed.
         """
@@ -68,7 +103,7 @@ class Law:
         except ModuleNotFoundError:
             raise DependencyError(f"SciPy is needed for a motion law: {installing('dynamics')}") from None
         time = require_numbers("time", time)
-        t, angle = np.array(self.time), np.array(self.theta_2)
+        t, angle = np.array(self.time), np.array(self.angle)
         mean = 0.0
         if self.ends == "periodic":
             # what is periodic is the departure from the mean speed
@@ -76,5 +111,5 @@ class Law:
             angle = angle - mean * (t - t[0])
             angle[-1] = angle[0]
         curve = CubicSpline(t, angle, bc_type=ENDS[self.ends])
-        theta_2, omega_2, alpha_2 = (np.asarray(curve(time, order)) for order in (0, 1, 2))
-        return theta_2 + mean * (time - t[0]), omega_2 + mean, alpha_2
+        theta, omega, alpha = (np.asarray(curve(time, order)) for order in (0, 1, 2))
+        return theta + mean * (time - t[0]), omega + mean, alpha

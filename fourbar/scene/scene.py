@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, expect
-from fourbar.formulas.mobility import default_range, limit_positions, on_smooth_path
-from fourbar.linkage import FourBar, require_bar
+from fourbar.errors import InputError, LimitError, expect
+from fourbar.formulas.mobility import default_range, limit_angles, on_smooth_path
+from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.scene.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
+from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.point import Point
 from fourbar.scene.tolerance import Tolerance
 from fourbar.solution import Array
@@ -100,50 +101,84 @@ class Scene:
 
 
 class Command(NamedTuple):
-    """What the input bar must do at each of n independent positions."""
+    """What one bar, the input unless another is named, must do at each of n independent positions."""
 
-    theta_2: Array
+    angle: Array
     """(n,), rad."""
     branch: NDArray[np.int8]
-    """(n,), +1 or -1."""
-    omega_2: float | Array | None
+    """(n,), +1 or -1: the sign of the sine between the two other moving bars, as `Motion` has it."""
+    speed: float | Array | None
     """rad/s; None: positions only."""
-    alpha_2: float | Array
+    acceleration: float | Array
     """rad/s^2."""
     remainder: Any = None
-    """What theta_2 as a double leaves out of the one angle meant (mpmath), rad: a limit position plus its offset."""
+    """What the angle as a double leaves out of the one angle meant (mpmath), rad: a limit position plus its offset."""
     time: Array | None = None
     """(n,), s; where the motion is given over time."""
+    bar: int = 2
+
+    @property
+    def commanded(self) -> str:
+        """Name of the angle."""
+        return COMMANDS[self.bar][0]
+
+    @property
+    def theta_2(self) -> Array:
+        """Of the input, where that is commanded; InputError where it is not."""
+        self._require_input()
+        return self.angle
+
+    @property
+    def omega_2(self) -> float | Array | None:
+        """Of the input, likewise."""
+        self._require_input()
+        return self.speed
+
+    @property
+    def alpha_2(self) -> float | Array:
+        """Of the input, likewise."""
+        self._require_input()
+        return self.acceleration
+
+    def _require_input(self) -> None:
+        if self.bar != 2:
+            raise InputError("at", self.commanded, "is commanded, and theta_2 is not")
+
+
+def require_input(scene: Scene, what: str) -> None:
+    """Raise a LimitError where what is asked for takes a command of the input alone, and another bar has it."""
+    if scene.motion.bar != 2:
+        raise LimitError(f"motion.{scene.motion.names[0]}: {what} takes a command of theta_2 alone")
 
 
 def command(scene: Scene) -> Command:
     """List the positions that the scene's motion names, each with its branch."""
     expect("scene", scene, Scene)
-    motion, linkage = scene.motion, scene.linkage
-    stated, remainder, time = motion.theta_2, None, None
-    omega_2: float | Array | None = motion.omega_2
-    alpha_2: float | Array = motion.alpha_2
+    motion, linkage, bar = scene.motion, scene.linkage, scene.motion.bar
+    stated, remainder, time = motion.angle, None, None
+    speed: float | Array | None = motion.speed
+    acceleration: float | Array = motion.acceleration
     if motion.law is not None:
         time = motion.law.times()
-        theta_2, omega_2, alpha_2 = motion.law.at(time)
+        angle, speed, acceleration = motion.law.at(time)
     elif stated is None:
-        theta_2 = np.linspace(*default_range(linkage), DEFAULT_STEPS + 1)
+        angle = np.linspace(*default_range(linkage, bar), DEFAULT_STEPS + 1)
     elif isinstance(stated, Sweep):
-        theta_2 = np.linspace(stated.start, stated.stop, stated.steps + 1)
+        angle = np.linspace(stated.start, stated.stop, stated.steps + 1)
     elif isinstance(stated, FromLimit):
-        limits = limit_positions(linkage)
+        key, limits = f"motion.theta_{bar}.limit", limit_angles(linkage, bar)
         if not limits:
-            raise InputError("motion.theta_2.limit", stated.limit, "the input of this linkage has no limit positions")
+            raise InputError(key, stated.limit, f"the {BAR_NAMES[bar]} of this linkage has no limit positions")
         if stated.limit > len(limits):
-            raise InputError("motion.theta_2.limit", stated.limit, f"must be from 1 to {len(limits)}")
+            raise InputError(key, stated.limit, f"must be from 1 to {len(limits)}")
         from fourbar.formulas.many_digits import limit_remainder
 
-        limit = limits[stated.limit - 1].theta_2
-        theta_2 = np.array([limit + stated.offset])
-        remainder = limit_remainder(linkage, limit, float(theta_2[0]), stated.offset)
+        limit = limits[stated.limit - 1]
+        angle = np.array([limit + stated.offset])
+        remainder = limit_remainder(linkage, limit, float(angle[0]), stated.offset, bar)
     else:
-        theta_2 = np.array(stated, dtype=float, ndmin=1)
-    branch = np.full(theta_2.shape, motion.branch, dtype=np.int8)
+        angle = np.array(stated, dtype=float, ndmin=1)
+    branch = np.full(angle.shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
-        branch = on_smooth_path(linkage, theta_2, motion.branch)
-    return Command(theta_2, branch, omega_2, alpha_2, remainder, time)
+        branch = on_smooth_path(linkage, angle, motion.branch, bar)
+    return Command(angle, branch, speed, acceleration, remainder, time, bar)

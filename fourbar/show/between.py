@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.linkage import PINS
+from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.show.duty import driving
@@ -35,7 +35,7 @@ class Between(NamedTuple):
     solution: Solution
     """At its positions and, among them, at both sides of each reversal and where each of `sizes` is largest."""
     reversals: list[tuple[float, str]]
-    """theta_2, rad, and the pin at which dry friction reverses there: the pin forces jump."""
+    """Commanded angle, rad, and the pin at which dry friction reverses there: the pin forces jump."""
     growing: set[str]
     """Those of `sizes` that grow without bound within a step."""
 
@@ -58,15 +58,15 @@ def between(scene: Scene, solution: Solution) -> Between | None:
     solution : of the scene's positions, or of its sweep in rising order, to the stage "force".
     """
     motion = scene.motion
-    listed = isinstance(motion.theta_2, np.ndarray)
+    listed = isinstance(motion.angle, np.ndarray)
     if motion.free is not None or listed or solution.F12 is None or len(solution) < 2:
         return None
 
     def at(places: Array, branch: Branch, stage: str = "force") -> Solution:
         if motion.law is not None:
-            theta_2, omega_2, alpha_2 = motion.law.at(places)
-            return solve(scene, stage, at=Command(theta_2, branch, omega_2, alpha_2, time=places))
-        return solve(scene, stage, at=Command(places, branch, motion.omega_2, motion.alpha_2))
+            angle, speed, acceleration = motion.law.at(places)
+            return solve(scene, stage, at=Command(angle, branch, speed, acceleration, time=places, bar=motion.bar))
+        return solve(scene, stage, at=Command(places, branch, motion.speed, motion.acceleration, bar=motion.bar))
 
     pins, low, high, branch = _reversing(scene, solution)
     for _ in range(ROUNDS if pins else 0):
@@ -84,7 +84,16 @@ def between(scene: Scene, solution: Solution) -> Between | None:
 
 
 def _over(solution: Solution) -> Array:
-    return solution.theta_2 if solution.time is None else solution.time
+    angle: Array = getattr(solution, solution.commanded)
+    return angle if solution.time is None else solution.time
+
+
+def _branch(solution: Solution) -> Branch:
+    """Return the branch of the command: the sign of the sine between the two bars that are not commanded."""
+    if solution.commanded == "theta_2":
+        return solution.branch
+    one, other = (getattr(solution, f"theta_{bar}") for bar in MOVING_BARS if f"theta_{bar}" != solution.commanded)
+    return np.where(np.sin(other - one) < 0.0, -1, 1).astype(np.int8)
 
 
 def _cut(low: Array, high: Array) -> Array:
@@ -97,7 +106,7 @@ def _merged(at: At, solution: Solution, places: Array, branch: Branch) -> Soluti
         return solution
     over = np.concatenate([_over(solution), places])
     order = np.unique(over, return_index=True)[1][:: 1 if over[0] < over[1] else -1]
-    return at(over[order], np.concatenate([solution.branch, branch])[order], "force")
+    return at(over[order], np.concatenate([_branch(solution), branch])[order], "force")
 
 
 def _slip(solution: Solution, pin: str) -> Array:
@@ -108,22 +117,22 @@ def _slip(solution: Solution, pin: str) -> Array:
 
 def _reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array, Branch]:
     """List the steps in which a pin with dry friction changes its sense: pin, ends, branch."""
-    over, steps = _over(solution), list[tuple[str, int, int]]()
+    over, branch, steps = _over(solution), _branch(solution), list[tuple[str, int, int]]()
     for pin in sorted({pin for effect in scene.effects for pin in effect.dry_pins}):
         slip = np.nan_to_num(_slip(solution, pin))
         moving = np.flatnonzero(np.abs(slip) > AT_REST * np.abs(slip).max())
         steps += [
             (pin, i, j)
             for i, j in pairwise(moving.tolist())
-            if slip[i] * slip[j] < 0.0 and solution.branch[i] == solution.branch[j] and solution.assembled[i:j].all()
+            if slip[i] * slip[j] < 0.0 and branch[i] == branch[j] and solution.assembled[i:j].all()
         ]
     first, last = (np.array([step[end] for step in steps], dtype=int) for end in (1, 2))
-    return [pin for pin, *_ in steps], over[first], over[last], solution.branch[first]
+    return [pin for pin, *_ in steps], over[first], over[last], branch[first]
 
 
 def _largest(at: At, solution: Solution) -> tuple[Array, Branch, set[str]]:
     """Find where each size is largest between positions that it has a local maximum at: places, branches, growing."""
-    over, branch, peaks = _over(solution), solution.branch, list[tuple[str, int, int, int]]()
+    over, branch, peaks = _over(solution), _branch(solution), list[tuple[str, int, int, int]]()
     for name, size in sizes(solution).items():
         known = np.concatenate([[-1.0], np.nan_to_num(size, nan=-1.0, posinf=-1.0), [-1.0]])
         before, here, after = known[:-2], known[1:-1], known[2:]

@@ -110,9 +110,10 @@ def drive_words(scene: Scene) -> str:
 
 def once_round(solution: Solution) -> Any:
     """Whether a sweep goes over whole turns: its last position then repeats the first; of a study (m,)."""
-    if solution.theta_2.shape[-1] == 1:
-        return np.zeros(solution.theta_2.shape[:-1], dtype=bool)
-    turns = np.abs(solution.theta_2[..., -1] - solution.theta_2[..., 0]) / (2.0 * np.pi)
+    angle: Array = getattr(solution, solution.commanded)
+    if angle.shape[-1] == 1:
+        return np.zeros(angle.shape[:-1], dtype=bool)
+    turns = np.abs(angle[..., -1] - angle[..., 0]) / (2.0 * np.pi)
     return (turns > 0.5) & np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
 
 
@@ -187,7 +188,8 @@ DUTY_UNITS = {
 def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty | None:
     """Peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
 
-    E = integral of P dt, dt = d theta_2/omega_2 in a sweep; E_in of the positive part of P, E_out of the negative.
+    E = integral of P dt, dt = d theta/omega of the commanded bar in a sweep; E_in of the positive part of P, E_out of
+    the negative.
     Positions without a value are left out, and so are the steps from and to them.
 
     Returns None where no position has a torque or force of the drive: a released linkage, or positions alone.
@@ -222,11 +224,12 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
 
 def _energy(solution: Solution, power: Array) -> tuple[float | None, float | None]:
     """Integrate the positive and the negative part of the power, each over time."""
-    omega_2 = solution.omega_2
+    omega = getattr(solution, solution.commanded.replace("theta", "omega"))
     if solution.time is not None:
         spans = np.diff(solution.time)
-    elif omega_2 is not None and np.all(omega_2 != 0.0):
-        spans = np.abs(np.diff(solution.theta_2) / np.broadcast_to(omega_2, power.shape)[..., :-1])
+    elif omega is not None and np.all(omega != 0.0):
+        angle = getattr(solution, solution.commanded)
+        spans = np.abs(np.diff(angle) / np.broadcast_to(omega, power.shape)[..., :-1])
     else:
         return None, None
     parts = [

@@ -46,8 +46,9 @@ def _facts(scene: "Scene", units: Conversion) -> list[tuple[str, str]]:
     for name, length, mass in zip(BAR_NAMES.values(), scene.linkage.lengths, masses, strict=True):
         facts.append((name, value(length, "m", units) + (f", {value(mass, 'kg', units)}" if mass else "")))
     speed = "positions only"
-    if motion.omega_2 is not None:
-        speed = f"ω2 = {value(motion.omega_2, 'rad/s', units)}, α2 = {value(motion.alpha_2, 'rad/s^2', units)}"
+    if motion.speed is not None:
+        omega, alpha = value(motion.speed, "rad/s", units), value(motion.acceleration, "rad/s^2", units)
+        speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
     acting = [f"load on bar {load.bar}" for load in scene.loads] + [effect.key for effect in scene.effects]
     return [
         *facts,

@@ -14,7 +14,7 @@ from fourbar.files.pictures import data_uri
 from fourbar.files.scene_text import BARS
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, OK, PIN_FORCES
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, require_input
 from fourbar.show.acting import Symbol, acting
 from fourbar.show.duty import energies
 from fourbar.show.plot.style import length_unit
@@ -33,6 +33,7 @@ SCALARS = (*ANGLES, "condition", *RATES, "torque", "drive_force", "stroke")
 
 def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
     """Everything the page's script needs: SI units, radians, null where there is no value."""
+    require_input(scene, "a page")
     linkage, motion = scene.linkage, scene.motion
     shown = _through_time(scene) if over_time(scene) else _sweep(scene)
     closes = [theta_3 is not None for theta_3 in shown["branches"][str(motion.branch)]["theta_3"]]

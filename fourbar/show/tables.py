@@ -103,9 +103,11 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
     if scene.motion.free is not None:
         drive = "released, no drive"
     branch = BRANCH_NAMES[scene.motion.branch]
+    theta, omega, _ = scene.motion.names
+    of_bar = "" if scene.motion.bar == 2 else f" of the command {theta}"
     lines = [
         ", ".join(f"{name} {value(length, 'm', units)}" for name, length in lengths),
-        f"{branch} branch; {drive}",
+        f"{branch} branch{of_bar}; {drive}",
     ]
     counts = np.bincount(solution.status_code, minlength=len(STATUS_NAMES))
     statuses = zip(STATUS_NAMES, counts.tolist(), strict=True)
@@ -117,12 +119,12 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
             f"t = {solution.stopped_at:.6g} s, where bars 3 and 4 are in line"
         )
     of_drive = driving(solution)
-    if scene.motion.omega_2 is None and of_drive.values is None and _acting(scene):
-        lines.append(f"positions only, since omega_2 is left out; {STATIC}")
+    if scene.motion.speed is None and of_drive.values is None and _acting(scene):
+        lines.append(f"positions only, since {omega} is left out; {STATIC.replace('omega_2', omega)}")
     found = between(scene, solution)
     if found is not None and found.reversals:
         where = ", ".join(f"{value(theta_2, 'rad', units)} ({pin})" for theta_2, pin in found.reversals)
-        lines.append(f"dry friction reverses, and the pin forces jump, at theta_2 = {where}")
+        lines.append(f"dry friction reverses, and the pin forces jump, at {solution.commanded} = {where}")
     if scene.motion.free is None and of_drive.values is not None and np.isfinite(of_drive.values).any():
         peak = solution if found is None else found.solution
         values = driving(peak).values
@@ -200,12 +202,14 @@ def _warning(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
     worst = int(np.nanargmax(share))
     left = max(math.floor(-math.log10(share[worst])), 0)
     where = f"at theta_2 = {value(solution.theta_2[worst], 'rad', units)}"
-    sines = {"3 and 4": abs(solution.sin_mu[worst])}
+    others = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
+    commanded = others[int(solution.commanded[-1])]
+    sines = {commanded: solution.condition[worst]}
     if scene.drive is not None:
-        lever, sine = solution.drive_condition[worst], sines["3 and 4"]
-        return [f"{left} digits left of F {where}: of its lever {lever:.2g}, of sin mu {sine:.2g} is left"]
-    if scene.drive_bar != 2:
-        sines[{3: "2 and 4", 4: "2 and 3"}[scene.drive_bar]] = solution.drive_condition[worst]
+        lever, sine = solution.drive_condition[worst], sines[commanded]
+        of_bars = f"of the sine of bars {commanded} {sine:.2g} is left"
+        return [f"{left} digits left of F {where}: of its lever {lever:.2g}, {of_bars}"]
+    sines[others[scene.drive_bar]] = solution.drive_condition[worst]
     bars = min(sines, key=lambda pair: sines[pair])
     gap = math.asin(min(sines[bars], 1.0))
     return [f"{left} digits left of T{scene.drive_bar} {where}: bars {bars} are {gap:.2g} rad from being in line"]
@@ -240,7 +244,8 @@ def columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[s
             add(f"{name}_{letter}", unit_of(name), vector[:, axis])
     for name in ANGLES:
         add(name, "rad", getattr(solution, name))
-    for name in ("stroke", "stroke_speed", "omega_3", "omega_4", "alpha_3", "alpha_4"):
+    sought = [bar for bar in "234" if bar != solution.commanded[-1]]
+    for name in ("stroke", "stroke_speed", *(f"{kind}_{bar}" for kind in ("omega", "alpha") for bar in sought)):
         if getattr(solution, name) is not None:
             add(name, UNITS[name], getattr(solution, name))
     shown["sin mu\n"] = _cells(solution.sin_mu)

@@ -14,7 +14,7 @@ from fourbar.formulas.closed_curve import on_curve, transmission
 from fourbar.formulas.mobility import TURN, change_points, turns_fully
 from fourbar.formulas.motion import State
 from fourbar.formulas.position import loop
-from fourbar.scene import Scene, command
+from fourbar.scene import Scene, command, require_input
 from fourbar.scene.motion import Sweep
 from fourbar.studies.sloped import Sloped
 
@@ -76,6 +76,7 @@ class CircuitCurve:
     """
 
     def __init__(self, scene: Scene) -> None:
+        require_input(scene, "the search for equilibria")
         self.scene, self.case = scene, Case.of(scene)
         self.case = self.case.with_start(command(scene)) if scene.counts_turns else self.case
         linkage = scene.linkage

@@ -13,7 +13,7 @@ from fourbar.effects.cones import solve_sliding
 from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
-from fourbar.evaluation.stages import kinematics
+from fourbar.evaluation.stages import kinematics, of_command
 from fourbar.formulas.arithmetic import polar
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Position, parallel_pairs, with_parallel_pairs
@@ -24,7 +24,7 @@ from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
 from fourbar.solution import Array, Solution, parts, values_of
 from fourbar.solve import solve
-from fourbar.studies.keys import THETA_2, SceneNumber, at_place, entries, placed
+from fourbar.studies.keys import SceneNumber, angle_key, at_place, entries, placed
 from fourbar.studies.sloped import Sloped, slopes, values
 from fourbar.writing import between, data_frame, html_table, listed
 
@@ -145,26 +145,27 @@ def sensitivity(scene: Scene) -> Sensitivity:
     expect("scene", scene, Scene)
     if scene.motion.free is not None:
         raise InputError("motion.free", "a free motion", "has no sensitivities: they are those of a prescribed theta_2")
-    if isinstance(scene.motion.theta_2, FromLimit):
-        raise InputError(THETA_2, scene.motion.theta_2, "has no sensitivities: the limit moves with the lengths")
+    theta = angle_key(scene)
+    if isinstance(scene.motion.angle, FromLimit):
+        raise InputError(theta, scene.motion.angle, "has no sensitivities: the limit moves with the lengths")
     at, solution, known = command(scene), solve(scene), entries(scene)
-    moving = at.omega_2 is not None
-    keys = {THETA_2: SceneNumber((), "rad")} | (
-        known if moving else {k: e for k, e in known.items() if _of_position(k)}
-    )
-    numbers = [np.nan if key == THETA_2 else at_place(scene, entry.place) for key, entry in keys.items()]
+    moving = at.speed is not None
+    keys = {theta: SceneNumber((), "rad")} | (known if moving else {k: e for k, e in known.items() if _of_position(k)})
+    numbers = [np.nan if key == theta else at_place(scene, entry.place) for key, entry in keys.items()]
     forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")
     names = [
         name
         for name in solution.evaluated()
-        if STAGE_OF.get(name, "force") in STAGES[:3] or (moving and name in forces)
+        if STAGE_OF.get(name, "force") in STAGES[:3]
+        or (moving and name in forces)
+        or (name == "theta_2" and at.bar != 2)
     ]
     names += [f"{start}{p.name}" for p in scene.points for start in (OF_POINTS if moving else ("",))]
     p = len(keys)
     by = {name: np.full((p, *values_of(solution, name).shape), np.nan) for name in names}
     status = np.array(STATUS_NAMES, dtype="<U16")[solution.status_code]
     with np.errstate(all="ignore"):
-        _, decided = Case.of(scene).half_angle(at.theta_2, None)
+        _, decided = Case.of(scene, at.bar).half_angle(at.angle, None)
         status[decided] = STATUS_NAMES[SINGULAR]  # on a limit: so near that doubles cannot tell the factors from zero
         regular = np.flatnonzero(~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)]))
         seeded = _seeded(scene, keys)
@@ -269,41 +270,44 @@ def _derivatives(
     place = {key: number for number, key in enumerate(keys)}
 
     def seeded(key: str, number: Any) -> Any:
-        number = np.broadcast_to(np.asarray(0.0 if number is None else number, dtype=float), at.theta_2.shape)[index]
+        number = np.broadcast_to(np.asarray(0.0 if number is None else number, dtype=float), at.angle.shape)[index]
         if key in place:
             return number + unit_slope(place[key], len(keys))
         return Sloped(number, np.zeros((len(keys), 1)))
 
-    theta_2, omega_2, alpha_2 = (
-        seeded(f"motion.{name}", getattr(at, name)) for name in ("theta_2", "omega_2", "alpha_2")
+    numbers = (at.angle, at.speed, at.acceleration)
+    q, speed, acceleration = (
+        seeded(f"motion.{name}", number) for name, number in zip(scene.motion.names, numbers, strict=True)
     )
-    case, branch = Case.of(scene), at.branch[index].astype(float)
-    position = _position(case.path, theta_2, branch)
-    state = case.state(case.path, theta_2, position, branch, omega_2, alpha_2, moving=moving)
-    found = kinematics(case, state, names)
+    case, branch = Case.of(scene, at.bar), at.branch[index].astype(float)
+    position = _position(case.path, q, branch)
+    state = case.state(case.path, q, position, branch, speed, acceleration, moving=moving)
+    found = kinematics(case, state, names) | of_command(case, position, state, q)
     held = np.zeros(len(index), dtype=bool)
     if moving:
         actions = Actions(state, case.bodies)
         for pin in {pin for term in case.terms for pin in term.dry_pins}:
-            held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (values(omega_2) == 0.0)
-        dynamics = case.dynamics(state, alpha_2)
+            held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (values(speed) == 0.0)
+        dynamics = case.dynamics(state, acceleration)
         found |= {**dynamics.pins._asdict(), case.names.value: dynamics.drive}
         found["power"] = dynamics.drive * case.drive_speed(state)
-        found["drive_condition"] = case.drive_condition(state._replace(at=position))
+        found["drive_condition"] = case.drive_condition(state)
     return {name: found[name] for name in names}, held
 
 
-def _position(path: Path, theta_2: Any, branch: Array) -> Position:
+def _position(path: Path, q: Any, branch: Array) -> Position:
     """Compute the positions, whose directions have the slopes of sines and cosines.
 
     Those of the tangent of a half angle, which has no bound, lose every digit half a turn from where it is zero.
     """
     d, a, *_, E1, E2 = path.lengths
-    h = 0.5 * (theta_2 - path.theta_1)
+    h = 0.5 * (q - path.theta_1)
     s, k = np.sin(h), np.cos(h)
+    if path.bar == 4:  # of half a turn less
+        s, k = -k, s
     sloped = (s * s, k * k, s * k, E1 + 4.0 * a * d * (k * k), E2 + 4.0 * a * d * (s * s))
-    plain = path.half_angle(theta_2)
+    plain = path.half_angle(q)
     half = HalfAngle(*(Sloped(values(x), slopes(same)) for x, same in zip(plain, sloped, strict=True)))
-    at = path.position(theta_2, half, branch)
-    at = at._replace(u2=Sloped(values(at.u2), slopes(polar(1.0, theta_2))))
+    at = path.position(q, half, branch)
+    at = at._replace(u2=Sloped(values(at.u2), slopes(polar(1.0, q))))
     return with_parallel_pairs(at, *parallel_pairs(path.lengths, half, branch)) if path.may_stay_parallel else at

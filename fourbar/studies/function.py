@@ -8,14 +8,14 @@ import numpy as np
 
 from fourbar.errors import DependencyError, InputError, expect, installing
 from fourbar.evaluation.case import Case, undecided
-from fourbar.evaluation.stages import kinematics
+from fourbar.evaluation.stages import kinematics, of_command
 from fourbar.formulas.arithmetic import namespace
 from fourbar.formulas.mobility import change_points
 from fourbar.quantities import OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, STAGE_OF, is_scalar
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
-from fourbar.studies.keys import THETA_2, at_place, entries, refusal, with_numbers
+from fourbar.studies.keys import angle_key, at_place, entries, refusal, with_numbers
 
 NO_DIGIT_LEFT, UNDECIDED = 8.0, 16.0
 """Times the spacing of the numbers at 1: of |sin mu|, and of what decides whether the loop closes, as `solve` has them
@@ -63,16 +63,18 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     [-0.009, -0.011, nan]
     """
     expect("scene", scene, Scene)
-    known = entries(scene)
+    for name, names in (("keys", keys), ("quantities", quantities)):
+        expect(name, names, tuple, list)
+        if len(set(names)) < len(names) or not names:
+            raise InputError(name, names, "must be one or more, each once")
+    known, theta, motion = entries(scene), angle_key(scene), scene.motion
     for key in keys:
-        if key not in (*known, THETA_2):
-            raise refusal(key, "a key", [*known, THETA_2])
+        if key not in (*known, theta):
+            raise refusal(key, "a key", [*known, theta])
     wanted = _wanted(scene, quantities, keys)
     _refuse_untraceable(scene, keys)
-    positions = None if THETA_2 in keys else command(scene)
-    single = positions is None or isinstance(scene.motion.theta_2, float)
-    branch = float(scene.motion.branch)
-    shape = () if single else positions.theta_2.shape
+    stated = None if theta in keys else command(scene)
+    shape = () if stated is None or isinstance(motion.angle, float) else stated.angle.shape
 
     def of_numbers(*values: Any) -> dict[str, Any]:
         given = _given(keys, values, shape)
@@ -83,14 +85,14 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
                 inside = xp.isfinite(value) if entry is None else entry.holds(value)
                 own = None if entry is None else at_place(scene, entry.place)
                 holds, numbers[key] = holds & inside, xp.where(inside, value, 1.0 if own is None else own)
-            theta_2 = numbers.pop(THETA_2, None)
-            changed = with_numbers(scene, numbers)
-            speed, acceleration = changed.motion.omega_2 or 0.0, changed.motion.alpha_2
-            if positions is not None:
-                theta_2 = _like(positions.theta_2.reshape(shape), given)
-                if scene.motion.law is not None:
-                    speed, acceleration = (_like(x, given) for x in (positions.omega_2, positions.alpha_2))
-            found, ok = _evaluated(Case.of(changed), theta_2 + zero, (speed, acceleration, branch), given, wanted)
+            q, changed = numbers.pop(theta, None), with_numbers(scene, numbers)
+            speed, acceleration = changed.motion.speed, changed.motion.acceleration
+            if stated is not None:
+                q = _like(stated.angle.reshape(shape), given)
+                if motion.law is not None:
+                    speed, acceleration = (_like(x, given) for x in (stated.speed, stated.acceleration))
+            case, moved = Case.of(changed, motion.bar), (0.0 if speed is None else speed, acceleration)
+            found, ok = _evaluated(case, q + zero, float(motion.branch), moved, given, wanted)
             ok = ok & holds
             parts = {
                 name: (value + zero,) if is_scalar(name) else (value.real + zero, value.imag + zero)
@@ -104,14 +106,14 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
 
 
 def _evaluated(
-    case: Case, theta_2: Any, motion: tuple[Any, Any, float], given: Given, wanted: dict[str, str]
+    case: Case, q: Any, branch: float, motion: tuple[Any, Any], given: Given, wanted: dict[str, str]
 ) -> tuple[dict[str, Any], Any]:
     """Evaluate quantities, and where they have a value; elsewhere they are finite, as in their derivatives.
 
     A loop that does not close is evaluated with a right angle at B in its place, its sides those of the bars.
     """
-    xp, path, (speed, acceleration, branch) = given.xp, case.path, motion
-    lengths, half = path.lengths, path.half_angle(theta_2)
+    xp, path, (speed, acceleration) = given.xp, case.path, motion
+    lengths, half = path.lengths, path.half_angle(q)
     square = 2.0 * lengths.b * lengths.c
     size, part = 4.0 * lengths.a * lengths.d, UNDECIDED * given.eps
     least = NO_DIGIT_LEFT * given.eps * square
@@ -120,9 +122,9 @@ def _evaluated(
         ok = ok & ~undecided(factor, constant, size, part)
     half = half._replace(outer=xp.where(ok, half.outer, square), inner=xp.where(ok, half.inner, square))
     stages = set(wanted.values())
-    at = path.position(theta_2, half, branch)
-    state = case.state(path, theta_2, at, branch, speed, acceleration, moving=stages != {"position"})
-    found = kinematics(case, state, wanted.keys())
+    at = path.position(q, half, branch)
+    state = case.state(path, q, at, branch, speed, acceleration, moving=stages != {"position"})
+    found = kinematics(case, state, wanted.keys()) | of_command(case, at, state, q)
     if "force" in stages:
         done = case.dynamics(state, acceleration)
         found |= {**done.pins._asdict(), "torque": done.drive, "power": done.drive * case.drive_speed(state)}
@@ -196,10 +198,10 @@ def _wanted(scene: Scene, quantities: Iterable[str], keys: Sequence[str]) -> dic
             close = get_close_matches(str(name), stages, 1, 0.0)
             raise InputError("quantities", name, f'is none of a function\'s; did you mean "{close[0]}"?')
     wanted = {name: stages[name] for name in quantities}
-    motion = scene.motion
-    at_rest = motion.omega_2 is None and motion.law is None and "motion.omega_2" not in keys
+    motion, omega = scene.motion, f"motion.{scene.motion.names[1]}"
+    at_rest = motion.speed is None and motion.law is None and omega not in keys
     if at_rest and set(wanted.values()) - {"position"}:
-        raise InputError("motion.omega_2", None, "is needed for more than positions")
+        raise InputError(omega, None, "is needed for more than positions")
     return wanted
 
 
@@ -219,10 +221,11 @@ def _refuse_untraceable(scene: Scene, keys: Sequence[str]) -> None:
             raise InputError(f"loads.{index}.table", load.table.theta_2, "must cover a whole turn to be traced")
     if motion.through == "follow" and change_points(scene.linkage):
         raise InputError("motion.through", motion.through, 'cannot be traced through change points: "sign" can')
-    if THETA_2 in keys:
+    theta = angle_key(scene)
+    if theta in keys:
         if motion.law is not None:
-            raise InputError(THETA_2, "a key", "is that of the scene's motion law")
-    elif isinstance(motion.theta_2, FromLimit):
-        raise InputError(THETA_2, motion.theta_2, "is evaluated in many digits, which cannot be traced")
-    elif motion.law is None and motion.theta_2 is None:
-        raise InputError(THETA_2, None, "depends on the linkage: state it, or make it one of the keys")
+            raise InputError(theta, "a key", "is that of the scene's motion law")
+    elif isinstance(motion.angle, FromLimit):
+        raise InputError(theta, motion.angle, "is evaluated in many digits, which cannot be traced")
+    elif motion.law is None and motion.angle is None:
+        raise InputError(theta, None, "depends on the linkage: state it, or make it one of the keys")

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN
-from fourbar.formulas.path import path
 from fourbar.quantities import JAMMED
 from fourbar.studies.circuit_curve import NOTHING, SAMPLES, Array, CircuitCurve, RestPosition
 
@@ -35,8 +34,7 @@ def with_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
     for bar, chosen in ((2, along), (4, ~along)):
         if chosen.any():
             part = curve.state(points[chosen])
-            # the path of bar 4 takes the drive's sine from directions
-            case = curve.case._replace(drive_bar=bar, drive=None, path=path(curve.lengths, curve.theta_1, 4))
+            case = curve.case._replace(drive_bar=bar, drive=None)
             found = case.dynamics(part, 0.0, side)
             Q = -found.drive * part.k[bar - 2]
             result[chosen] = Q if found.status is None else np.where(found.status == JAMMED, -side * np.inf, Q)

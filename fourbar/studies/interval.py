@@ -9,9 +9,9 @@ import numpy as np
 from fourbar.errors import InputError, LimitError
 from fourbar.formulas.mobility import TURN, change_points, intervals, limit_positions, turns_fully
 from fourbar.quantities import NOT_ASSEMBLED
-from fourbar.scene import Scene, command
+from fourbar.scene import Scene, command, require_input
 from fourbar.solve import solve
-from fourbar.studies.keys import THETA_2, at_place, entries
+from fourbar.studies.keys import at_place, entries
 from fourbar.studies.study import vary
 
 DISTANCE = math.radians(1.0)
@@ -26,6 +26,7 @@ KNOWN = ("gravity", "viscous", "springs", "flywheel", "load")
 def require(scene: Scene) -> None:
     """InputError for what has no proven extremes."""
     motion = scene.motion
+    require_input(scene, "the search for proven extremes")
     if motion.free is not None or motion.law is not None:
         raise InputError("motion", "a free motion or a motion law", "has no interval of theta_2 at one speed")
     if motion.omega_2 is None:
@@ -93,7 +94,7 @@ def require_all(scene: Scene, parts: tuple[tuple[float, float], ...]) -> None:
     }
     along = [first + 0.5 * TURN * turn for turn in range(-4, 5)]
     inside = [at for at in along if any(low <= at <= high for low, high in parts)]
-    values[THETA_2] = np.array([*itertools.chain(*parts), *inside])
+    values["motion.theta_2"] = np.array([*itertools.chain(*parts), *inside])
     apart = (solve(vary(scene, values), "position").status_code == NOT_ASSEMBLED).any(axis=1)
     if apart.any():
         share = 100.0 * float(apart[len(corners) :].mean())

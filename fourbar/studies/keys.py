@@ -15,7 +15,8 @@ from fourbar.formulas.arithmetic import namespace, polar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 
-THETA_2 = "motion.theta_2"
+ANGLE_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4")
+"""Of the commanded angle."""
 SAME_FOR_ALL = (
     *("title", "source", "drive", "bar", "branch", "through", "free", "law", "frame", "table", "picture"),
     *("from", "to", "steps", "limit", "offset"),
@@ -76,7 +77,7 @@ def _of_ends(key: str, place: Place) -> dict[str, SceneNumber]:
 
 
 def entries(scene: Scene) -> dict[str, SceneNumber]:
-    """List the numbers of a scene that a study varies, lengths first, by key; motion.theta_2 is not among them."""
+    """List the numbers of a scene that a study varies, lengths first, by key; the commanded angle is not among them."""
     found = {"lengths.ground": SceneNumber(("linkage", "ground"), "m", POSITIVE)}
     bars = [BAR_NAMES[number] for number in MOVING_BARS]
     found |= {f"lengths.{name}": SceneNumber(("linkage", name, "length"), "m", POSITIVE) for name in bars}
@@ -87,8 +88,9 @@ def entries(scene: Scene) -> dict[str, SceneNumber]:
         found[f"bars.{name}.inertia"] = SceneNumber((*own, "inertia"), "kg m^2", AT_LEAST_ZERO)
         found |= _pair(f"bars.{name}.centre", (*own, "centre"), "m")
     if scene.motion.law is None:
-        found["motion.omega_2"] = SceneNumber(("motion", "omega_2"), "rad/s")
-        found["motion.alpha_2"] = SceneNumber(("motion", "alpha_2"), "rad/s^2")
+        _, omega, alpha = scene.motion.names
+        found[f"motion.{omega}"] = SceneNumber(("motion", omega), "rad/s")
+        found[f"motion.{alpha}"] = SceneNumber(("motion", alpha), "rad/s^2")
     if scene.drive is not None:
         found |= _of_ends("drive", ("drive",))
     for index, load in enumerate(scene.loads):
@@ -101,6 +103,11 @@ def entries(scene: Scene) -> dict[str, SceneNumber]:
     for index, effect in enumerate(scene.effects):
         found |= _of_effect(effect, f"effects.{effect.key}", ("effects", index))
     return found
+
+
+def angle_key(scene: Scene) -> str:
+    """Return the key of the commanded angle."""
+    return f"motion.{scene.motion.names[0]}"
 
 
 def refusal(key: str, value: object, known: list[str]) -> InputError:

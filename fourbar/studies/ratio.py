@@ -21,7 +21,7 @@ from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import require_whole
 from fourbar.quantities import OK
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, require_input
 from fourbar.scene.motion import Sweep
 from fourbar.solution import Array
 from fourbar.solve import solve
@@ -91,6 +91,7 @@ def ratio(scene: Scene, degree: int = MOST) -> GearRatio:
         does not assemble, or stands at a limit of the input, somewhere in the range.
     """
     expect("scene", scene, Scene)
+    require_input(scene, "the ratio over theta_2")
     degree = require_whole("degree", degree, range(1, MOST + 1), f"must be 1 to {MOST}")
     for term in scene.effects:
         if term.loaded_pins:
@@ -133,7 +134,7 @@ def _over_range(scene: Scene) -> Command:
     else:
         low, high = interval(replace(scene, drive_bar=2, drive=None))[0][0]
     at = command(replace(scene, motion=replace(scene.motion, theta_2=Sweep(low, high, SAMPLES), free=None)))
-    return at._replace(omega_2=scene.motion.omega_2 or 0.0)
+    return at._replace(speed=scene.motion.speed or 0.0)
 
 
 def _torque(case: Case, state: State, alpha_2: Any) -> Array:

@@ -13,7 +13,7 @@ from fourbar.scene import Scene, command
 from fourbar.solution import Array, parts, values_of
 from fourbar.solve import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
-from fourbar.studies.keys import LEFT_OUT, THETA_2, at_place, entries, left_out, refusal
+from fourbar.studies.keys import LEFT_OUT, angle_key, at_place, entries, left_out, refusal
 from fourbar.studies.study import Study, vary
 from fourbar.writing import between, data_frame, extent, html_table, listed
 
@@ -194,7 +194,7 @@ def _members(scene: Scene, samples: int, seed: int) -> Study:
         change = norm.ppf(inside) if tolerance.sigma else 2.0 * column - 1.0
         numbers[tolerance.key] = at_place(scene, entry.place) + tolerance.width * change
     if scene.motion.law is None:
-        numbers[THETA_2] = command(scene).theta_2
+        numbers[angle_key(scene)] = command(scene).angle
     return vary(scene, numbers)
 
 
@@ -202,7 +202,7 @@ def _columns(
     study: Study, scene: Scene, samples: int, closes: NDArray[np.bool_]
 ) -> Iterator[tuple[slice, NDArray[np.intp]]]:
     """Blocks of positions, and their indices: after that at which the motion begins where an effect counts from it."""
-    n, first = study.at.theta_2.shape[1], int(np.argmax(closes))
+    n, first = study.at.angle.shape[1], int(np.argmax(closes))
     begins = [first] if scene.counts_turns else []
     size = max(1, AT_ONCE // samples)
     for start in range(0, n, size):

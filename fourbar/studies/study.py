@@ -12,13 +12,13 @@ from fourbar.evaluation.blocks import each, evaluation, is_compiled, keep, posit
 from fourbar.evaluation.case import BLOCK, Case
 from fourbar.evaluation.stages import FORCE
 from fourbar.formulas.mobility import on_smooth_path
-from fourbar.formulas.position import loop
+from fourbar.formulas.position import lengths_read_from, loop
 from fourbar.quantities import ANGLES, INVALID
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.solution import Array, Solution, unwrap
-from fourbar.solve import arrays, requested, solved
-from fourbar.studies.keys import THETA_2, entries, placed, refusal, with_numbers
+from fourbar.solution import Array, Solution
+from fourbar.solve import arrays, requested, solved, unwrap_angles
+from fourbar.studies.keys import ANGLE_KEYS, angle_key, entries, placed, refusal, with_numbers
 from fourbar.writing import extent, listed
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Study:
     invalid: NDArray[np.bool_]
     """The members that a scene would refuse, (m,)."""
     at: Command
-    """theta_2 and branch (m, n), omega_2 and alpha_2 of the scene, or (m, 1)."""
+    """Commanded angle and branch (m, n), its speed and acceleration those of the scene, or (m, 1)."""
 
     def __len__(self) -> int:
         return len(self.invalid)
@@ -53,12 +53,12 @@ class Study:
         self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0, compiled: bool | None = None
     ) -> Solution:
         """Return what `fourbar.solve` does for a study: every quantity as (m, n) or (m, n, 2)."""
-        at, shape = self.at, self.at.theta_2.shape
-        wanted, names = requested(self.scene, shape, at.omega_2, stage, out)
+        at, shape = self.at, self.at.angle.shape
+        wanted, names = requested(self.scene, shape, at, stage, out)
         result = arrays(names, shape, out)
         code = np.zeros(shape, dtype=np.uint8)
         with np.errstate(all="ignore"):
-            whole = Case.of(self._members(slice(0, 1), 1, self.scene))
+            whole = Case.of(self._members(slice(0, 1), 1, self.scene), at.bar)
         quick = is_compiled(whole, wanted, code.size, compiled)
         size = BLOCK if quick else positions_at_once(wanted)
 
@@ -66,14 +66,12 @@ class Study:
             begins = self._started(rows) if wanted >= FORCE else self.scene
             for columns in _parts(shape[1], size):
                 block = (rows.stop - rows.start, columns.stop - columns.start)
-                case = Case.of(self._members(rows, block[1], begins))._replace(side=side)
+                case = Case.of(self._members(rows, block[1], begins), at.bar)._replace(side=side)
                 where = self._command(rows, columns)
                 run = evaluation(quick and not case.path.may_stay_parallel)
                 found = run(case, where, (...,), wanted, names)
                 keep(case, found, result, code, (rows, columns), block)
-            for name in ANGLES:
-                if name in result:
-                    unwrap(result[name][rows])
+            unwrap_angles({name: result[name][rows] for name in ("theta_2", *ANGLES) if name in result}, at.bar)
 
         each(evaluate, list(_parts(len(self), max(1, size // shape[1]))), at_once=quick)
         code[self.invalid] = INVALID
@@ -96,7 +94,8 @@ class Study:
                 return value
             return _repeated(value[rows, 0], count) if value.shape[1] == 1 else value[rows, columns].ravel()
 
-        return Command(*(flat(value) for value in self.at[:4]))
+        angle, branch, speed, acceleration = (flat(value) for value in self.at[:4])
+        return Command(angle, branch, speed, acceleration, bar=self.at.bar)
 
     def _members(self, rows: slice, count: int, scene: Scene) -> Scene:
         """Make the scene of some members whose numbers are arrays, each repeated for `count` positions."""
@@ -111,20 +110,20 @@ class Study:
             return self.scene
         count = rows.stop - rows.start
         first = np.full(count, -1)
-        for columns in _parts(self.at.theta_2.shape[1], BLOCK):
+        for columns in _parts(self.at.angle.shape[1], BLOCK):
             width = columns.stop - columns.start
-            half, _ = Case.of(self._members(rows, width, self.scene)).half_angle(
-                self._command(rows, columns).theta_2, None
+            half, _ = Case.of(self._members(rows, width, self.scene), self.at.bar).half_angle(
+                self._command(rows, columns).angle, None
             )
             assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(count, width)
             here = (first < 0) & assembled.any(axis=1)
             first[here] = columns.start + np.argmax(assembled, axis=1)[here]
         member = np.arange(count)
-        theta_2 = np.where(first < 0, np.nan, self.at.theta_2[rows][member, first])
+        angle = np.where(first < 0, np.nan, self.at.angle[rows][member, first])
         one_branch = np.ptp(self.at.branch[rows], axis=1) == 0
-        at = Command(np.where(one_branch, theta_2, np.nan), self.at.branch[rows, 0], 0.0, 0.0)
+        at = Command(np.where(one_branch, angle, np.nan), self.at.branch[rows, 0], 0.0, 0.0, bar=self.at.bar)
         scene = self.scene
-        counted = Case.of(self._members(rows, 1, scene)).started(at).terms[len(scene.loads) :]
+        counted = Case.of(self._members(rows, 1, scene), at.bar).started(at).terms[len(scene.loads) :]
         for index, turns in _turns(counted).items():
             scene = placed(scene, ("effects", index, "turns"), turns)
         return scene
@@ -150,9 +149,9 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     Parameters
     ----------
     values : arrays of one length m, or single numbers, SI and rad, by keys as in the scene file: lists by index
-        ("loads.0.moment"), pairs likewise ("bars.coupler.centre.0"). "motion.theta_2" is (n,), for all members, or
-        (m, n); a scene that states no angles needs it. What the scene leaves out (the inertia of a uniform bar, its
-        centre at mid-bar) follows the length of each member.
+        ("loads.0.moment"), pairs likewise ("bars.coupler.centre.0"). "motion.theta_2" (or theta_3, theta_4, where that
+        is commanded) is (n,), for all members, or (m, n); a scene that states no angles needs it. What the scene leaves
+        out (the inertia of a uniform bar, its centre at mid-bar) follows the length of each member.
 
     Raises
     ------
@@ -169,12 +168,12 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     expect("values", values, Mapping)
     if scene.motion.free is not None:
         raise InputError("motion.free", "a free motion", "is integrated for one linkage; a study prescribes theta_2")
-    known = entries(scene)
-    given = {key: _numbers(key, value, [*known, THETA_2]) for key, value in values.items()}
-    angles = _angles(scene, given)
-    sizes = {key: array.size for key, array in given.items() if key != THETA_2 and array.size != 1}
+    known, theta = entries(scene), angle_key(scene)
+    given = {key: _numbers(key, value, [*known, theta]) for key, value in values.items()}
+    angles = _angles(scene, given, theta)
+    sizes = {key: array.size for key, array in given.items() if key != theta and array.size != 1}
     if angles.shape[0] != 1:
-        sizes[THETA_2] = angles.shape[0]
+        sizes[theta] = angles.shape[0]
     m = next(iter(sizes.values()), 1)
     for key, size in sizes.items():
         if size != m:
@@ -185,16 +184,16 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     for key, array in numbers.items():
         invalid = invalid | ~known[key].holds(array)
     numbers = {key: np.where(invalid, np.nan, array) for key, array in numbers.items()}
-    theta_2 = np.broadcast_to(angles, (m, angles.shape[1]))
+    angle = np.broadcast_to(angles, (m, angles.shape[1]))
     motion: Any = scene.motion if scene.motion.law is None else command(scene)
-    omega_2, alpha_2 = (
-        numbers.pop(f"motion.{name}")[:, None] if f"motion.{name}" in numbers else getattr(motion, name)
-        for name in ("omega_2", "alpha_2")
+    speed, acceleration = (
+        numbers.pop(f"motion.{name}")[:, None] if f"motion.{name}" in numbers else number
+        for name, number in zip(scene.motion.names[1:], (motion.speed, motion.acceleration), strict=True)
     )
     if scene.motion.law is not None:
-        omega_2, alpha_2 = (np.broadcast_to(value, theta_2.shape) for value in (omega_2, alpha_2))
+        speed, acceleration = (np.broadcast_to(value, angle.shape) for value in (speed, acceleration))
     branch = _branches(scene, numbers, angles, m)
-    return Study(scene, numbers, invalid, Command(theta_2, branch, omega_2, alpha_2))
+    return Study(scene, numbers, invalid, Command(angle, branch, speed, acceleration, bar=scene.motion.bar))
 
 
 def _branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:
@@ -202,15 +201,15 @@ def _branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int)
     motion, shape = scene.motion, (m, angles.shape[1])
     own = {key: array for key, array in numbers.items() if key in LENGTHS}
     if motion.through == "follow" and not own and len(angles) == 1:
-        return np.broadcast_to(on_smooth_path(scene.linkage, angles[0], motion.branch), shape)
+        return np.broadcast_to(on_smooth_path(scene.linkage, angles[0], motion.branch, motion.bar), shape)
     branch = np.full(shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
         lengths = with_numbers(scene, own).linkage.lengths
-        _, _, _, _, E1, E2 = loop(*lengths)
+        _, _, _, _, E1, E2 = loop(*lengths_read_from(motion.bar, lengths))
         size = NEAR_A_CHANGE_POINT * sum(lengths) ** 2
         for member in np.flatnonzero(np.broadcast_to((np.abs(E1) <= size) | (np.abs(E2) <= size), (m,))):
             linkage = with_numbers(scene, {key: float(array[member]) for key, array in own.items()}).linkage
-            branch[member] = on_smooth_path(linkage, angles[member % len(angles)], motion.branch)
+            branch[member] = on_smooth_path(linkage, angles[member % len(angles)], motion.branch, motion.bar)
     return branch
 
 
@@ -224,9 +223,9 @@ def _numbers(key: str, value: Any, known: list[str]) -> Array:
         raise InputError(key, "a ragged list", "must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or array.size == 0:
         raise InputError(key, _shown(value), "must be an array of numbers, at least one")
-    most = 2 if key == THETA_2 else 1
+    most = 2 if key in ANGLE_KEYS else 1
     if array.ndim > most:
-        allowed = "must have the shape (n,) or (m, n)" if key == THETA_2 else "must have the shape (m,)"
+        allowed = "must have the shape (n,) or (m, n)" if most == 2 else "must have the shape (m,)"
         raise InputError(key, f"shape {array.shape}", allowed)
     return array.astype(float)
 
@@ -236,13 +235,13 @@ def _shown(value: Any) -> object:
     return f"{type(value).__name__} of shape {value.shape}" if isinstance(value, np.ndarray) else value
 
 
-def _angles(scene: Scene, given: Mapping[str, Array]) -> Array:
-    """theta_2 of all members, (1, n) or (m, n)."""
+def _angles(scene: Scene, given: Mapping[str, Array], key: str) -> Array:
+    """Commanded angles of all members, (1, n) or (m, n)."""
     motion = scene.motion
-    if THETA_2 in given:
+    if key in given:
         if motion.law is not None:
-            raise InputError(THETA_2, "angles", "are those of the scene's motion law")
-        return np.atleast_2d(given[THETA_2])
-    if motion.law is None and (motion.theta_2 is None or isinstance(motion.theta_2, FromLimit)):
-        raise InputError(THETA_2, motion.theta_2, "depends on the linkage; a study states it: (n,) or (m, n) angles")
-    return command(scene).theta_2[None, :]
+            raise InputError(key, "angles", "are those of the scene's motion law")
+        return np.atleast_2d(given[key])
+    if motion.law is None and (motion.angle is None or isinstance(motion.angle, FromLimit)):
+        raise InputError(key, motion.angle, "depends on the linkage; a study states it: (n,) or (m, n) angles")
+    return command(scene).angle[None, :]

@@ -289,4 +289,4 @@ def test_a_command_on_no_branch_is_refused(wrong: float) -> None:
     at = fourbar.command(scene)
     for row in (np.array([wrong]), np.array([1, wrong])):
         with pytest.raises(fourbar.InputError, match=r"at\.branch = .*must be \+1"):
-            fourbar.solve(scene, at=at._replace(theta_2=at.theta_2[: len(row)], branch=row))
+            fourbar.solve(scene, at=at._replace(angle=at.theta_2[: len(row)], branch=row))

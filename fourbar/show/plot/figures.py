@@ -10,7 +10,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar.scene import Scene
+from fourbar.scene import Scene, require_input
 from fourbar.show.between import between
 from fourbar.show.plot import curves, freebody, hodograph, linkage, studies
 from fourbar.show.plot.labels import Labels
@@ -114,6 +114,7 @@ def _painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[f
         if not isinstance(value, str) or value not in allowed:
             raise InputError(key, value, "must be one of " + ", ".join(allowed))
     painter, size, dynamic = FIGURES[figure]
+    require_input(scene, "a figure")
     if dynamic and scene.motion.omega_2 is None and not over_time(scene):
         raise InputError("motion.omega_2", None, f"is needed for the figure {figure!r}; {STATIC}")
     if figure == "energy" and scene.motion.free is None:

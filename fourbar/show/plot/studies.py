@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import InputError
+from fourbar.scene import require_input
 from fourbar.show.influence import influences, largest_value, ranked, shown_quantities
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
@@ -56,6 +57,7 @@ def draw_tolerances(found: Tolerances, path: str | Path, units: Conversion = SI)
     """
     target = Path(path)
     kind = format_of(target)
+    require_input(found.scene, "a picture of bands")
     if len(found.theta_2) < 2:
         raise InputError("motion.theta_2", "one position", "a picture of bands needs a sweep")
     with matplotlib_style():

@@ -12,7 +12,7 @@ from fourbar.evaluation.case import state_at
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, PINS
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, require_input
 from fourbar.scene.motion import FromLimit
 from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve
@@ -133,13 +133,13 @@ def sweep_command(scene: Scene) -> Command:
     own = command(scene)
     if len(own.theta_2) > 1:
         order = np.argsort(own.theta_2, kind="stable")
-        return own._replace(theta_2=own.theta_2[order], branch=own.branch[order])
+        return own._replace(angle=own.theta_2[order], branch=own.branch[order])
     assert motion.theta_2 is None or isinstance(motion.theta_2, (float, FromLimit, np.ndarray))
     wide = command(replace(scene, motion=replace(motion, theta_2=None)))
     # the same position may lie whole turns away from the default range
     turns = np.round((0.5 * (wide.theta_2[0] + wide.theta_2[-1]) - own.theta_2) / math.tau)
     theta_2, first = np.unique(np.concatenate([wide.theta_2, own.theta_2 + turns * math.tau]), return_index=True)
-    return wide._replace(theta_2=theta_2, branch=np.concatenate([wide.branch, own.branch])[first])
+    return wide._replace(angle=theta_2, branch=np.concatenate([wide.branch, own.branch])[first])
 
 
 def common_position(scenes: "list[Scene]") -> float | None:
@@ -168,6 +168,7 @@ def view(scene: Scene, position: float | None = None) -> View:
     ------
     NotAssembledError : no position of the sweep assembles, or the one named does not.
     """
+    require_input(scene, "a picture")
     if over_time(scene):
         return _through_time(scene, position)
     where = sweep_command(scene)

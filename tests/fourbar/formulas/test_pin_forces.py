@@ -216,7 +216,7 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(pi
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_the_sine_of_a_drive_is_that_of_two_directions(drive_bar: int) -> None:
     """Of the two bars that are not driven."""
-    at = command(5)._replace(theta_2=np.linspace(0.1, 6.0, 5))
+    at = command(5)._replace(angle=np.linspace(0.1, 6.0, 5))
     s, found = fourbar.solve(example(), "position", at=at), state_of(example().linkage, at.theta_2, 1).at
     angle = {2: at.theta_2, 3: s.theta_3, 4: s.theta_4}
     one, other = (k for k in (2, 3, 4) if k != drive_bar)

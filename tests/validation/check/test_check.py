@@ -38,6 +38,8 @@ Numbers = dict[str, np.ndarray]
 def right(scene: Scene, **changed: object) -> Numbers:
     """The right numbers at some positions; the command may be changed."""
     at = command(scene)
+    fields = {"theta_2": "angle", "omega_2": "speed", "alpha_2": "acceleration"}
+    changed = {fields.get(name, name): value for name, value in changed.items()}
     at = Command(at.theta_2[::EVERY], at.branch[::EVERY], at.omega_2, at.alpha_2)._replace(**changed)
     solution = solve(scene, at=at)
     assert np.all(solution.status_code == OK)

@@ -139,14 +139,14 @@ class Elsewhere(Right):
     name = "answers another motion"
 
     def answer(self, scene: Any, at: Any) -> Answer:
-        return super().answer(scene, at._replace(omega_2=0.0))
+        return super().answer(scene, at._replace(speed=0.0))
 
 
 class Nowhere(Right):
     name = "a motion of no positions"
 
     def answer(self, scene: Any, at: Any) -> Answer:
-        return Answer(self.name, "exact", at._replace(theta_2=at.theta_2[:0], branch=at.branch[:0]), np.ones(0, bool))
+        return Answer(self.name, "exact", at._replace(angle=at.theta_2[:0], branch=at.branch[:0]), np.ones(0, bool))
 
 
 class Evidence(Right):

@@ -94,7 +94,7 @@ def answered(name: str, case: Scene, at: Command | None = None) -> Any:
 def failures(name: str, case: Scene, every: int = 1) -> list[tuple[str, str]]:
     """Quantities on which an engine and the formulas disagree, or its refusal."""
     at = command(case)
-    at = at._replace(theta_2=at.theta_2[::every], branch=at.branch[::every])
+    at = at._replace(angle=at.theta_2[::every], branch=at.branch[::every])
     answer = answered(name, case, at)
     if answer.refusal is not None:
         return [("refusal", answer.refusal)]
@@ -398,7 +398,7 @@ def test_a_thousand_turns_take_no_position(name: str) -> None:
 def test_a_position_before_leaves_nothing_behind(name: str) -> None:
     fast = Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.array([1.0, 2.0]), 3e4, 1e9))
     whole, at = answered(name, fast).quantities, command(fast)
-    alone = answered(name, fast, at._replace(theta_2=at.theta_2[1:], branch=at.branch[1:])).quantities
+    alone = answered(name, fast, at._replace(angle=at.theta_2[1:], branch=at.branch[1:])).quantities
     for quantity in ("omega_3", "alpha_4", "F12", "F43", "torque"):
         np.testing.assert_array_equal(whole[quantity][1:], alone[quantity], err_msg=quantity)
         assert np.isfinite(alone[quantity]).all(), quantity

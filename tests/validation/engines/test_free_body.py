@@ -256,7 +256,10 @@ def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None
         inertia(motion._replace(omega=dict.fromkeys(motion.omega, 0.0 * motion.omega[2])), wrenches)
 
     faults: dict[str, tuple[Callable[..., Any], set[str]]] = {
-        "close": (lambda linkage, theta_2, branch: close(linkage, theta_2, -branch), {"theta_3", "theta_4", "torque"}),
+        "close": (
+            lambda linkage, theta_2, branch, bar: close(linkage, theta_2, -branch, bar),
+            {"theta_3", "theta_4", "torque"},
+        ),
         "_matrix": (arm_turned, {"torque"}),
         "_add_inertia": (still, {"F12", "F32", "F43", "F14", "torque"}),
         "acting": (lambda scene, motion: acting(replace(scene, loads=()), motion), {"F43", "torque"}),

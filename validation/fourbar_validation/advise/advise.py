@@ -94,7 +94,7 @@ def looked_at(scene: Scene) -> Command:
         return own
     between = np.linspace(own.theta_2.min(), own.theta_2.max(), BETWEEN + 1)
     theta_2 = np.union1d(own.theta_2, between)
-    return own._replace(theta_2=theta_2, branch=np.full(theta_2.shape, own.branch[0], dtype=np.int8))
+    return own._replace(angle=theta_2, branch=np.full(theta_2.shape, own.branch[0], dtype=np.int8))
 
 
 class _CheapestSearch:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,12 +167,12 @@ def _offset(judge: Judge) -> Iterator[Mistake]:
     def residuals(offsets: Array, rows: NDArray[np.int_]) -> Array:
         """One line for each offset."""
         at, m = judge.at, len(offsets)
-        many = {
+        many: dict[str, Any] = {
             name: np.tile(values[rows], m)
-            for name in ("theta_2", "branch", "omega_2", "alpha_2")
+            for name in ("angle", "branch", "speed", "acceleration")
             if np.ndim(values := getattr(at, name)) == 1
         }
-        many["theta_2"] += np.repeat(offsets, len(rows))
+        many["angle"] += np.repeat(offsets, len(rows))
         moved = solve(judge.scene, judge.stage, at=at._replace(**many, remainder=None, time=None))
         parts = []
         for key in keys:
@@ -200,7 +201,7 @@ def _offset(judge: Judge) -> Iterator[Mistake]:
         if abs(step) < STEP**2:
             break
     offset = math.remainder(offset, 2.0 * np.pi)
-    wrong = solve(judge.scene, judge.stage, at=judge.at._replace(theta_2=judge.at.theta_2 + offset, remainder=None))
+    wrong = solve(judge.scene, judge.stage, at=judge.at._replace(angle=judge.at.theta_2 + offset, remainder=None))
     yield Mistake(
         f"the crank angle is measured from another zero: theta_2 {math.degrees(offset):+.6g} deg is what they solved",
         lambda quantity, right: None if quantity == "theta_2" else getattr(wrong, quantity, None),

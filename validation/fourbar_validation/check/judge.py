@@ -116,7 +116,7 @@ class Judge:
         if not rounding.any():
             return []
         moved = (self.at.theta_2 + shift for shift in (-rounding, rounding))
-        return [solve(self.scene, self.stage, at=self.at._replace(theta_2=x, remainder=None)) for x in moved]
+        return [solve(self.scene, self.stage, at=self.at._replace(angle=x, remainder=None)) for x in moved]
 
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
         """(error, allowed, apart) of the table where `ours` is taken for the right numbers, each (n,)."""

@@ -79,7 +79,7 @@ def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
 def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Command]]:
     """Evaluate the same formulas on the scene that the mistake amounts to."""
     yield "the other branch", scene, at._replace(branch=-at.branch)
-    yield "theta_2 read as degrees", scene, at._replace(theta_2=np.radians(at.theta_2))
+    yield "theta_2 read as degrees", scene, at._replace(angle=np.radians(at.theta_2))
     gravity = [effect for effect in scene.effects if isinstance(effect, Gravity)]
     if gravity:
         others = tuple(effect for effect in scene.effects if not isinstance(effect, Gravity))
@@ -100,11 +100,11 @@ def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Com
             turned = tuple(_reversed(other) if other is load else other for other in scene.loads)
             yield f"load {number} (bar {load.bar}) is reversed", replace(scene, loads=turned), at
     if at.omega_2 is not None:
-        yield "no inertial forces (statics)", scene, at._replace(omega_2=0.0, alpha_2=0.0)
+        yield "no inertial forces (statics)", scene, at._replace(speed=0.0, acceleration=0.0)
         if np.any(at.alpha_2):
-            yield "alpha_2 is left out", scene, at._replace(alpha_2=0.0)
+            yield "alpha_2 is left out", scene, at._replace(acceleration=0.0)
         rpm = np.pi / 30.0
-        yield "omega_2 in rev/min taken for rad/s", scene, at._replace(omega_2=at.omega_2 / rpm)
+        yield "omega_2 in rev/min taken for rad/s", scene, at._replace(speed=at.omega_2 / rpm)
     for name, bar in moving(scene):
         for text, change in BAR_MISTAKES:
             if (changed := change(bar)) is not None:

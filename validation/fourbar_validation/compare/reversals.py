@@ -122,7 +122,7 @@ def _between(scene: Scene, at: Command, pin: str, i: int, j: int, slip: float) -
     """Halve the interval between positions i and j; there, friction in the sense of either side."""
 
     def look(theta_2: float, side: int, stage: str) -> Solution:
-        where = at._replace(theta_2=np.array([theta_2]), branch=at.branch[i : i + 1], remainder=None, time=None)
+        where = at._replace(angle=np.array([theta_2]), branch=at.branch[i : i + 1], remainder=None, time=None)
         return solve(scene, stage, at=where, side=side)
 
     low, high = float(at.theta_2[i]), float(at.theta_2[j])

@@ -164,24 +164,26 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
     """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
     if answer.at is None or not {"theta_3", "theta_4"} <= answer.quantities.keys():
         return None
-    theta_2, known = answer.at.theta_2, answer.quantities
+    known = answer.quantities
+    theta_2 = known["theta_2"] if answer.at.bar != 2 else answer.at.angle
     theta = {2: theta_2, 3: known["theta_3"], 4: known["theta_4"]}
     code = np.full(len(theta_2), OK, dtype=np.uint8)
     reference = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2)
     for name in UNITS:
         if name in known:
             setattr(reference, name, known[name])
-    if answer.at.omega_2 is not None:
-        reference.omega_2, reference.alpha_2 = (
-            np.broadcast_to(np.asarray(x, float), theta_2.shape) for x in (answer.at.omega_2, answer.at.alpha_2)
-        )
+    reference.commanded = answer.at.commanded
+    if answer.at.speed is not None:
+        for name, x in (("omega", answer.at.speed), ("alpha", answer.at.acceleration)):
+            setattr(reference, f"{name}_{answer.at.bar}", np.broadcast_to(np.asarray(x, float), theta_2.shape))
         if reference.omega_3 is not None and reference.omega_4 is not None:
             _add_velocities(scene.linkage, theta, reference)
     reference.drive = scene.drive
     if scene.drive is not None:
         _add_line(scene.linkage, scene.drive, theta, reference)
     reference.sin_mu = np.sin(theta[4] - theta[3])
-    reference.condition = np.abs(reference.sin_mu)
+    one, other = (theta[bar] for bar in theta if bar != answer.at.bar)
+    reference.condition = np.abs(np.sin(other - one))
     if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
         one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits than its sine

@@ -29,12 +29,12 @@ Complex: TypeAlias = Any
 Values: TypeAlias = dict[str, Ball]
 
 
-def inputs(scene: Scene, theta_2: float) -> dict[str, float]:
-    """Collect the stored doubles that the outputs at one position depend on."""
+def inputs(scene: Scene, angle: float) -> dict[str, float]:
+    """Collect the stored doubles that the outputs at one position, of the commanded angle, depend on."""
     link, motion = scene.linkage, scene.motion
     d, a, b, c = link.lengths
-    values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle, "theta_2": theta_2}
-    values |= {"omega_2": motion.omega_2 or 0.0, "alpha_2": motion.alpha_2}
+    values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle}
+    values |= dict(zip(motion.names, (angle, motion.speed or 0.0, motion.acceleration), strict=True))
     for k in MOVING_BARS:
         bar = link.bar(k)
         values |= {f"m{k}": bar.mass, f"I{k}": inertia(bar)}
@@ -66,10 +66,10 @@ def inputs(scene: Scene, theta_2: float) -> dict[str, float]:
     return values
 
 
-def stored(scene: Scene, theta_2: float, **motion: float) -> Values:
+def stored(scene: Scene, angle: float, **motion: float) -> Values:
     """Give the inputs as balls of no radius, with another omega_2 or alpha_2 where given; set the working precision."""
     ctx.prec = BITS
-    return {name: arb(value) for name, value in (inputs(scene, theta_2) | motion).items()}
+    return {name: arb(value) for name, value in (inputs(scene, angle) | motion).items()}
 
 
 def polar(r: Ball, angle: Ball) -> Complex:
@@ -86,18 +86,28 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     """e^{i theta_2}, e^{i theta_3}, e^{i theta_4}; None where the loop does not close.
 
     With D = d e^{i theta_1} - a e^{i theta_2}, |D - b w| = c is b conj(D) w^2 - K w + b D = 0, K = D^2 + b^2 - c^2.
+    Where bar 3 is commanded D = d e^{i theta_1} - b e^{i theta_3} is what bars 2 and 4 span, where bar 4 is it is
+    d e^{i theta_1} + c e^{i theta_4}, spanned by bars 3 and 2 with bar 2 reversed.
     """
-    w2 = polar(arb(1), x["theta_2"])
-    D = polar(x["d"], x["theta_1"]) - x["a"] * w2
-    b, c = x["b"], x["c"]
+    bar, d = commanded(x), x["d"]
+    own, b, c = {2: ("a", "b", "c"), 3: ("b", "a", "c"), 4: ("c", "b", "a")}[bar]
+    own, b, c, side = x[own], x[b], x[c], 1 if bar == 4 else -1
+    w = polar(arb(1), x[f"theta_{bar}"])
+    D = polar(d, x["theta_1"]) + side * own * w
     # |D|^2 by the angle between ground and input: where they are in line it is exact, and so is a loop that just closes
-    squared = x["d"] ** 2 + x["a"] ** 2 - 2 * x["d"] * x["a"] * (x["theta_2"] - x["theta_1"]).cos()
+    squared = d**2 + own**2 + side * 2 * d * own * (x[f"theta_{bar}"] - x["theta_1"]).cos()
     K = squared + b * b - c * c
     discriminant = 4 * b * b * squared - K * K
     if discriminant < 0:  # an undecided one has no root, and what follows is NaN
         return None
-    w3 = acb(K, branch * discriminant.sqrt()) * D / (2 * b * squared)
-    return w2, w3, (b * w3 - D) / c
+    first = acb(K, branch * discriminant.sqrt()) * D / (2 * b * squared)
+    second = (b * first - D) / c
+    return (w, first, second) if bar == 2 else (first, w, second) if bar == 3 else (-second, first, w)
+
+
+def commanded(x: Values) -> int:
+    """Return the bar whose angle is among the inputs."""
+    return next(bar for bar in MOVING_BARS if f"theta_{bar}" in x)
 
 
 def linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
@@ -112,23 +122,26 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     if closed is None:
         return None
     w = dict(zip(MOVING_BARS, closed, strict=True))
-    a, b, c = x["a"], x["b"], x["c"]
-    y: Values = {"theta_3": w[3].arg(), "theta_4": w[4].arg(), "sin_mu": wedge(w[3], w[4])}
-    y["condition"] = abs(y["sin_mu"])
+    a, b, c, bar = x["a"], x["b"], x["c"], commanded(x)
+    y: Values = {f"theta_{k}": w[k].arg() for k in MOVING_BARS if k != bar}
+    sines = {2: wedge(w[3], w[4]), 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
+    y |= {"sin_mu": sines[2], "condition": abs(sines[bar])}
     if not y["condition"] > 0:  # singular; NaN where A lies on O4, about which bars 3 and 4 then turn freely
         return y
     zero = acb(0)
-    of_3, of_4 = acb(0, b) * w[3], acb(0, -c) * w[4]
+    side = {2: a * w[2], 3: b * w[3], 4: -c * w[4]}  # of the loop
 
-    def rates(known: Complex) -> list[Ball]:
-        """Solve for the rates of bars 3 and 4, where b i w3 rate_3 - c i w4 rate_4 is given."""
-        return linear([[of_3.real, of_4.real], [of_3.imag, of_4.imag]], [known.real, known.imag])
+    def rates(stated: Ball, known: Complex) -> dict[int, Ball]:
+        """Solve for the rates of the other bars, where the sum of i side rate is given."""
+        one, other = (k for k in MOVING_BARS if k != bar)
+        u, v, known = acb(0, 1) * side[one], acb(0, 1) * side[other], known - acb(0, stated) * side[bar]
+        found = linear([[u.real, v.real], [u.imag, v.imag]], [known.real, known.imag])
+        return {bar: stated, **dict(zip((one, other), found, strict=True))}
 
     # what a probe opens the loop by: slip, m/s, and jerk, m/s^2
-    omega, alpha = {2: x["omega_2"]}, {2: x["alpha_2"]}
-    omega[3], omega[4] = rates(x.get("slip", zero) - acb(0, a * omega[2]) * w[2])
-    centripetal = a * omega[2] ** 2 * w[2] + b * omega[3] ** 2 * w[3] - c * omega[4] ** 2 * w[4]
-    alpha[3], alpha[4] = rates(x.get("jerk", zero) + centripetal - acb(0, a * alpha[2]) * w[2])
+    omega = rates(x[f"omega_{bar}"], x.get("slip", zero))
+    centripetal = sum((side[k] * omega[k] ** 2 for k in MOVING_BARS), zero)
+    alpha = rates(x[f"alpha_{bar}"], x.get("jerk", zero) + centripetal)
     for k in MOVING_BARS:
         y[f"omega_{k}"], y[f"alpha_{k}"] = omega[k], alpha[k]
 
@@ -173,7 +186,6 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
     for row, (i, j) in enumerate(((2, 4), (3, 5), (6, 8), (7, 9)), start=9):
         matrix[row][i] = matrix[row][j] = arb(1)
         known.append(arb(0))
-    sines = {2: y["sin_mu"], 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
     y["drive_condition"] = abs(sines[drive_bar])
     try:
         solved = linear(matrix, known)
@@ -211,7 +223,8 @@ def _add_effects(
 ) -> None:
     """Add loads and springs, from the directions and first pins of all bars, the ground's too."""
     for k, load in enumerate(scene.loads):
-        factor = _factor(load.table, x["theta_2"]) if load.table else arb(1)
+        theta_2 = x.get("theta_2", w[2].arg())
+        factor = _factor(load.table, theta_2) if load.table else arb(1)
         axes = w[load.bar] if load.frame == "bar" else acb(1)
         f, arm = (axes * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"]) for name in ("F", "at"))
         force[load.bar] += factor * f
@@ -272,9 +285,9 @@ def response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]
     return {}
 
 
-def reference(scene: Scene, branch: int, theta_2: float) -> tuple[Values, dict[str, float]] | None:
+def reference(scene: Scene, branch: int, angle: float) -> tuple[Values, dict[str, float]] | None:
     """Compute values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
-    exact = stored(scene, theta_2)
+    exact = stored(scene, angle)
 
     def evaluate(**changed: Ball) -> Values | None:
         return outputs(scene, branch, exact | changed, scene.drive_bar)

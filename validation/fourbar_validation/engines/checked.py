@@ -9,6 +9,7 @@ import numpy as np
 
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
+from fourbar.scene.motion_law import COMMANDS
 from fourbar_validation.compare.answer import Answer, Array, Engine, WitnessError
 from fourbar_validation.compare.rows import in_words, one_line
 
@@ -48,7 +49,7 @@ class Checked:
             return Answer(self.name, setting, refusal=self._reason(answer.refusal))
         if not isinstance(answer.quantities, dict):
             raise TypeError("quantities must be a dictionary of arrays")
-        n = len(command.theta_2)
+        n = len(command.angle)
         return Answer(
             self.name,
             setting,
@@ -89,16 +90,19 @@ def _motion(at: Any, command: Command) -> Command:
     """Check the motion that a witness says it made: it must be near the one that was commanded."""
     if not isinstance(at, Command):
         raise TypeError(f"at must be the command or one made of it, not a {type(at).__name__}")
-    if not np.array_equal(at.branch, command.branch) or (at.omega_2 is None) != (command.omega_2 is None):
+    if not np.array_equal(at.branch, command.branch) or (at.speed is None) != (command.speed is None):
         raise ValueError("at must have the branch of the command, and speeds where that has")
-    n, made = len(command.theta_2), dict[str, Any]()
-    speed, acceleration = (0.0 if x is None else float(np.abs(x).max()) for x in (command.omega_2, command.alpha_2))
-    for name, size in {"theta_2": 1.0, "omega_2": speed, "alpha_2": speed**2 + acceleration}.items():
+    n, made = len(command.angle), dict[str, Any]()
+    speed, acceleration = (0.0 if x is None else float(np.abs(x).max()) for x in (command.speed, command.acceleration))
+    keys = dict(zip(("angle", "speed", "acceleration"), COMMANDS[command.bar], strict=True))
+    for name, size in {"angle": 1.0, "speed": speed, "acceleration": speed**2 + acceleration}.items():
         commanded, value = getattr(command, name), getattr(at, name)
         if commanded is None:
             continue
-        made[name] = _numbers(f"at.{name}", value, (n,) if np.ndim(value) else ())
+        made[name] = _numbers(f"at.{keys[name]}", value, (n,) if np.ndim(value) else ())
         if not np.abs(made[name] - commanded).max() <= FURTHEST * size:
-            raise ValueError(f"at.{name} is too far from the command: it must be within {FURTHEST * size:g} of it")
+            raise ValueError(
+                f"at.{keys[name]} is too far from the command: it must be within {FURTHEST * size:g} of it"
+            )
     same = all(np.array_equal(value, getattr(command, name)) for name, value in made.items())
     return command if same else command._replace(**made, remainder=None)

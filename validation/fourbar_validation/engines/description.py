@@ -119,9 +119,9 @@ def place(point: Any, ground_angle: float) -> tuple[float, float]:
 
 
 def speeds(at: Command) -> tuple[Array, Array]:
-    """omega_2 and alpha_2 of each position, (n,); an omega_2 that is not stated is 0."""
+    """omega_2 and alpha_2 of each position, or those of the commanded bar, (n,); a speed that is not stated is 0."""
     omega, alpha = (
-        np.broadcast_to(np.asarray(0.0 if x is None else x, float), at.theta_2.shape) for x in (at.omega_2, at.alpha_2)
+        np.broadcast_to(np.asarray(0.0 if x is None else x, float), at.angle.shape) for x in (at.speed, at.acceleration)
     )
     return omega, alpha
 

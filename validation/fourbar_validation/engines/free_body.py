@@ -53,27 +53,33 @@ class FreeBody:
     """Every compared quantity, all positions at once."""
 
     name = NAME
+    commands = ("theta_2", "theta_3", "theta_4")
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming an effect that it does not know."""
         if reason := unknown_effect(scene, WRENCH_OF, linear=True):
             return Answer(NAME, "exact", refusal=reason)
-        closed = close(scene.linkage, command.theta_2, command.branch)
+        if command.bar != 2 and scene.counts_turns:
+            return Answer(
+                NAME, "exact", refusal=f"it counts the turns of springs along theta_2, not {command.commanded}"
+            )
+        bar, closed = command.bar, close(scene.linkage, command.angle, command.branch, command.bar)
+        theta = np.insert(closed.theta, bar - 2, command.angle, axis=0)
         answer = Answer(
             NAME,
             "exact",
             at=command,
             assembled=closed.assembled,
-            quantities=_places(scene.linkage, command.theta_2, *closed.theta),
+            quantities=_places(scene.linkage, *theta),
             evidence={"closure_gap": float(np.max(closed.gap, initial=0.0, where=closed.assembled))},
             shared=SHARED,
             own="assembly (Newton on the two closure equations), speeds and accelerations (own 2x2 Jacobian), every "
             "effect from its definition, the thirteen equations of the free bodies as one system",
         )
-        if command.omega_2 is not None:
-            commanded = (command.theta_2, *speeds(command), *closed.theta)
-            blocks = [slice(start, start + BLOCK) for start in range(0, len(command.theta_2), BLOCK)]
-            parts = [_answered(scene, *(array[block] for array in commanded)) for block in blocks]
+        if command.speed is not None:
+            commanded = (theta[0], *speeds(command), *theta[1:])
+            blocks = [slice(start, start + BLOCK) for start in range(0, len(command.angle), BLOCK)]
+            parts = [_answered(scene, bar, *(array[block] for array in commanded)) for block in blocks]
             answer.evidence["residual"] = max((residual for _, residual in parts), default=0.0)
             for name in parts[0][0] if parts else ():
                 answer.quantities[name] = np.concatenate([part[name] for part, _ in parts])
@@ -85,7 +91,7 @@ def _places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) ->
     unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
     O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
     first_pin = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
-    result = {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
+    result = {"theta_2": theta_2, "theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
     result |= {"A": _plane(first_pin[3]), "B": _plane(O4 + linkage.output.length * unit[4])}
     for bar in MOVING_BARS:
         result[f"G{bar}"] = _plane(first_pin[bar] + polar(centre(linkage.bar(bar))) * unit[bar])
@@ -93,10 +99,10 @@ def _places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) ->
 
 
 def _answered(
-    scene: Scene, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array
+    scene: Scene, commanded: int, theta_2: Array, speed: Array, acceleration: Array, theta_3: Array, theta_4: Array
 ) -> tuple[dict[str, Array], float]:
     """Motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
-    motion = move(scene.linkage, theta_2, omega_2, alpha_2, theta_3, theta_4)
+    motion = move(scene.linkage, theta_2, speed, acceleration, theta_3, theta_4, commanded)
     unknowns, residual, from_jamming = balance(scene, motion)
     drive = COUPLE if scene.drive is None else LINE
     if (gone := wound(scene, motion)) is not None:
@@ -112,7 +118,9 @@ def _answered(
     if any(effect.dry for effect in scene.effects):
         ends = []
         for side in (1.0, -1.0):
-            begins = move(scene.linkage, theta_2, np.full_like(theta_2, side), 0.0 * theta_2, theta_3, theta_4)
+            begins = move(
+                scene.linkage, theta_2, np.full_like(theta_2, side), 0.0 * theta_2, theta_3, theta_4, commanded
+            )
             ends.append(balance(scene, motion._replace(beginning=begins.omega))[0][:, DRIVE])
         result |= {drive.low: np.minimum(*ends), drive.high: np.maximum(*ends)}
     if scene.loads or scene.effects:
@@ -135,20 +143,32 @@ def _line(scene: Scene, motion: BodyMotion) -> DriveLine | None:
 
 
 def move(
-    linkage: FourBar, theta_2: Array, omega_2: Array, alpha_2: Array, theta_3: Array, theta_4: Array
+    linkage: FourBar,
+    theta_2: Array,
+    speed: Array,
+    acceleration: Array,
+    theta_3: Array,
+    theta_4: Array,
+    bar: int = 2,
 ) -> BodyMotion:
-    """Compute speeds and accelerations; NaN where the Jacobian is singular."""
+    """Compute speeds and accelerations where those of a bar are stated; NaN where the Jacobian is singular."""
     d, a, b, c = linkage.lengths
     n = len(theta_2)
     u_1, u_2 = np.exp(1j * linkage.ground_angle), np.exp(1j * theta_2)
     u_3, u_4 = np.exp(1j * theta_3), np.exp(1j * theta_4)
-    jacobian = np.stack((_plane(u_3), -_plane(u_4)), axis=-1)
-    v_3, v_4 = solved(jacobian, _plane(-a * omega_2 * u_2)[..., None])[0][..., 0].T
-    omega = {1: np.zeros(n), 2: omega_2, 3: v_3 / b, 4: v_4 / c}
-    centripetal = a * omega_2**2 * u_2 + b * omega[3] ** 2 * u_3 - c * omega[4] ** 2 * u_4
-    w_3, w_4 = solved(jacobian, _plane(-a * alpha_2 * u_2 - 1j * centripetal)[..., None])[0][..., 0].T
-    alpha = {1: np.zeros(n), 2: alpha_2, 3: w_3 / b, 4: w_4 / c}
+    length, round_ = {2: a, 3: b, 4: c}, {2: u_2, 3: u_3, 4: -u_4}  # bar 4 is gone along from B to O4
+    others = [each for each in MOVING_BARS if each != bar]
+    jacobian = np.stack([_plane(round_[each]) for each in others], axis=-1)
+
+    def rates(stated: Array, centripetal: Complex) -> dict[int, Array]:
+        right = _plane(-length[bar] * stated * round_[bar] - 1j * centripetal)
+        found = solved(jacobian, right[..., None])[0][..., 0].T
+        return {bar: stated} | {each: v / length[each] for each, v in zip(others, found, strict=True)}
+
     zero = np.zeros(n, dtype=complex)
+    omega = {1: np.zeros(n), **rates(speed, zero)}
+    pull = sum((length[each] * omega[each] ** 2 * round_[each] for each in MOVING_BARS), zero)
+    alpha = {1: np.zeros(n), **rates(acceleration, pull)}
     first_pin = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
     return BodyMotion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, first_pin, omega, alpha)
 
@@ -187,8 +207,9 @@ def _with_unit_couples(scene: Scene, motion: BodyMotion) -> tuple[Array, Complex
 
 def solutions(scene: Scene, command: Command) -> Array:
     """Count the pin forces and friction couples that balance the linkage at each position, where it moves, (n,)."""
-    closed = close(scene.linkage, command.theta_2, command.branch)
-    motion = move(scene.linkage, command.theta_2, *speeds(command), *closed.theta)
+    closed = close(scene.linkage, command.angle, command.branch, command.bar)
+    theta = np.insert(closed.theta, command.bar - 2, command.angle, axis=0)
+    motion = move(scene.linkage, theta[0], *speeds(command), theta[1], theta[2], command.bar)
     _, loads, arms, _ = _with_unit_couples(scene, motion)
     return np.array([_number(F, C, arms) for F, C in zip(loads[..., 0], loads[..., 1:], strict=True)], dtype=float)
 

@@ -34,36 +34,45 @@ ROUNDING = 16.0 * 2.0**-52
 
 
 class Closed(NamedTuple):
-    """Where the loop closes, theta_3 and theta_4 there (NaN elsewhere), and what gap is left, m."""
+    """Where the loop closes, the two angles sought there (NaN elsewhere), and what gap is left, m."""
 
     assembled: NDArray[np.bool_]
     theta: Array
-    """(2, n), rad."""
+    """(2, n), rad: of the two bars that are not commanded."""
     gap: Array
 
 
-def close(linkage: FourBar, theta_2: Array, branch: NDArray[np.int8]) -> Closed:
-    """Newton from each start in turn, for the positions at which no earlier one arrived."""
+def close(linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2) -> Closed:
+    """Newton from each start in turn, for the positions at which no earlier one arrived.
+
+    Bar 2 commanded, bars 3 and 4 span the diagonal from A to O4; of bar 3 they are bars 2 and 4, of bar 4 bars 3 and 2,
+    bar 2 from A to O2.
+    """
     d, a, b, c = linkage.lengths
-    diagonal = d * np.exp(1j * linkage.ground_angle) - a * np.exp(1j * theta_2)
+    ground = d * np.exp(1j * linkage.ground_angle)
+    own = {2: -a, 3: -b, 4: c}[bar]
+    b, c = {2: (b, c), 3: (a, c), 4: (b, a)}[bar]
+    diagonal = ground + own * np.exp(1j * theta)
     e, phi = np.abs(diagonal), np.angle(diagonal)
-    closed = ROUNDING * (a + b + c + d)
+    closed = ROUNDING * sum(linkage.lengths)
     # the gap is least where bars 3 and 4 lie along the diagonal
     possible = np.maximum(e - (b + c), abs(b - c) - e) <= closed
-    theta, gap = np.full((2, len(e)), np.nan), np.full(len(e), np.nan)
+    found, gap = np.full((2, len(e)), np.nan), np.full(len(e), np.nan)
     for alpha, beta in [(_between(e, b, c), _between(e, c, b)), *np.radians(STARTS)]:
         remaining = np.flatnonzero(possible & np.isnan(gap))
         if not len(remaining):
             break
         start = np.array([phi + branch * alpha, phi + np.pi - branch * beta])[:, remaining]
-        theta[:, remaining], gap[remaining] = _newton(diagonal[remaining], b, c, branch[remaining], start, closed)
+        found[:, remaining], gap[remaining] = _newton(diagonal[remaining], b, c, branch[remaining], start, closed)
     assembled = np.isfinite(gap)
     missed = possible & ~assembled & (np.maximum(e - (b + c), abs(b - c) - e) < -closed)
     if missed.any():
         raise ArithmeticError(
-            f"the loop closes at theta_2 = {theta_2[np.argmax(missed)]!r}, but Newton's method does not find it"
+            f"the loop closes at theta_{bar} = {theta[np.argmax(missed)]!r}, but Newton's method does not find it"
         )
-    return Closed(assembled, np.angle(np.exp(1j * theta)), gap)
+    if bar == 4:
+        found = np.array([found[1] + np.pi, found[0]])
+    return Closed(assembled, np.angle(np.exp(1j * found)), gap)
 
 
 def _between(e: Array, near: float, far: float) -> Array:

@@ -56,7 +56,8 @@ class BodyMotion(NamedTuple):
         i, j = PINS[pin]
         begins = self.beginning[j] - self.beginning[i]
         begins[np.abs(begins) < TURNS_AS_ONE * (np.abs(self.beginning[j]) + np.abs(self.beginning[i]))] = 0.0
-        return np.where(self.omega[2] == 0.0, np.sign(begins), np.sign(slip))
+        at_rest = np.logical_and.reduce([self.omega[bar] == 0.0 for bar in MOVING_BARS])
+        return np.where(at_rest, np.sign(begins), np.sign(slip))
 
 
 TURNS_AS_ONE = 64.0 * 2.0**-52

@@ -228,7 +228,7 @@ def answering_nearby(witness: Witness, scene: Scene, at: Command, formulas: Solu
 
     A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine does not correct.
     """
-    if not witness.nearby or scene.drive_bar != 2 or at.remainder is not None or at.omega_2 is None:
+    if not witness.nearby or scene.drive_bar != 2 or at.remainder is not None or at.speed is None or at.bar != 2:
         return None
     omega, alpha = speeds(at)
 

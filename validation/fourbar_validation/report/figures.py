@@ -169,10 +169,10 @@ def _label(quantity: str, solution: Solution) -> str:
 
 def _base(solution: Solution, at: Command | None) -> Array:
     """Choose what a curve is drawn over: the time of a free motion, else theta_2 in degrees."""
-    theta_2 = solution.theta_2 if at is None else at.theta_2
-    if solution.time is not None and len(solution.time) == len(theta_2):
+    angle = getattr(solution, solution.commanded) if at is None else at.angle
+    if solution.time is not None and len(solution.time) == len(angle):
         return solution.time
-    return np.degrees(theta_2)
+    return np.degrees(angle)
 
 
 def _limit_to_bulk(axes: "Axes", values: Array) -> None:

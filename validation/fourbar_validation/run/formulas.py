@@ -61,9 +61,9 @@ def check_identities(question: Question) -> Iterator[Row]:
     """Check each equation that the stage of the solution allows."""
     solution, at, linkage = question.solution, question.at, question.scene.linkage
     closing = solution.assembled & (solution.status_code != OVERFLOW)
-    gap = closing_gap(linkage, at.theta_2, solution.theta_3, solution.theta_4)
+    gap = closing_gap(linkage, solution.theta_2, solution.theta_3, solution.theta_4)
     yield _row(question, "closure", CLOSURE, gap, closing)
-    if question.scene.motion.theta_2 is None and question.scene.motion.law is None:
+    if question.scene.motion.angle is None and question.scene.motion.law is None and at.bar == 2:
         yield _sweep(question)
     if solution.F12 is not None and (solution.status_code == OK).any():
         yield from _sums(question)
@@ -88,7 +88,7 @@ def _sweep(question: Question) -> Row:
 
 def _row(question: Question, quantity: str, equation: str, error: Array, where: Mask) -> Row:
     """By how much an equation is missed, in parts of its terms, where it is worst."""
-    condition = 1.0 / half_turns(question.scene.linkage.ground_angle, question.at.theta_2)
+    condition = 1.0 / half_turns(question.scene.linkage.ground_angle, question.at.angle)
     reason = f"identity: {equation}" if where.any() else NOWHERE
     return question.row(quantity, error, IDENTITY.factor / condition, reason, where, condition)
 
@@ -100,7 +100,8 @@ def _sums(question: Question) -> Iterator[Row]:
     assert solution.F32 is not None and solution.F43 is not None
     state = state_at(scene, at)
     # what acts at the speeds that were answered, not at another evaluation of them
-    state = state._replace(moving=state.moving._replace(omega_3=solution.omega_3, omega_4=solution.omega_4))
+    speeds = {f"omega_{bar}": getattr(solution, f"omega_{bar}") for bar in MOVING_BARS if bar != at.bar}
+    state = state._replace(moving=state.moving._replace(**speeds))
     actions = Actions(state, bodies(scene.linkage, scene.effects))
     with np.errstate(all="ignore"):
         for term in (*scene.loads, *scene.effects):
@@ -150,11 +151,17 @@ def _sums(question: Question) -> Iterator[Row]:
     where = solution.status_code == OK
     # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
     where &= ~question.reversing(IDENTITY.factor)
-    works = getattr(solution, drive) * getattr(solution, f"omega_{scene.drive_bar}", solution.stroke_speed)
-    yield _row(question, "power", "of the drive", relative(np.abs(solution.power - works), np.abs(works)), where)
+    yield _power(question, drive, where)
     forces, moments = relative(magnitude(force), force_terms), relative(np.abs(moment), moment_terms)
     yield _row(question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, where)
     yield _row(question, "moment_sum", "moments about O2, with the torque", moments, where)
+
+
+def _power(question: Question, drive: str, where: Mask) -> Row:
+    """Compare the power of the drive with its torque or force times the speed at which it works."""
+    solution = question.solution
+    works = getattr(solution, drive) * getattr(solution, f"omega_{solution.drive_bar}", solution.stroke_speed)
+    return _row(question, "power", "of the drive", relative(np.abs(solution.power - works), np.abs(works)), where)
 
 
 def _cross(u: Array, v: Array) -> Array:

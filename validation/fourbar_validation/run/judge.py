@@ -34,10 +34,12 @@ class Check(NamedTuple):
     """Whether it is of something shipped besides `solve`: the engine of its rows, by its own name."""
     free: bool = False
     """Whether it is of a free motion, the others of a prescribed one."""
+    any_bar: bool = False
+    """Whether it holds for a command of bar 3 or 4 too."""
 
 
 CHECKS = (
-    Check(check_identities),
+    Check(check_identities, any_bar=True),
     Check(check_status),
     Check(check_points),
     Check(check_law),
@@ -45,7 +47,7 @@ CHECKS = (
     Check(check_error_bars),
     Check(check_residual),
     Check(Question.find_reversals),
-    Check(compare_answers),
+    Check(compare_answers, any_bar=True),
     Check(compare_statements),
     Check(check_mjcf),
     Check(compare_inertia),
@@ -100,16 +102,16 @@ def judge(
     begin = time.perf_counter()
     question.solution  # noqa: B018 - timed
     seconds = time.perf_counter() - begin
-    if (
-        shipped
-        and not free
-        and (question.at.omega_2 is None or question.free_body is None or question.free_body.refusal)
-    ):
+    if shipped and not free and (question.at.speed is None or question.free_body is None or question.free_body.refusal):
         what = "judged by what the free bodies say of forces, and here they say nothing"
         question.left_out.append(f"what else is shipped: {what}")
         shipped = False
     rows: list[Row] = []
+    if other := question.at.bar != 2:
+        question.left_out.append(f"checks that move theta_2: {question.at.commanded} is commanded")
     for check in CHECKS:
+        if other and not check.any_bar:
+            continue
         if check.free == free and (shipped or not check.shipped):
             called = check.rows.__name__
             engine, part = (called, "") if check.shipped else (FORMULAS, called)
@@ -123,8 +125,8 @@ def ask(name: str, scene: Scene, witnesses: Sequence[Witness]) -> Question:
     if scene.motion.free is not None:
         return Question(name, scene, at, witnesses)
     question = Question(name, scene, at)
-    numbers = (at.theta_2, at.branch, 0.0 if at.omega_2 is None else at.omega_2, at.alpha_2)
-    if len(at.theta_2) > 1 and all(np.ptp(values) == 0 for values in numbers):  # constant conditions are not swept
+    numbers = (at.angle, at.branch, 0.0 if at.speed is None else at.speed, at.acceleration)
+    if len(at.angle) > 1 and all(np.ptp(values) == 0 for values in numbers):  # constant conditions are not swept
         question.left_out.append("positions: all are the same, one is evaluated")
         question.at = select_positions(at, np.array([0]))._replace(time=None)
     question.witnesses = list(_called_for(witnesses, question.at, question.left_out))
@@ -136,13 +138,13 @@ def _called_for(witnesses: Iterable[Witness], at: Command, left_out: list[str]) 
     """Choose the witnesses that the question needs; the others are left out before their engine is imported."""
     for witness in witnesses:
         reason = None
-        if at.omega_2 is None:
+        if at.speed is None:
             reason = None if witness.positions else "the scene states positions only, and it gives forces"
-        elif witness.through_time and not np.any(at.omega_2):
+        elif witness.through_time and not np.any(at.speed):
             reason = "omega_2 is 0: nothing moves through time"
-        elif witness.through_time and len(at.theta_2) == 1:
+        elif witness.through_time and len(at.angle) == 1:
             reason = "one position is no motion through time"
         if reason is None:
-            yield witness if at.omega_2 is not None else replace(witness, expected=witness.positions)
+            yield witness if at.speed is not None else replace(witness, expected=witness.positions)
         else:
             left_out.append(f"{witness.name}: {reason}")

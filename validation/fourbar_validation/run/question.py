@@ -58,7 +58,7 @@ class Question:
         """Solve the scene as far as anything is compared: error bars take ten times as long as all the rest."""
         if self.scene.motion.free is not None:
             return solve(self.scene)
-        return solve(self.scene, "position" if self.at.omega_2 is None else "force", at=self.at)
+        return solve(self.scene, "position" if self.at.speed is None else "force", at=self.at)
 
     @cached_property
     def solution(self) -> Solution:
@@ -94,7 +94,12 @@ class Question:
         if witness.name not in self.answered:
             with kept(self.output, witness.name):
                 engine, begin = self.engine(witness), time.perf_counter()
-                self.answered[witness.name] = engine.answer(self.scene, self.at), time.perf_counter() - begin
+                if self.at.commanded in getattr(engine, "commands", ("theta_2",)):
+                    answer = engine.answer(self.scene, self.at)
+                else:
+                    refusal = f"it takes a command of theta_2, and here {self.at.commanded} is commanded"
+                    answer = Answer(witness.name, "exact", refusal=refusal)
+                self.answered[witness.name] = answer, time.perf_counter() - begin
         return self.answered[witness.name][0]
 
     def find_reversals(self) -> tuple[()]:
@@ -129,7 +134,7 @@ class Question:
         verdict = AGREES if error[index] <= allowed else FAILS
         if where is not None and not where.any():
             verdict = UNDECIDED
-        place = float((self.at.theta_2 if theta_2 is None else theta_2)[index])
+        place = float((self.at.angle if theta_2 is None else theta_2)[index])
         return Row(
             self.name, FORMULAS, "exact", quantity, float(error[index]), allowed, verdict, reason, place, condition
         )
@@ -143,7 +148,7 @@ class Question:
         """
         answered = [self.answered[witness.name] for witness in self.witnesses if witness.name in self.answered]
         timings = [Timing(self.name, FORMULAS, "exact", len(self.solution), seconds), *self.timings]
-        n = len(self.at.theta_2)
+        n = len(self.at.angle)
         timings += [Timing(self.name, answer.engine, answer.setting, n, took) for answer, took in answered]
         return Record(
             self.name,
@@ -176,4 +181,5 @@ def select_positions(at: Command, where: NDArray[np.intp]) -> Command:
         return value if value is None or np.ndim(value) == 0 else value[where]  # type: ignore[index]
 
     time = None if at.time is None else at.time[where]
-    return Command(at.theta_2[where], at.branch[where], of(at.omega_2), of(at.alpha_2), None, time)  # type: ignore[arg-type]
+    speed, acceleration = of(at.speed), of(at.acceleration)
+    return Command(at.angle[where], at.branch[where], speed, acceleration, None, time, at.bar)  # type: ignore[arg-type]

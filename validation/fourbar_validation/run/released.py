@@ -204,7 +204,7 @@ def _prescribed(scene: Scene, at: Command) -> Iterator[tuple[Scene, NDArray[np.i
         where = np.array([first])
         here = select_positions(at, where)
         needed, begins = FreeBody().answer(bare, here).quantities["torque"][0], float(np.sign(here.alpha_2)[0])
-        turning = FreeBody().answer(bare, here._replace(omega_2=np.ones(1))).quantities
+        turning = FreeBody().answer(bare, here._replace(speed=np.ones(1))).quantities
         rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}
         slips = {pin: rate[PINS[pin][1]] - rate[PINS[pin][0]] for pin, _ in friction.torques}
         most = sum(torque * abs(slips[pin]) for pin, torque in friction.torques)

@@ -125,7 +125,7 @@ def _printed(name: str) -> str:
 
 def _positions(scene: Scene, file: Path) -> int:
     """Count the positions that a scene asks for, or what takes as long; InputError beyond the most."""
-    for key, stated in (("motion.theta_2", scene.motion.theta_2), ("motion.free", scene.motion.free)):
+    for key, stated in ((f"motion.{scene.motion.names[0]}", scene.motion.angle), ("motion.free", scene.motion.free)):
         if isinstance(stated, (Sweep, Free)):
             if stated.steps >= MOST_POSITIONS:
                 raise InputError(f"{key}.steps", stated.steps, f"must be below {MOST_POSITIONS} in a run", str(file))

@@ -32,7 +32,7 @@ Quantities = dict[str, Any]
 def few(at: Command) -> Command:
     """Choose at most AT_MOST positions, evenly over the sweep."""
     rows = np.unique(np.linspace(0, len(at.theta_2) - 1, min(AT_MOST, len(at.theta_2))).round().astype(int))
-    return at._replace(theta_2=at.theta_2[rows], branch=at.branch[rows])
+    return at._replace(angle=at.theta_2[rows], branch=at.branch[rows])
 
 
 def double(scene: Scene, at: Command) -> Quantities:

@@ -131,7 +131,7 @@ class CostStudy:
             if settled:
                 before = float(at.theta_2.min() if at.omega_2 > 0.0 else at.theta_2.max())  # type: ignore[operator]
                 before -= math.copysign(2.0 * math.pi, at.omega_2)  # type: ignore[arg-type]
-                at = at._replace(theta_2=np.append(at.theta_2, before), branch=np.append(at.branch, at.branch[0]))
+                at = at._replace(angle=np.append(at.theta_2, before), branch=np.append(at.branch, at.branch[0]))
             self._rigs[slow, bare, settled] = TrialSetup(scene, at)
         return self._rigs[slow, bare, settled]
 
@@ -245,7 +245,7 @@ class CostStudy:
             raise LimitError(f"{engine.name}: {answer.refusal}")
         assert answer.assembled is not None
         rows = np.flatnonzero(answer.assembled)
-        at = self.command._replace(theta_2=self.command.theta_2[rows], branch=self.command.branch[rows])
+        at = self.command._replace(angle=self.command.theta_2[rows], branch=self.command.branch[rows])
         result = errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
         return self._at_positions(curve, EXACT, label or engine.name, result, times, len(self.command.theta_2), dial)
 

@@ -63,7 +63,7 @@ def _by_solve(compiled: bool) -> Loop:
         for name in UNKNOWNS:
             row = next(rows)
             into[name] = out[row : next(rows) + 1].T if name in VECTORS else out[row]
-        solve(scene, at=command(len(theta_2))._replace(theta_2=theta_2), out=into, compiled=compiled)
+        solve(scene, at=command(len(theta_2))._replace(angle=theta_2), out=into, compiled=compiled)
 
     return call
 

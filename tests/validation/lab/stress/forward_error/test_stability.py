@@ -12,6 +12,8 @@ from fourbar_validation.lab.stress.forward_error.stability import CHANCE, TOO_SM
 
 SAMPLES = 40
 """Per family: about 1 s each; the ten thousand of each are `python -m validation stability`."""
+FED_BACK = 8
+"""Per family and bar."""
 ONCE_BAD = {
     # seed, number, and what once was beyond its bound there
     "random": [
@@ -58,6 +60,16 @@ def test_every_output_is_within_what_the_inputs_last_digits_do(family: str, tall
     assert not tally.warned
     bad = {name: entry for name, entry in tally.worst.items() if not entry[0] <= 1.0}
     assert not bad
+
+
+@pytest.mark.parametrize("bar", [3, 4])
+@pytest.mark.parametrize("family", FAMILIES)
+def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too(family: str, bar: int) -> None:
+    tally = run(family, range(FED_BACK), bar=bar)
+    assert tally.samples > FED_BACK / 2 and not tally.not_assembled and not tally.warned
+    assert not {name: entry for name, entry in tally.worst.items() if not entry[0] <= 1.0}
+    assert {"theta_2", "omega_2", "alpha_2"} <= tally.worst.keys()
+    assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
 
 def test_error_bars_are_neither_too_small_nor_useless(tallies: dict[str, Tally]) -> None:

@@ -7,7 +7,7 @@ stored inputs: what a change of the inputs in their last digits does to y, and n
 import math
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -15,8 +15,11 @@ import click
 import numpy as np
 
 from fourbar.errors import FAILED, HOLDS
+from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.quantities import OK, PIN_FORCES, UNITS, VECTORS
 from fourbar.scene import Command, Scene
+from fourbar.scene.motion import Motion
+from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.tolerance import used
 from fourbar_validation.engines.balls import reference
@@ -97,19 +100,15 @@ def components(name: str) -> list[tuple[str, Any]]:
 def judge(scene: Scene, tally: Tally, sample: str) -> None:
     """Compare one position with the reference; `solve` evaluates one in plain numbers, two in arrays."""
     tally.samples += 1
-    theta_2 = float(np.asarray(scene.motion.theta_2))
-    times = 1 + hash(theta_2) % 2  # as good as random, and the same on every run
-    at = Command(
-        np.full(times, theta_2),
-        np.full(times, scene.motion.branch, np.int8),
-        scene.motion.omega_2,
-        scene.motion.alpha_2,
-    )
+    motion, angle = scene.motion, float(np.asarray(scene.motion.angle))
+    times = 1 + hash(angle) % 2  # as good as random, and the same on every run
+    branch = np.full(times, motion.branch, np.int8)
+    at = Command(np.full(times, angle), branch, motion.speed, motion.acceleration, bar=motion.bar)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         solution = solve(scene, "error", at=at)
     tally.warned += [f"{sample}: {warning.message}" for warning in caught]
-    exact = reference(scene, scene.motion.branch, theta_2)
+    exact = reference(scene, motion.branch, angle)
     if exact is None:
         tally.not_assembled += 1
         if solution.status_code[0] == OK:
@@ -119,7 +118,7 @@ def judge(scene: Scene, tally: Tally, sample: str) -> None:
     errors: dict[str, float] = {}
     for name in UNITS:
         array = getattr(solution, name)
-        if array is None or name == "theta_2" or name.endswith("_error"):
+        if array is None or name == at.commanded or name.endswith("_error"):
             continue
         for component, index in components(name):
             if component not in values:
@@ -153,17 +152,42 @@ def _ratio(name: str, ours: float, value: Any, sensitivity: float) -> tuple[floa
     return float(used(wrong, allowed)), wrong
 
 
-def run(family: str, samples: range, seed: int = 0) -> Tally:
-    """Judge some samples of a family; each depends on the family, the seed and its number alone."""
+def run(family: str, samples: range, seed: int = 0, bar: int = 2) -> Tally:
+    """Judge some samples of a family; each depends on the family, the seed and its number alone.
+
+    `bar`: whose motion is commanded, as it comes out where the input is.
+    """
     tally = Tally()
     for number in samples:
         rng = np.random.default_rng([seed, list(FAMILIES).index(family), number])
-        judge(FAMILIES[family](rng), tally, f"{family} {number}")
+        scene = fed_back(FAMILIES[family](rng), bar)
+        if scene is not None:
+            judge(scene, tally, f"{family} {number}")
     return tally
 
 
-def _run(seed: int, task: tuple[str, range]) -> Tally:
-    return run(*task, seed)
+def fed_back(scene: Scene, bar: int) -> Scene | None:
+    """Command bar 2, 3 or 4 to move as it does under the scene's own command; None where that has no motion."""
+    if bar == 2:
+        return scene
+    found = solve(scene, "acceleration")
+    theta, omega, alpha, sine = commanded(found, bar)
+    if found.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
+        return None
+    numbers = {f"theta_{bar}": theta, f"omega_{bar}": omega, f"alpha_{bar}": alpha}
+    return replace(scene, motion=Motion(branch=1 if sine > 0.0 else -1, **numbers))  # type: ignore[arg-type]
+
+
+def commanded(found: Solution, bar: int) -> tuple[float, float, float, float]:
+    """Return angle, speed and acceleration of a bar at the first position, and the sine whose sign its branch is."""
+    theta, omega, alpha = (float(getattr(found, f"{name}_{bar}")[0]) for name in ("theta", "omega", "alpha"))
+    first, second = {2: (3, 4), 3: (2, 4), 4: (2, 3)}[bar]
+    one, other = (float(getattr(found, f"theta_{each}")[0]) for each in (first, second))
+    return theta, omega, alpha, math.sin(other - one)
+
+
+def _run(seed: int, bar: int, task: tuple[str, range]) -> Tally:
+    return run(*task, seed, bar)
 
 
 def chunks(samples: int) -> Iterator[range]:
@@ -176,8 +200,9 @@ def chunks(samples: int) -> Iterator[range]:
 @click.option("--samples", default=FULL, show_default=True, type=click.IntRange(1), help="Samples per family.")
 @click.option("--family", "families", multiple=True, type=click.Choice(list(FAMILIES)), help="Only these (repeatable).")
 @click.option("--seed", default=0, show_default=True)
+@click.option("--bar", default=2, show_default=True, type=click.IntRange(2, 4), help="Whose motion is commanded.")
 @click.option("--jobs", default=2, show_default=True, help="Processes.")
-def stability(samples: int, families: tuple[str, ...], seed: int, jobs: int) -> int:
+def stability(samples: int, families: tuple[str, ...], seed: int, bar: int, jobs: int) -> int:
     """Measure the error of every output against 50-digit arithmetic, and whether the error bars hold."""
     from rich.box import HEAVY_HEAD
     from rich.console import Console
@@ -185,7 +210,7 @@ def stability(samples: int, families: tuple[str, ...], seed: int, jobs: int) -> 
 
     chosen = families or tuple(FAMILIES)
     tasks = [(family, part) for family in chosen for part in chunks(samples)]
-    results = each(partial(_run, seed), tasks, jobs, seconds=None)
+    results = each(partial(_run, seed, bar), tasks, jobs, seconds=None)
     tallies = {family: Tally() for family in chosen}
     for (family, _), tally in track(zip(tasks, results, strict=True), "samples", total=len(tasks)):
         tallies[family].add(tally)
@@ -193,10 +218,10 @@ def stability(samples: int, families: tuple[str, ...], seed: int, jobs: int) -> 
     for name in dict.fromkeys(name for tally in tallies.values() for name in tally.worst):
         cells = [tallies[family].worst.get(name, (math.nan, ""))[0] for family in chosen]
         rows.append((name, *("-" if math.isnan(cell) else f"{cell:.3f}" + " fails" * (cell > 1.0) for cell in cells)))
-    for bar in ("torque_error", "force_error"):
-        rows.append((f"error / {bar}", *(f"{tallies[family].too_small.get(bar, math.nan):.2f}" for family in chosen)))
-        shares = (100.0 * tallies[family].too_large.get(bar, 0) / tallies[family].samples for family in chosen)
-        rows.append((f"% {bar} > {TOO_LARGE:.0f} x error", *(f"{share:.2f}" for share in shares)))
+    for name in ("torque_error", "force_error"):
+        rows.append((f"error / {name}", *(f"{tallies[family].too_small.get(name, math.nan):.2f}" for family in chosen)))
+        shares = (100.0 * tallies[family].too_large.get(name, 0) / tallies[family].samples for family in chosen)
+        rows.append((f"% {name} > {TOO_LARGE:.0f} x error", *(f"{share:.2f}" for share in shares)))
     rows.append(("not assembled", *(str(tallies[family].not_assembled) for family in chosen)))
     rows.append(("no torque", *(str(tallies[family].no_torque) for family in chosen)))
     console = Console()
