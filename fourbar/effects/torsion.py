@@ -85,7 +85,7 @@ class Torsion(Effect):
         return [angles[PINS[pin][1]] - angles[PINS[pin][0]] for pin, *_ in self.springs]
 
 
-def _continuous(state: State, branch: Number) -> dict[int, Array]:
+def _continuous(state: State, branch: Number) -> dict[int, Number]:
     """theta_1 .. theta_4 without jumps at a whole turn, on one branch, as the loop is read from the commanded bar.
 
     The diagonal from A to O4 swings about the ground's line where a < d, and otherwise about the input's, never by
@@ -101,7 +101,7 @@ def _continuous(state: State, branch: Number) -> dict[int, Array]:
     line = np.where(a < d, theta_1, theta_2 + math.pi)
     phi = line + _wound(phi - line)
 
-    def beyond(angle: Array) -> Array:
+    def beyond(angle: Number) -> Number:
         """Wrap the angle into half a turn, or as far outside as rounding puts it."""
         return _wound(angle - 0.5 * math.pi) + 0.5 * math.pi
 

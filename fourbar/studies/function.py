@@ -95,9 +95,8 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
             found, ok = _evaluated(case, q + zero, float(motion.branch), moved, given, wanted)
             ok = ok & holds
             parts = {
-                name: (value + zero,) if is_scalar(name) else (value.real + zero, value.imag + zero)
-                for name, value in found.items()
-                if name in wanted
+                name: (found[name] + zero,) if is_scalar(name) else (found[name].real + zero, found[name].imag + zero)
+                for name in wanted
             }
         kept = {name: [xp.where(ok, part, xp.nan) for part in of] for name, of in parts.items()}
         return {name: of[0] if is_scalar(name) else xp.stack(of, axis=-1) for name, of in kept.items()}
