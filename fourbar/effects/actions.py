@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, anywhere, cross, namespace
+from fourbar.formulas.arithmetic import Number, anywhere, cross, sign
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies, Body, Wrenches
 from fourbar.linkage import PINS, FourBar
@@ -114,8 +114,7 @@ class Actions:
         """
         slip, turning = self.state.slip(pin), self.turning(pin)
         if not anywhere(self.side != 0):
-            velocity = slip * self.state.speed
-            return turning * namespace(velocity).sign(velocity)
+            return turning * sign(slip * self.state.speed)
         moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
         return np.where(np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving)
 

@@ -116,8 +116,13 @@ def angle(u: Number) -> Number:
 
 
 def conjugate(u: Number) -> Number:
-    """u*, of a complex number."""
-    return u.conjugate() if (xp := namespace(u)) is np else xp.conj(u)
+    """u*, of a complex number; by its parts in other libraries: PyTorch maps no conjugate over many numbers at once."""
+    return u.conjugate() if namespace(u) is np else vector(u.real, -u.imag)
+
+
+def sign(x: Number) -> Number:
+    """-1, 0 or 1; for arrays of other libraries 0 of what is no number, which PyTorch else does not map."""
+    return np.sign(x) if namespace(x) is np else (x > 0.0) * 1.0 - (x < 0.0) * 1.0
 
 
 def nearest(x: Number) -> Number:

@@ -21,6 +21,7 @@ from fourbar.formulas.arithmetic import (
     polar,
     power_of_two,
     select,
+    sign,
     sine,
     vector,
 )
@@ -137,7 +138,7 @@ class Path(NamedTuple):
             return at.sin_mu if self.bar == 2 else at.root * (0.5 / (self.lengths.b * self.lengths.c))
         found = drive_sine_of_triangle(self.lengths, at, role)
         if self.may_stay_parallel:  # with the sine of the angle that all of them make
-            first, second = parallel_pairs(self.lengths, at.half, namespace(at.root).sign(at.root))
+            first, second = parallel_pairs(self.lengths, at.half, sign(at.root))
             with_first, with_second = (0.0, 2.0 * at.half.sk) if role == 3 else (-2.0 * at.half.sk, 0.0)
             found = select(first, with_first, select(second, with_second, found))
         return -found if self.bar + drive_bar == 7 else found  # there the two bars have changed places

@@ -22,6 +22,7 @@ from fourbar.formulas.arithmetic import (
     exact_difference,
     namespace,
     select,
+    sign,
     square_root,
     tangent,
     vector,
@@ -185,7 +186,7 @@ def parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Numb
     Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c = d).
     """
     d, a, b, c, _, _ = lengths
-    side = branch * namespace(half.sk).sign(half.sk)
+    side = branch * sign(half.sk)
     return (a == c) & (b == d) & (side > 0), (a == b) & (c == d) & (side < 0)
 
 
@@ -194,5 +195,5 @@ def with_parallel_pairs(at: Position, first: Number, second: Number) -> Position
     xp = namespace(first, at.u2)
     u3 = xp.where(first, at.u1, xp.where(second, -at.u2, at.u3))
     u4 = xp.where(first, at.u2, xp.where(second, -at.u1, at.u4))
-    sine = xp.where(first | second, xp.sign(at.root) * 2.0 * abs(at.half.sk), at.sin_mu)
+    sine = xp.where(first | second, sign(at.root) * 2.0 * abs(at.half.sk), at.sin_mu)
     return at._replace(u3=u3, u4=u4, sin_mu=sine)
