@@ -27,14 +27,15 @@ class Scene:
     Parameters
     ----------
     linkage : bars and ground, as `uniform` or `FourBar` make them.
-    motion : what the input does: angles, speed, branch.
-    drive_bar : 2, 3 or 4, on which the drive's torque acts.
+    motion : what the commanded bar does: angles, speed, branch.
+    drive_bar : 2, 3 or 4, on which the drive's torque acts; left out: 2.
     loads : forces and couples, `Load`.
     effects : `Gravity`, `Viscous`, `Friction`, ...: only what acts, each kind once.
     title, source : words.
     pictures : of bars, as a scene file names them.
     points : points of bars whose paths are wanted, `Point`.
     tolerances : of numbers by their keys in a scene file, `Tolerance`.
+    drive : along a line, `LinearDrive`, in place of a torque on a bar.
     """
 
     linkage: FourBar

@@ -455,7 +455,7 @@ def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
     out = capsys.readouterr().out
     assert "left out (stated by the scene): status, branch, drive_bar" in out
     out = out.replace(" [N m]", "")
-    assert "left out (blank): torque_low, torque_high" in out and "390 of 390 numbers agree" in out
+    assert "left out (blank): torque_low, torque_high" in out and "429 of 429 numbers agree" in out
 
 
 def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(tmp_path: Path) -> None:

@@ -32,7 +32,6 @@ DECIMALS = 4
 """12.5 deg and 0.25 rad are positions that somebody chose, 0.1745 rad is one that was rounded."""
 NOT_JUDGED = {
     "time": "a row is found by its theta_2",
-    "power": "the torque or force of the drive is judged, and the speed",
     **dict.fromkeys(
         (COUPLE.error, LINE.error, "force_error", "friction_residual"), "an error of the formulas themselves"
     ),

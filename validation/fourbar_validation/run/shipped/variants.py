@@ -135,7 +135,8 @@ def held_to(question: Question, engine: str, scene: Scene, solution: Solution, a
     reference = reference_of(scene, answer)
     rows = Comparison(question.name, scene, answer, solution, EQUIVALENCE, COMPARED, predicted, reference).rows()
     if scene.points and reference is not None:
-        rows.append(replace(points(question, solution, reference, WELL_CONDITIONED), engine=engine))
+        moved = Question(question.name, scene, answer.at)
+        rows.append(replace(points(moved, solution, reference, WELL_CONDITIONED), engine=engine))
     return rows
 
 
@@ -173,7 +174,7 @@ def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
 
     one = replace(study, **{field.name: own(getattr(study, field.name)) for field in fields(study) if field.init})
     one.points, one.velocity, one.acceleration = (own(of) for of in (study.points, study.velocity, study.acceleration))
-    one.drive = study.drive
+    one.drive, one.commanded = study.drive, study.commanded
     return one
 
 
