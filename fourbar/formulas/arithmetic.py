@@ -43,21 +43,23 @@ def anywhere(mask: Number) -> bool:
     """Whether a mask may hold at any entry; `np.any` costs a plain number fifty times as much."""
     if isinstance(mask, PLAIN):
         return bool(mask)
-    return namespace(mask) is not np or bool(mask.any())  # arrays of another library may be traced
+    if isinstance(mask, np.ndarray) or namespace(mask) is np:
+        return bool(mask.any())
+    return True  # arrays of another library may be traced
 
 
 def is_zero(x: Number) -> Number:
     """Where a number is 0 whatever it is differentiated by: an array of another library, which may be, nowhere."""
-    return namespace(x) is np and x == 0.0
+    return (type(x) is float or namespace(x) is np) and x == 0.0
 
 
 def select(mask: Number, x: Number, y: Number) -> Number:
     """Of two forms of one number x where a mask holds, y elsewhere; for a plain one the number itself."""
     if isinstance(mask, PLAIN):
         return x if mask else y
-    if (xp := namespace(mask)) is not np:
-        return xp.where(mask, x, y)
-    return np.where(mask, x, y) if isinstance(mask, np.ndarray) else mask.of_one(x, y)
+    if isinstance(mask, np.ndarray):
+        return np.where(mask, x, y)
+    return mask.of_one(x, y) if hasattr(mask, "of_one") else namespace(mask).where(mask, x, y)
 
 
 def divisor(x: Number, where: Number) -> Number:
@@ -91,10 +93,10 @@ def vector(x: Number, y: Number) -> Number:
     """Make x + i y, each part written once: over arrays the sum takes three times as long."""
     if type(x) is type(y) is float:
         return complex(x, y)
-    if hasattr(x, "slopes") or hasattr(y, "slopes") or namespace(x, y) is not np:  # nothing that is written into
+    if hasattr(x, "slopes") or hasattr(y, "slopes"):  # numbers that carry their derivatives
         return x + 1j * y
     if not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray):
-        return np.complex128(complex(x, y))
+        return np.complex128(complex(x, y)) if namespace(x, y) is np else x + 1j * y
     z = np.empty(np.broadcast(x, y).shape, dtype=complex)
     z.real, z.imag = x, y
     return z[()]
@@ -116,13 +118,14 @@ def angle(u: Number) -> Number:
 
 
 def conjugate(u: Number) -> Number:
-    """u*, of a complex number; by its parts in other libraries: PyTorch maps no conjugate over many numbers at once."""
-    return u.conjugate() if namespace(u) is np else vector(u.real, -u.imag)
+    """u*, of a complex number; by its parts in PyTorch, which maps no conjugate over many numbers at once."""
+    return u.conjugate() if hasattr(u, "conjugate") else vector(u.real, -u.imag)
 
 
 def sign(x: Number) -> Number:
     """-1, 0 or 1; for arrays of other libraries 0 of what is no number, which PyTorch else does not map."""
-    return np.sign(x) if namespace(x) is np else (x > 0.0) * 1.0 - (x < 0.0) * 1.0
+    xp = namespace(x)
+    return np.sign(x) if xp is np else xp.astype(x > 0.0, x.dtype) - xp.astype(x < 0.0, x.dtype)
 
 
 def nearest(x: Number) -> Number:
@@ -132,8 +135,7 @@ def nearest(x: Number) -> Number:
 
 def tangent(x: Number) -> Number:
     """Compute tan x, of Python's own floats as such."""
-    t = namespace(x).tan(x)
-    return t.item() if type(x) is float else t
+    return np.tan(x).item() if type(x) is float else namespace(x).tan(x)
 
 
 def square_root(x: Number) -> Number:
