@@ -36,7 +36,7 @@ long-problems:
 long-releases:
 	RELEASES=pip $(BIN)/python -m pytest tests/validation/lab/subjects/test_versions.py
 long-standing:
-	$(BIN)/python -m validation standing
+	$(BIN)/python -m validation standing --history mujoco --history pinocchio
 long-free:
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/evaluation/test_free_motion_reference.py
 long-fuzz:

@@ -90,7 +90,8 @@ def solve(
         case = Case.of(scene, where.bar)._replace(side=side)
         if wanted >= FORCE and scene.counts_turns:
             case = case.with_start(_beginning(scene, where, moved))
-        quick = moved is None and where.remainder is None and is_compiled(case, wanted, n, compiled)
+        plain = moved is None and where.remainder is None and where.lever is None
+        quick = plain and is_compiled(case, wanted, n, compiled)
         result = None
         if n == 1 and moved is None and out is None and not quick:
             result = _alone(case, where, wanted, names, code)
@@ -109,7 +110,8 @@ def _refuse(at: Command) -> None:
     expect("at", at, Command)
     require_bar("at.bar", at.bar)
     named = dict(zip(("angle", "speed", "acceleration", "branch"), (*COMMANDS[at.bar], "branch"), strict=True))
-    for name in ("angle", "branch"):
+    named |= {name: name for name in ("stroke", "lever") if getattr(at, name) is not None}
+    for name in (name for name in named if name not in ("speed", "acceleration")):
         value = getattr(at, name)
         expect(f"at.{named[name]}", value, np.ndarray)
         if value.ndim != 1 or value.shape != at.angle.shape or value.dtype.kind not in "iuf":

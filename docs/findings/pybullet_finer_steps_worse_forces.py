@@ -1,9 +1,14 @@
 """PyBullet's default solverResidualThreshold makes forces worse as the timestep falls: 1e-7 is a speed, not a force.
 
-Its guide says that the solver stops where the speeds of all constraints miss by less than that; over a step of 10 us
-this is an acceleration of 0.01. A parallelogram turns at 1 rad/s under its weight; the motor's torque is read with the
-default and with 0. Exit 0: they differ over 100 times more at a step of 10 us than at 100 us, as found with PyBullet
-3.2.7.
+Engine: pybullet (pybullet)
+Expected: a motor's torque converges as the timestep falls.
+Found: of a parallelogram that turns at 1 rad/s under its weight, the torque with the default differs from that with
+  solverResidualThreshold=0 over 100 times more at a step of 10 us than at 100 us. The guide says that the solver stops
+  where the speeds of all constraints miss by less than the threshold; over a step of 10 us this is an acceleration of
+  0.01.
+Since: 3.2.7 or before
+Until: still in 3.2.7
+Reported: not reported yet; the threshold became one of speed in bulletphysics/bullet3 #1798
 """
 
 import sys
@@ -56,4 +61,5 @@ for step in (1e-4, 1e-5):
     default, none = torque(step), torque(step, solverResidualThreshold=0.0)
     apart[step] = abs(default - none)
     print(f"step {step:g} s: torque {default:.9f} N m by default, {none:.9f} with no threshold")
-sys.exit(0 if apart[1e-5] > 1e-5 and apart[1e-5] > 100.0 * apart[1e-4] else 1)
+if not (apart[1e-5] > 1e-5 and apart[1e-5] > 100.0 * apart[1e-4]):
+    sys.exit("mended")

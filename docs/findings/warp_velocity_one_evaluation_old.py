@@ -1,7 +1,13 @@
 """MuJoCo Warp builds (dJ/dt) v of an equality constraint `connect` from the velocities of the evaluation before.
 
-The same state evaluated once and twice has two closing forces, and the second is MuJoCo's. Exit 0: they differ, as
-found with MuJoCo Warp 4.0.0.
+Engine: mujoco-warp (mujoco_warp)
+With: mujoco=={version}
+Expected: mjw.forward of a state gives MuJoCo's closing force, whatever was evaluated before.
+Found: the first forward after a change of qvel gives another force, the second MuJoCo's: fwd_position makes the
+  constraint before com_vel, in fwd_velocity, has the new velocities. Over a simulated turn the error is of first order.
+Since: #1294 of May 2026, which brought the term; run with 4.0.0
+Until: still in 4.0.0
+Reported: not reported yet; the term came with google-deepmind/mujoco_warp #1294
 """
 
 import sys
@@ -31,5 +37,6 @@ for _ in range(2):
     mjw.forward(theirs, state)
     found.append(state.efc.force.numpy()[0, :2].copy())
 print("MuJoCo", data.efc_force[:2], " Warp, once", found[0], " twice", found[1])
-twice_right = np.abs(found[1] - data.efc_force[:2]).max() < 1e-3
-sys.exit(0 if twice_right and np.abs(found[0] - found[1]).max() > 1e-3 else 1)
+assert np.abs(found[1] - data.efc_force[:2]).max() < 1e-3, "another fault"
+if np.abs(found[0] - found[1]).max() < 1e-3:
+    sys.exit("mended")

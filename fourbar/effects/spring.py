@@ -49,7 +49,8 @@ def require_ends(key: str, start: object, end: object) -> tuple[SpringEnd, Sprin
         if not isinstance(point, SpringEnd):
             raise InputError(f"{key}.{name}", point, "must be a fourbar.effects.SpringEnd")
         bar = require_whole(f"{key}.{name}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
-        ends.append(SpringEnd(bar, *(require(f"{key}.{name}.at", number) for number in point[1:])))
+        at = zip(point[1:], ("m", "rad"), strict=True)
+        ends.append(SpringEnd(bar, *(require(f"{key}.{name}.at", number, unit) for number, unit in at)))
     if ends[0].bar == ends[1].bar:
         raise InputError(f"{key}.to.bar", ends[1].bar, "must be another bar than that of `from`")
     return ends[0], ends[1]

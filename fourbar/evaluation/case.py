@@ -24,7 +24,7 @@ from fourbar.formulas.pin_forces import (
     pin_forces,
 )
 from fourbar.formulas.position import HalfAngle, Loop, Position
-from fourbar.formulas.torque import half_slope, inertia
+from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, JAMMED, LINE, DriveNames
 from fourbar.scene import Command, Scene
@@ -253,7 +253,7 @@ class Case(NamedTuple):
         def eliminate(acting: Actions, *, with_inertia: bool = True) -> PinForces:
             if unit is None:
                 return apart(self.drive_bar, acting, with_inertia)
-            pushed = acting.plus(unit, ((inertial if with_inertia else 0.0) - acting.work()[0]) / by)
+            pushed = acting.plus(unit, driving_torque(by, inertial if with_inertia else 0.0, acting.work()[0]))
             found = {bar: apart(bar, pushed, with_inertia) for bar in driven}
             return found[driven[0]] if len(driven) == 1 else steadiest(sines, found)
 
@@ -261,7 +261,7 @@ class Case(NamedTuple):
         for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
             if term.loaded_pins:
                 solved = term.solve_friction(actions, solved.pins, eliminate)
-        return Dynamics(*solved, (inertial - actions.work()[0]) / by)
+        return Dynamics(*solved, driving_torque(by, inertial, actions.work()[0]))
 
     def drive_interval(self, state: State, acceleration: Any, drive: Any) -> tuple[Any, Any, Any]:
         """Least and greatest torque or force of the drive where dry friction holds a pin at rest, elsewhere it twice.

@@ -143,7 +143,8 @@ def forces(
     else:
         moment = Q + of_A * k.h3 - others
     pins = pin_forces_of(lengths, at, drive_bar, sine, w, mass_at_A, moment)
-    return pins, driving_torque(k, drive_bar, inertial, Q + of_A * slip_A + (N2 + of_O2) * k.h2), sine
+    by = k.h2 if drive_bar == 2 else k.h3 if drive_bar == 3 else k.h4
+    return pins, driving_torque(by, inertial, Q + of_A * slip_A + (N2 + of_O2) * k.h2), sine
 
 
 def thirteen(signs: Any, first: int) -> Any:

@@ -63,6 +63,8 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
         return _angles(case, half, branch, names)
     at = case.path.position(q, half, branch)
     codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
+    if where.lever is not None:
+        codes = np.where(codes == OK, np.where(where.lever[part] <= NO_DIGIT_LEFT, SINGULAR, OK), codes)
     if anywhere(codes):  # velocities are 0/0
         at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
     speed, acceleration = piece(where.speed, part), piece(where.acceleration, part)
@@ -70,6 +72,8 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
     values = kinematics(case, state, names)
     if where.bar != 2:
         values |= {name: value for name, value in of_command(case, at, state, q).items() if name in names}
+    if where.lever is not None and "condition" in values:
+        values["condition"] = values["condition"] * where.lever[part]
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
         codes, forces = _forces(case, state, acceleration, branch, branch, codes, names, known)

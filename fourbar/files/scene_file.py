@@ -22,7 +22,7 @@ from fourbar.files.scene_text import BARS, BRANCHES
 from fourbar.files.tolerances import read_tolerances
 from fourbar.linkage import BAR_NAMES, MOST_STEPS, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.motion import DEFAULT_STEPS, Free, FromLimit, Motion, Sweep
+from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import COMMANDS, ENDS, Law
 from fourbar.scene.point import Point
 from fourbar.solution import Array
@@ -169,8 +169,16 @@ def _bar(read: Reader, key: str, value: object, length: float) -> Bar:
 
 def _motion(read: Reader, value: object) -> Motion:
     numbers = [name for names in COMMANDS.values() for name in names]
-    entry = read.table("motion", value, (*numbers, "branch", "through", "free", "law"))
+    entry = read.table("motion", value, (*numbers, *OF_STROKE, "side", "branch", "through", "free", "law"))
     stated = [name for name in numbers if name in entry]
+    words: dict[str, Any] = {
+        "branch": BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
+        "through": read.choice("motion.through", entry.get("through", "sign"), THROUGH),
+    }
+    if given := [name for name in (*OF_STROKE, "side") if name in entry]:
+        for name in (*stated, *(name for name in ("free", "law") if name in entry)):
+            raise read.refuse(f"motion.{name}", entry[name], f"{given[0]} commands a cylinder, and nothing else is")
+        return _stroke_motion(read, entry, words)
     bar = int(stated[0][-1]) if stated else 2
     for name in stated:
         if int(name[-1]) != bar:
@@ -187,11 +195,33 @@ def _motion(read: Reader, value: object) -> Motion:
     if omega in entry:
         commanded[omega] = read.quantity(f"motion.{omega}", entry[omega], "rad/s")
     return Motion(
-        branch=BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
-        through=read.choice("motion.through", entry.get("through", "sign"), THROUGH),
         free=free,
         law=_law(read, entry["law"]) if "law" in entry else None,
+        **words,
         **commanded,
+    )
+
+
+def _stroke_motion(read: Reader, entry: dict[str, Any], words: dict[str, Any]) -> Motion:
+    key, value = "motion.stroke", entry.get("stroke")
+    stroke: Any = None
+    if isinstance(value, dict):
+        sweep = read.table(key, value, ("from", "to", "steps"))
+        start, stop = (read.quantity(f"{key}.{name}", sweep.get(name), "m") for name in ("from", "to"))
+        stroke = Sweep(start, stop, read.whole(f"{key}.steps", sweep.get("steps", DEFAULT_STEPS), 1, MOST_STEPS))
+    elif isinstance(value, list) and value:
+        stroke = np.array([read.quantity(f"{key}[{index}]", each, "m") for index, each in enumerate(value)])
+    else:
+        stroke = read.quantity(key, value, "m")
+    speed = "stroke_speed"
+    return Motion(
+        stroke=stroke,
+        stroke_speed=read.quantity(f"motion.{speed}", entry[speed], "m/s") if speed in entry else None,
+        stroke_acceleration=read.quantity(
+            "motion.stroke_acceleration", entry.get("stroke_acceleration", "0 m/s^2"), "m/s^2"
+        ),
+        side=read.choice("motion.side", entry.get("side"), ("left", "right")),
+        **words,
     )
 
 

@@ -80,22 +80,24 @@ def _bar_entry(scene: Scene, number: int) -> dict[str, Any]:
 def _motion_entry(motion: Motion) -> dict[str, Any]:
     law, free, wanted = motion.law, motion.free, motion.angle
     theta, omega, alpha = motion.names
+    unit = "rad" if motion.stroke is None else "m"
     angles: Any = wanted
     if isinstance(wanted, Sweep):
-        ends = {"from": quantity(wanted.start, "rad"), "to": quantity(wanted.stop, "rad")}
+        ends = {"from": quantity(wanted.start, unit), "to": quantity(wanted.stop, unit)}
         angles = {**ends, "steps": wanted.steps}
     elif isinstance(wanted, FromLimit):
         angles = {"limit": wanted.limit, "offset": quantity(wanted.offset, "rad")}
     elif isinstance(wanted, np.ndarray):
-        angles = [quantity(angle, "rad") for angle in wanted.tolist()]
+        angles = [quantity(angle, unit) for angle in wanted.tolist()]
     elif wanted is not None:
-        angles = quantity(wanted, "rad")
+        angles = quantity(wanted, unit)
     entry = {
         theta: angles,
-        omega: None if motion.speed is None else quantity(motion.speed, "rad/s"),
-        alpha: quantity(motion.acceleration, "rad/s^2") if law is None else None,
+        omega: None if motion.speed is None else quantity(motion.speed, f"{unit}/s"),
+        alpha: quantity(motion.acceleration, f"{unit}/s^2") if law is None else None,
         "law": None if law is None else _law_entry(law),
         "branch": BRANCH_NAMES[motion.branch],
+        "side": motion.side,
         "through": motion.through,
         "free": None if free is None else {"duration": quantity(free.duration, "s"), "steps": free.steps},
     }

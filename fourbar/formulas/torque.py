@@ -46,11 +46,12 @@ def half_slope(a: Number, bodies: Bodies, at: Position, k: Coefficients) -> Numb
     return half
 
 
-def driving_torque(k: Coefficients, drive_bar: int, inertial: Number, Q: Number) -> Number:
-    """T_k = (J q'' + J'/2 q'^2 - Q)/h_k, N m.
+def driving_torque(by: Number, inertial: Number, Q: Number) -> Number:
+    """Compute T_k = (J q'' + J'/2 q'^2 - Q)/h_k, N m, or the force of a drive along a line with ds/dq for h_k, N.
 
     Parameters
     ----------
+    by : h_k of the driven bar, or ds/dq, m.
     inertial : J q'' + J'/2 q'^2, N m.
     Q : generalised force of loads and effects, N m.
 
@@ -64,7 +65,7 @@ def driving_torque(k: Coefficients, drive_bar: int, inertial: Number, Q: Number)
     >>> bars = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.020, 1.5, G3), Body(0.015, 0.8, 5 + 0j)
     >>> inertial = sum(inertia(5, bars, s.at, s.k)) * -40 + half_slope(5, bars, s.at, s.k) * 25**2
     >>> Q = dot(P, s.point_coefficient(3, G3 + polar(3, 100 * deg))) + 120 * s.k.h4
-    >>> f"{driving_torque(s.k, 2, inertial, Q):.2f}"
+    >>> f"{driving_torque(s.k.h2, inertial, Q):.2f}"
     '243.23'
     """
-    return (inertial - Q) / (k.h2 if drive_bar == 2 else k.h3 if drive_bar == 3 else k.h4)
+    return (inertial - Q) / by

@@ -15,6 +15,8 @@ OPEN, CROSSED = 1, -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
 FASTEST = math.sqrt(sys.float_info.max)
 """rad/s. The square of any greater speed is beyond the range of a double, and with it every acceleration."""
+OF_STROKE = ("stroke", "stroke_speed", "stroke_acceleration")
+"""What commands a cylinder."""
 DEFAULT_STEPS = 360
 """Of the default range, where a motion names no angle."""
 
@@ -80,6 +82,10 @@ class Motion:
     free : released motion instead of a prescribed one.
     law : an angle over time instead of theta_2, omega_2 and alpha_2.
     theta_3, omega_3, alpha_3, theta_4, omega_4, alpha_4 : of the coupler or the output instead.
+    stroke, stroke_speed, stroke_acceleration : of the scene's cylinder between the ground and bar 2 or 4 instead: one
+        stroke, an array of them or a Sweep, m; m/s; m/s^2.
+    side : "left" or "right", with a stroke: on which side of the line from the bar's ground pin to the cylinder's end
+        on the ground, seen towards that end, its end on the bar lies.
     """
 
     theta_2: float | Array | Sweep | FromLimit | None = None
@@ -95,29 +101,36 @@ class Motion:
     theta_4: float | Array | Sweep | FromLimit | None = None
     omega_4: float | None = None
     alpha_4: float = 0.0
+    stroke: float | Array | Sweep | None = None
+    stroke_speed: float | None = None
+    stroke_acceleration: float = 0.0
+    side: str | None = None
     bar: int = field(default=2, init=False)
-    """Which is commanded: 2, 3 or 4."""
+    """Which is commanded: 2, 3 or 4; of a stroke the scene's drive tells."""
 
     def __post_init__(self) -> None:
         expect("motion.law", self.law, Law, type(None))
         stated = the_bar("motion", self, COMMANDS)
         object.__setattr__(self, "bar", (stated or 2) if self.law is None else self.law.bar)
+        if self.stroke is not None or self.side is not None or self.stroke_speed is not None:
+            self._require_stroke(stated)
         theta, omega, alpha = self.names
         if self.law is not None and (stated is not None or self.free is not None):
             allowed = f"stands alone: it gives {theta}, {omega} and {alpha}"
             raise InputError("motion.law", self.law.ends, allowed)
+        unit = "rad" if self.stroke is None else "m"
         if self.angle is not None and not isinstance(self.angle, (Sweep, FromLimit)):
-            angles = require_numbers(f"motion.{theta}", self.angle, "must be finite angles", "rad")
+            angles = require_numbers(f"motion.{theta}", self.angle, "must be finite angles", unit)
             if angles.size == 0:
                 raise InputError(f"motion.{theta}", self.angle, "must be one angle or more")
             angles.flags.writeable = False
             object.__setattr__(self, theta, float(angles) if angles.ndim == 0 else angles)
         if self.speed is not None:
-            object.__setattr__(self, omega, speed := require(f"motion.{omega}", self.speed, "rad/s"))
+            object.__setattr__(self, omega, speed := require(f"motion.{omega}", self.speed, f"{unit}/s"))
             if not math.isfinite(speed * speed):
                 allowed = f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
                 raise InputError(f"motion.{omega}", speed, allowed)
-        object.__setattr__(self, alpha, require(f"motion.{alpha}", self.acceleration, "rad/s^2"))
+        object.__setattr__(self, alpha, require(f"motion.{alpha}", self.acceleration, f"{unit}/s^2"))
         if isinstance(self.branch, str):
             words = {name: number for number, name in BRANCH_NAMES.items()}
             object.__setattr__(self, "branch", words.get(self.branch, self.branch))
@@ -142,12 +155,25 @@ class Motion:
 
     def _rest(self) -> tuple[object, ...]:
         """Everything but the angles."""
-        return (self.bar, self.speed, self.acceleration, self.branch, self.through, self.free, self.law)
+        return (self.names, self.side, self.speed, self.acceleration, self.branch, self.through, self.free, self.law)
+
+    def _require_stroke(self, stated: int | None) -> None:
+        """InputError where the stroke is not what alone is commanded, or is none."""
+        if self.stroke is None or stated is not None or self.law is not None or self.free is not None:
+            raise InputError("motion.stroke", self.stroke, "is commanded alone: no angle, law or release besides")
+        if not isinstance(self.stroke, Sweep):
+            strokes = require_numbers("motion.stroke", self.stroke, "must be finite lengths", "m")
+            object.__setattr__(self, "stroke", strokes)
+        ends = (self.stroke.start, self.stroke.stop) if isinstance(self.stroke, Sweep) else self.stroke
+        if not np.all(np.asarray(ends) > 0.0):
+            raise InputError("motion.stroke", self.stroke, "must be above 0 m")
+        if self.side not in ("left", "right"):
+            raise InputError("motion.side", self.side, 'must be "left" or "right", as a stroke has two angles')
 
     @property
     def names(self) -> tuple[str, str, str]:
-        """Of what is commanded: theta_2, omega_2 and alpha_2, or those of bar 3 or 4."""
-        return COMMANDS[self.bar]
+        """Of what is commanded: theta_2, omega_2 and alpha_2, those of bar 3 or 4, or a stroke and its rates."""
+        return COMMANDS[self.bar] if self.stroke is None else OF_STROKE
 
     @property
     def angle(self) -> float | Array | Sweep | FromLimit | None:

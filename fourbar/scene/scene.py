@@ -1,6 +1,6 @@
 """A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages requested."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -60,6 +60,11 @@ class Scene:
             object.__setattr__(self, "drive_bar", bar)
         else:
             self._require_linear(self.drive)
+        if self.motion.stroke is not None:
+            from fourbar.scene.stroke import triangle
+
+            object.__setattr__(self, "motion", replace(self.motion))
+            object.__setattr__(self.motion, "bar", triangle(self.linkage, self.drive).bar)
         from fourbar.effects.effect import Effect
 
         many = {"loads": Effect, "effects": Effect, "pictures": object, "points": Point, "tolerances": Tolerance}
@@ -117,6 +122,10 @@ class Command(NamedTuple):
     time: Array | None = None
     """(n,), s; where the motion is given over time."""
     bar: int = 2
+    stroke: Array | None = None
+    """(n,), m; where a stroke is commanded, from which the others follow."""
+    lever: Array | None = None
+    """(n,), of that cylinder, as a part of the longest that it could be."""
 
     @property
     def commanded(self) -> str:
@@ -148,8 +157,26 @@ class Command(NamedTuple):
 
 def require_input(scene: Scene, what: str) -> None:
     """Raise a LimitError where what is asked for takes a command of the input alone, and another bar has it."""
-    if scene.motion.bar != 2:
+    if scene.motion.names[0] != "theta_2":
         raise LimitError(f"motion.{scene.motion.names[0]}: {what} takes a command of theta_2 alone")
+
+
+def _of_stroke(scene: Scene) -> Command:
+    """List the positions of a commanded stroke, as those of the bar that the cylinder turns."""
+    from fourbar.scene.stroke import triangle
+
+    motion, wanted = scene.motion, scene.motion.stroke
+    if isinstance(wanted, Sweep):
+        stroke = np.linspace(wanted.start, wanted.stop, wanted.steps + 1)
+    else:
+        stroke = np.array(wanted, dtype=float, ndmin=1)
+    own = triangle(scene.linkage, scene.drive)
+    assert motion.side is not None
+    angle, speed, acceleration, lever = own.turned(stroke, motion.stroke_speed, motion.stroke_acceleration, motion.side)
+    branch = np.full(stroke.shape, motion.branch, dtype=np.int8)
+    if motion.through == "follow":
+        branch = on_smooth_path(scene.linkage, angle, motion.branch, own.bar)
+    return Command(angle, branch, speed, acceleration, bar=own.bar, stroke=stroke, lever=lever)
 
 
 def command(scene: Scene) -> Command:
@@ -159,6 +186,8 @@ def command(scene: Scene) -> Command:
     stated, remainder, time = motion.angle, None, None
     speed: float | Array | None = motion.speed
     acceleration: float | Array = motion.acceleration
+    if motion.stroke is not None:
+        return _of_stroke(scene)
     if motion.law is not None:
         time = motion.law.times()
         angle, speed, acceleration = motion.law.at(time)

@@ -58,7 +58,7 @@ def between(scene: Scene, solution: Solution) -> Between | None:
     solution : of the scene's positions, or of its sweep in rising order, to the stage "force".
     """
     motion = scene.motion
-    listed = isinstance(motion.angle, np.ndarray)
+    listed = isinstance(motion.angle, np.ndarray) or motion.stroke is not None
     if motion.free is not None or listed or solution.F12 is None or len(solution) < 2:
         return None
 

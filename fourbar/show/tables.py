@@ -120,7 +120,8 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
         )
     of_drive = driving(solution)
     if scene.motion.speed is None and of_drive.values is None and _acting(scene):
-        lines.append(f"positions only, since {omega} is left out; {STATIC.replace('omega_2', omega)}")
+        static = STATIC.replace("omega_2", omega) if scene.motion.stroke is None else STATIC_STROKE
+        lines.append(f"positions only, since {omega} is left out; {static}")
     found = between(scene, solution)
     if found is not None and found.reversals:
         where = ", ".join(f"{value(theta_2, 'rad', units)} ({pin})" for theta_2, pin in found.reversals)
@@ -175,6 +176,7 @@ def _motor(solution: Solution, units: Conversion, found: Between | None) -> list
 
 
 STATIC = 'omega_2 = "0 rad/s" gives the static torque and pin forces'
+STATIC_STROKE = 'stroke_speed = "0 m/s" gives the static force and pin forces'
 
 
 def _acting(scene: Scene) -> bool:

@@ -145,6 +145,8 @@ def sensitivity(scene: Scene) -> Sensitivity:
     expect("scene", scene, Scene)
     if scene.motion.free is not None:
         raise InputError("motion.free", "a free motion", "has no sensitivities: they are those of a prescribed theta_2")
+    if scene.motion.stroke is not None:
+        raise InputError("motion.stroke", "a stroke", "has no sensitivities: they are those at angles of a bar")
     theta = angle_key(scene)
     if isinstance(scene.motion.angle, FromLimit):
         raise InputError(theta, scene.motion.angle, "has no sensitivities: the limit moves with the lengths")

@@ -87,7 +87,7 @@ def entries(scene: Scene) -> dict[str, SceneNumber]:
         found[f"bars.{name}.mass"] = SceneNumber((*own, "mass"), "kg", AT_LEAST_ZERO)
         found[f"bars.{name}.inertia"] = SceneNumber((*own, "inertia"), "kg m^2", AT_LEAST_ZERO)
         found |= _pair(f"bars.{name}.centre", (*own, "centre"), "m")
-    if scene.motion.law is None:
+    if scene.motion.law is None and scene.motion.stroke is None:
         _, omega, alpha = scene.motion.names
         found[f"motion.{omega}"] = SceneNumber(("motion", omega), "rad/s")
         found[f"motion.{alpha}"] = SceneNumber(("motion", alpha), "rad/s^2")

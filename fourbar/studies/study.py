@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, expect
+from fourbar.errors import InputError, LimitError, expect
 from fourbar.evaluation.blocks import each, evaluation, is_compiled, keep, positions_at_once
 from fourbar.evaluation.case import BLOCK, Case
 from fourbar.evaluation.stages import FORCE
@@ -165,6 +165,8 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     [['ok'], ['ok'], ['not_assembled']]
     """
     expect("scene", scene, Scene)
+    if scene.motion.stroke is not None:
+        raise LimitError("motion.stroke: a study varies linkages at angles of a bar, not at strokes")
     expect("values", values, Mapping)
     if scene.motion.free is not None:
         raise InputError("motion.free", "a free motion", "is integrated for one linkage; a study prescribes theta_2")

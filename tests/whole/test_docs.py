@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 import pytest
 
 import fourbar
@@ -62,7 +63,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize(
     ("name", "count"),
-    [("README.md", 2), ("docs/commands.md", 9), ("docs/gallery.md", 6)],
+    [("README.md", 2), ("docs/commands.md", 9), ("docs/gallery.md", 8)],
     ids=["readme", "commands", "gallery"],
 )
 def test_every_command_prints_what_is_shown(
@@ -172,7 +173,7 @@ def test_the_index_lists_every_page_for_readers_and_for_the_site() -> None:
 def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
     suite = suite_file(GALLERY / "suite.txt")
     names = [suite.name(index) for index in range(len(suite))]
-    assert names == sorted(path.stem for path in GALLERY.glob("*.toml")) and len(names) == 6
+    assert names == sorted(path.stem for path in GALLERY.glob("*.toml")) and len(names) == 8
     for name in names:
         scene = load(GALLERY / f"{name}.toml")
         assert set(fourbar.solve(scene, "force").status) == {"ok"} and len(scene.source) > 100
@@ -180,6 +181,10 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
     # what the sources state of them: a stroke of 54 in, 60 deg to and fro in the same time, 450 mm straight to 1.5 mm
     pump = load(GALLERY / "pump_jack.toml").linkage
     assert fourbar.swing(pump) * 72.0 == pytest.approx(54.0, rel=0.03)
+    stroke = fourbar.solve(load(GALLERY / "excavator_bucket.toml")).stroke
+    assert [round(float(end(stroke)), 1) for end in (np.min, np.max)] == [1.3, 2.1]
+    rest = [each for each in fourbar.equilibrium(load(GALLERY / "tailgate.toml")).found if each.place.branch == -1]
+    assert [each.stability for each in rest] == ["unstable"] and rest[0].held is not None
     wiper = load(GALLERY / "wiper.toml").linkage
     assert math.degrees(fourbar.swing(wiper)) == pytest.approx(60.0, rel=1e-8)
     assert fourbar.time_ratio(wiper) == pytest.approx(1.0, rel=1e-8)

@@ -55,7 +55,7 @@ JUDGED_BY = {
     "loaded loop opensim pinocchio prediction tree witnesses; validation/scenes: random; "
     "validation/engines/mujoco: closed_loop inverse",
     "validation/engines/test_added_guests.py": "validation/engines: checked output workers",
-    "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
+    "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects free_body_stroke",
     "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
     "validation/compare: nearby; validation/engines: exact; validation/engines/mujoco: shipped; "
     "validation/report: hard_page",
@@ -85,7 +85,8 @@ JUDGED_BY = {
     "validation/lab/effects/test_cost.py": "validation/lab/effects: table work; validation/engines/mujoco: stepping",
     # simulators that need not be there: their scripts run where they are installed
     "validation/lab/subjects/test_subjects.py": "validation/lab/subjects: drake_sap examine exudyn_simulated "
-    "genesis_rigid motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco pybullet standing work",
+    "genesis_rigid motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco pinocchio_simulated pybullet "
+    "standing work",
     "validation/lab/subjects/test_versions.py": "validation/lab/subjects: releases versions_page",
 }
 """Modules without a test of their name, folder by folder, and the test that says when one of them is wrong."""

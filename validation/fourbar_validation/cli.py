@@ -28,6 +28,7 @@ COMMANDS = {
     "faults": "fourbar_validation.lab.stress.mutation.planted:command",
     "faults --mutants": "fourbar_validation.lab.stress.mutation.harness:command",
     "standing": "fourbar_validation.lab.subjects.standing:command",
+    "standing --findings": "fourbar_validation.lab.subjects.findings:command",
     "standing --versions": "fourbar_validation.lab.subjects.versions:command",
     "write": "fourbar_validation.lab.models:models",
     "write --problems": "fourbar_validation.lab.subjects.problems:command",

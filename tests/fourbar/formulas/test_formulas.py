@@ -294,7 +294,7 @@ def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any
     for k_th in MOVING_BARS:
         values[f"G{k_th}"] = here.point(k_th, bodies[k_th - 2].z)
         values[f"a_G{k_th}"] = here.acceleration(k_th, bodies[k_th - 2].z)
-        values[f"T{k_th}"] = driving_torque(k, k_th, inertial, 0.5)
+        values[f"T{k_th}"] = driving_torque(k[k_th - 2], inertial, 0.5)
         pins = pin_forces(lengths, at, k_th, drive_sine(at, k_th), w, mass_at_A, 0.25)
         values |= {f"{name} of drive {k_th}": value for name, value in pins._asdict().items()}
     return values

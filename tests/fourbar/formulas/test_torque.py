@@ -450,7 +450,7 @@ def test_a_drive_shares_the_power_of_the_input(drive: int) -> None:
     )
     rate = getattr(s, f"omega_{drive}")
     assert len(s) > 5 and s.torque * rate == pytest.approx(two.torque * at.omega_2, rel=1e-13)
-    assert driving_torque(state_at(fourbar.Scene(linkage), at).k, 2, 3.0, 1.0) == 2.0
+    assert driving_torque(state_at(fourbar.Scene(linkage), at).k.h2, 3.0, 1.0) == 2.0
 
 
 def test_a_single_pendulum() -> None:

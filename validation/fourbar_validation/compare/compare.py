@@ -64,8 +64,8 @@ OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
 SLOW_DRIVE = 0.1
-"""T3 and T4 have poles where omega_3, omega_4 vanish: a simulation is judged where the driven bar
-turns at more than this part of its greatest speed."""
+"""T3 and T4, and the pin forces with them, have poles where omega_3, omega_4 vanish, a cylinder's force where it stands
+still: a simulation is judged where the drive moves at more than this part of its greatest speed."""
 CLOSURE = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
 NOWHERE = "no position at which it is demanded"
 NUMBERS = ("error", "allowed", "theta_2", "condition")
@@ -317,14 +317,14 @@ def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBo
 
 def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
     """Mark where a quantity may be demanded of an engine of this class."""
-    if quantity == "torque" and scene.drive_bar != 2 and tolerance.in_time:
-        speed = formulas.omega_3 if scene.drive_bar == 3 else formulas.omega_4
+    if quantity in FORCES and scene.drive_bar != 2 and tolerance.in_time:
+        speed = {3: formulas.omega_3, 4: formulas.omega_4}.get(scene.drive_bar, formulas.stroke_speed)
         assert speed is not None
         return turning(speed)
     return np.ones(len(formulas), dtype=bool)
 
 
 def turning(speed: Array) -> Mask:
-    """Mark where a driven bar turns fast enough that its torque is no pole's, (n,)."""
+    """Mark where a driven bar turns fast enough that its torque and the pin forces are no pole's, (n,)."""
     fast = np.abs(np.nan_to_num(speed))
     return np.asarray(fast > SLOW_DRIVE * fast.max())

@@ -48,6 +48,15 @@ class DriveLine(NamedTuple):
         return np.asarray((np.conj(self.unit) * (swung[1] - swung[0])).real)
 
     @property
+    def lever(self) -> Array:
+        """Distance of a cylinder's line from the ground pin of its bar 2 or 4, over the longer of both arms."""
+        own, other = (0, 1) if self.drive.start.bar != 1 else (1, 0)
+        point = (self.drive.start, self.drive.end)[own]
+        to_ground = self.arms[other] - (0.0 if point.bar == 2 else self.linkage.ground * self.directions[1])
+        longer = np.maximum(np.abs(self.arms[own]), np.abs(to_ground))
+        return np.asarray(np.abs((np.conj(self.unit) * self.arms[own]).imag) / longer)
+
+    @property
     def most(self) -> float:
         """What its ends could move at most, as `condition` counts, m."""
         _, a, b, c = self.linkage.lengths

@@ -165,7 +165,8 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
     if answer.at is None or not {"theta_3", "theta_4"} <= answer.quantities.keys():
         return None
     known = answer.quantities
-    theta_2 = known["theta_2"] if answer.at.bar != 2 else answer.at.angle
+    commanded = answer.at.bar == 2 and answer.at.stroke is None
+    theta_2 = answer.at.angle if commanded else known["theta_2"]
     theta = {2: theta_2, 3: known["theta_3"], 4: known["theta_4"]}
     code = np.full(len(theta_2), OK, dtype=np.uint8)
     reference = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2)
@@ -174,7 +175,8 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
             setattr(reference, name, known[name])
     reference.commanded = answer.at.commanded
     if answer.at.speed is not None:
-        for name, x in (("omega", answer.at.speed), ("alpha", answer.at.acceleration)):
+        rates = (("omega", answer.at.speed), ("alpha", answer.at.acceleration))
+        for name, x in rates if answer.at.stroke is None else ():  # of a stroke the engine finds them
             setattr(reference, f"{name}_{answer.at.bar}", np.broadcast_to(np.asarray(x, float), theta_2.shape))
         if reference.omega_3 is not None and reference.omega_4 is not None:
             _add_velocities(scene.linkage, theta, reference)
@@ -184,6 +186,8 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
     reference.sin_mu = np.sin(theta[4] - theta[3])
     one, other = (theta[bar] for bar in theta if bar != answer.at.bar)
     reference.condition = np.abs(np.sin(other - one))
+    if answer.at.stroke is not None and scene.drive is not None:
+        reference.condition = reference.condition * line_of(scene.linkage, scene.drive, theta).lever
     if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
         one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits than its sine

@@ -32,7 +32,7 @@ UP = (0.0, 0.0, 1.0)
 
 def refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := unknown_effect(scene, TERM_OF):
+    if reason := unknown_effect(scene, TERM_OF, linear=True):
         return reason
     for number in FIRST_PIN:
         bar = scene.linkage.bar(number)

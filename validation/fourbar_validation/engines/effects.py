@@ -66,10 +66,7 @@ def _torsion(effect: "Torsion", bars: Loaded) -> None:
 def _springs(effect: "Springs", bars: Loaded) -> None:
     """Pull at the engine's own places of the two points."""
     for spring in effect.springs:
-        one, other = (
-            bars.first_pin(point.bar) + bars.rotate(point.bar, *components(point.distance, point.angle))
-            for point in (spring.start, spring.end)
-        )
+        one, other = bars.end(spring.start), bars.end(spring.end)
         vector = np.asarray(other - one)
         distance = math.hypot(*vector)
         if spring.preload == spring.stiffness * spring.length:

@@ -28,6 +28,7 @@ from fourbar_validation.engines.free_body_effects import (
     sliding_pins,
     wound,
 )
+from fourbar_validation.engines.free_body_stroke import turned_by
 
 NAME = "free-body"
 COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
@@ -53,7 +54,7 @@ class FreeBody:
     """Every compared quantity, all positions at once."""
 
     name = NAME
-    commands = ("theta_2", "theta_3", "theta_4")
+    commands = ("theta_2", "theta_3", "theta_4", "stroke")
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming an effect that it does not know."""
@@ -63,12 +64,15 @@ class FreeBody:
             return Answer(
                 NAME, "exact", refusal=f"it counts the turns of springs along theta_2, not {command.commanded}"
             )
+        asked = command
+        if command.stroke is not None:
+            command = turned_by(scene, command)
         bar, closed = command.bar, close(scene.linkage, command.angle, command.branch, command.bar)
         theta = np.insert(closed.theta, bar - 2, command.angle, axis=0)
         answer = Answer(
             NAME,
             "exact",
-            at=command,
+            at=asked,
             assembled=closed.assembled,
             quantities=_places(scene.linkage, *theta),
             evidence={"closure_gap": float(np.max(closed.gap, initial=0.0, where=closed.assembled))},

@@ -2,14 +2,18 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FORCE_AT, rotate, rotate_by
+from fourbar_validation.engines.description import FORCE_AT, components, rotate, rotate_by
+
+if TYPE_CHECKING:
+    from fourbar.effects import LinearDrive
+    from fourbar.effects.spring import SpringEnd
 
 PASSES = 1000
 """Passes over pin loads and the friction they make; each lessens the error where the friction is far from a jam."""
@@ -71,6 +75,8 @@ class Loaded(EngineBars, Protocol):
     """
 
     drive_bar: int
+    linear: "LinearDrive | None" = None
+    """The drive, where it is along a line."""
     field: tuple[float, float] = (0.0, 0.0)
     """Of gravity, m/s^2."""
     loaded: list[str]
@@ -84,6 +90,7 @@ class Loaded(EngineBars, Protocol):
     def ready(self, scene: Scene, terms: list[Act]) -> None:
         """To be called by an engine that has its bars, with what acts on them."""
         self.ground_angle, self.drive_bar, self.terms = scene.linkage.ground_angle, scene.drive_bar, terms
+        self.linear = scene.drive
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
 
     # what the engine gives
@@ -115,6 +122,10 @@ class Loaded(EngineBars, Protocol):
     def first_pin(self, bar: int) -> Array:
         """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
         return np.zeros(2) if bar == 1 else self.point(f"first_pin{bar}")
+
+    def end(self, point: "SpringEnd") -> Array:
+        """Locate an end of a spring or of a linear drive, m, (2,)."""
+        return self.first_pin(point.bar) + self.rotate(point.bar, *components(point.distance, point.angle))
 
     def gravity(self, field: tuple[float, float]) -> None:
         """Set a field (g_x, g_y) for the engine's own gravity, m/s^2."""

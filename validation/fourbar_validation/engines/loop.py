@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
-from fourbar.quantities import ANGLES, OF_LINE, PIN_FORCES, STAGE_OF, STAGES, VECTORS
+from fourbar.quantities import ANGLES, COUPLE, LINE, OF_LINE, PIN_FORCES, STAGE_OF, STAGES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.description import SHARED, speeds
@@ -129,7 +129,9 @@ class Exact:
         start, moves = time.perf_counter(), command.omega_2 is not None
         wanted = STAGES if moves else ("position",)
         names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
-        names += ["torque_inertia"] if bars.alone and moves else []
+        names += [f"{LINE.value}_inertia" if scene.drive else "torque_inertia"] if bars.alone and moves else []
+        if scene.drive is not None and moves:
+            names = [LINE.value if name == COUPLE.value else name for name in names]
 
         def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
             points, theta_3, theta_4 = bars.positions(), bars.angle(3), bars.angle(4)

@@ -22,7 +22,7 @@ class PinocchioTree(Tree):
     """The open tree, built from the description."""
 
     def __init__(self, scene: Scene) -> None:
-        if reason := unknown_effect(scene, TERM_OF):
+        if reason := unknown_effect(scene, TERM_OF, linear=True):
             raise LimitError(reason)
         self.model = model = pin.Model()
         self.joint, self.frame = {1: 0}, dict[str, int]()

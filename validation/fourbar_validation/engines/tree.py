@@ -5,19 +5,25 @@ bar 3 minus B on bar 4 and J = dg/dq the loop holds where g = 0, J v = 0, J a + 
 
     [J^T e_drive] [lambda; T] = tau(q, v, a),
 
-lambda = F43 and e_drive = the derivative of the driven bar's rotation. Every number comes from the engine.
+lambda = F43 and e_drive = the derivative of the driven bar's rotation, or of the stroke of a linear drive. Every number
+comes from the engine.
 """
 
+import math
 from functools import partial
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import COUPLE, LINE
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import ON_BARS, POINTS
 from fourbar_validation.engines.loaded import Act, Loaded, Values, no_wrenches
+
+if TYPE_CHECKING:
+    from fourbar.effects.spring import SpringEnd
 
 
 class Tree(Loaded, Protocol):
@@ -95,11 +101,39 @@ class Tree(Loaded, Protocol):
         self.act()
         return self.needed(self.field, self.wrenches)
 
-    def forces(self, loop_force: Array, torque: float) -> dict[str, Array]:
-        """F12, F32, F14 with the loop force on bar 3 at B, its opposite on bar 4, and the drive's couple put back."""
+    def line(self) -> tuple[Array, Array, Array]:
+        """Place the linear drive: both ends, m, and the unit vector from the one to the other."""
+        assert self.linear is not None
+        one, other = self.end(self.linear.start), self.end(self.linear.end)
+        return one, other, (other - one) / math.hypot(*(other - one))
+
+    def drive_column(self) -> Array:
+        """Return what the drive does on the coordinates per N m or N: of a line the derivative of its stroke, (3,)."""
+        if self.linear is None:
+            return self.turns[self.drive_bar]
+        *_, along = self.line()
+        return np.asarray(along @ (self.end_jacobian(self.linear.end) - self.end_jacobian(self.linear.start)))
+
+    def end_jacobian(self, point: "SpringEnd") -> Array:
+        """Return the derivative of an end of the drive, (2, 3), m: its bar's first pin, and the arm turned across."""
+        if point.bar == 1:
+            return np.zeros((2, 3))
+        x, y = self.end(point) - self.first_pin(point.bar)
+        return self.point_jacobian(f"first_pin{point.bar}") + np.outer((-y, x), self.turns[point.bar])
+
+    def work(self, size: float) -> None:
+        """Let the drive act with a torque, N m, or a force, N."""
+        if self.linear is None:
+            return self.twist(self.drive_bar, size)
+        one, other, along = self.line()
+        self.push(self.linear.start.bar, -size * along, one)
+        return self.push(self.linear.end.bar, size * along, other)
+
+    def forces(self, loop_force: Array, drive: float) -> dict[str, Array]:
+        """F12, F32, F14 with the loop force on bar 3 at B, its opposite on bar 4, and the drive put back."""
         self.push(3, loop_force, self.point("end3"))
         self.push(4, -loop_force, self.point("end4"))
-        self.twist(self.drive_bar, torque)
+        self.work(drive)
         on = self.carried()
         return {"F12": on[2], "F32": -on[3], "F14": on[4]}
 
@@ -115,18 +149,19 @@ class Tree(Loaded, Protocol):
         values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
         for bar in (3, 4):
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
-        solve = partial(multipliers, jacobian, self.turns[self.drive_bar])
+        name = (COUPLE if self.linear is None else LINE).value
+        solve = partial(multipliers, jacobian, self.drive_column())
 
         def balanced() -> dict[str, Any]:
             unknowns = solve(self.torques())
-            return self.forces(unknowns[:2], float(unknowns[2])) | {"F43": unknowns[:2], "torque": unknowns[2]}
+            return self.forces(unknowns[:2], float(unknowns[2])) | {"F43": unknowns[:2], name: unknowns[2]}
 
         try:
             values |= self.settled(balanced)
-        except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
+        except np.linalg.LinAlgError:  # no torque or force of the drive balances the linkage here
             return values
         if self.alone:
-            values["torque_inertia"] = float(solve(self.needed((0.0, 0.0), no_wrenches()))[2])
+            values[f"{name}_inertia"] = float(solve(self.needed((0.0, 0.0), no_wrenches()))[2])
         return values
 
 

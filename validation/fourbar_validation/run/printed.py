@@ -49,15 +49,15 @@ ROUNDED_SOMEWHERE = 20
 def check_points(question: Question) -> Iterator[Row]:
     """Check the scene's own points."""
     if question.scene.points and question.reference is not None and question.at.omega_2 is not None:
-        yield points(question, question.solution, question.reference)
+        yield points(question, question.scene, question.solution, question.reference)
 
 
-def points(question: Question, solution: Solution, reference: Solution, least: float = 0.0) -> Row:
-    """Compare places, velocities and accelerations of the scene's own points, from the angles of another derivation.
+def points(question: Question, scene: Scene, solution: Solution, reference: Solution, least: float = 0.0) -> Row:
+    """Compare places, velocities and accelerations of a scene's own points, from the angles of another derivation.
 
     `least`: the condition from which on they are judged.
     """
-    scene, link, n = question.scene, question.scene.linkage, len(reference)
+    link, n = scene.linkage, len(reference)
     zero = np.zeros(n)
     theta = {1: zero + link.ground_angle, 2: reference.theta_2, 3: reference.theta_3, 4: reference.theta_4}
     speed = {bar: zero if bar == 1 else _known(reference, f"omega_{bar}", n) for bar in theta}

@@ -94,10 +94,11 @@ class Question:
         if witness.name not in self.answered:
             with kept(self.output, witness.name):
                 engine, begin = self.engine(witness), time.perf_counter()
-                if self.at.commanded in getattr(engine, "commands", ("theta_2",)):
+                commanded = self.at.commanded if self.at.stroke is None else "stroke"
+                if commanded in getattr(engine, "commands", ("theta_2",)):
                     answer = engine.answer(self.scene, self.at)
                 else:
-                    refusal = f"it takes a command of theta_2, and here {self.at.commanded} is commanded"
+                    refusal = f"it takes a command of theta_2, and here {commanded} is commanded"
                     answer = Answer(witness.name, "exact", refusal=refusal)
                 self.answered[witness.name] = answer, time.perf_counter() - begin
         return self.answered[witness.name][0]
@@ -182,4 +183,5 @@ def select_positions(at: Command, where: NDArray[np.intp]) -> Command:
 
     time = None if at.time is None else at.time[where]
     speed, acceleration = of(at.speed), of(at.acceleration)
-    return Command(at.angle[where], at.branch[where], speed, acceleration, None, time, at.bar)  # type: ignore[arg-type]
+    moved = Command(at.angle[where], at.branch[where], speed, acceleration, None, time, at.bar)  # type: ignore[arg-type]
+    return moved._replace(stroke=of(at.stroke), lever=of(at.lever))  # type: ignore[arg-type]

@@ -203,3 +203,11 @@ def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links: 
     mass = float(advised[1])
     scene = hood(links or mass, None if output is None else mass)
     assert {row.verdict for row in judge("hood", scene, SIMULATION).rows} == {AGREES}
+
+
+def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused() -> None:
+    """One of ten thousand random linkages stands 1.5e-3 rad from where omega_3 vanishes: T3 and every force diverge."""
+    scene = random_scene(2026, 2265, tuple(DrawnType))
+    assert np.nanmin(fourbar.solve(scene).drive_condition) < 0.003
+    (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
+    assert not [row for row in judge("", scene, [simulated]).rows if row.failed]

@@ -192,19 +192,21 @@ def test_the_bare_model_has_the_closed_loop_and_nothing_else() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "enabled", "more_rows", "tendons"),
+    ("name", "enabled", "more_rows", "tendons", "actuators"),
     [
-        ("gravity", set(), 0, 0),
-        ("viscous", {"damper"}, 0, 1),
-        ("friction", {"frictionloss"}, 4, 1),
-        ("torsion", {"spring"}, 0, 1),
-        ("springs", {"spring"}, 0, 2),
-        ("flywheel", set(), 0, 0),
+        ("gravity", set(), 0, 0, 1),
+        ("viscous", {"damper"}, 0, 1, 1),
+        ("friction", {"frictionloss"}, 4, 1, 1),
+        ("torsion", {"spring"}, 0, 1, 1),
+        ("springs", {"spring"}, 0, 5, 3),  # a constant force, and one that pulls at every length, is an actuator
+        ("flywheel", set(), 0, 0, 1),
     ],
 )
-def test_each_effect_adds_what_it_needs_and_no_more(name: str, enabled: set[str], more_rows: int, tendons: int) -> None:
+def test_each_effect_adds_what_it_needs_and_no_more(
+    name: str, enabled: set[str], more_rows: int, tendons: int, actuators: int
+) -> None:
     model = compiled(name)
-    assert (model.nv, model.neq, model.nu, model.nsensor) == (3, 1, 1, 0)
+    assert (model.nv, model.neq, model.nu, model.nsensor) == (3, 1, actuators, 0)
     assert disabled(model) == BARE - enabled
     assert rows(model) == 3 + more_rows
     assert model.ntendon == tendons  # one at the cut pin B, one for each linear spring

@@ -22,7 +22,16 @@ from tests.whole.test_imports import ROOT
 FILES = sorted(PROBLEMS.glob("*.toml"))
 LONG = () if os.environ.get("PROBLEMS") == "all" else ("iftomm_a02",)
 """Motions that take seconds to compute again; their values are held in any case."""
-PUBLIC = {"crank_rocker", "drake_23842", "gz_physics_987", "iftomm_a02", "newton_128", "pinocchio_2729"}
+PUBLIC = {
+    "crank_rocker",
+    "drake_23842",
+    "gz_physics_987",
+    "iftomm_a02",
+    "newton_128",
+    "pinocchio_2729",
+    "second_on_the_crank",
+    "sprung",
+}
 
 
 @cache

@@ -1,6 +1,5 @@
 """Simulators under test: what is checked, and the findings' scripts where their simulator is installed."""
 
-import ast
 import json
 import math
 import subprocess
@@ -17,14 +16,15 @@ from click.testing import CliRunner
 
 import fourbar
 from fourbar.effects import Friction, Viscous
-from fourbar.errors import LimitError
+from fourbar.errors import DependencyError, LimitError
 from fourbar.mjcf import mjcf
 from fourbar.mjcf.sdf import sdf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.lab.subjects import examine, motion, standing
-from fourbar_validation.lab.subjects.standing import PROBLEM, findings
+from fourbar_validation.lab.subjects.findings import findings
+from fourbar_validation.lab.subjects.standing import PROBLEM
 from fourbar_validation.run.elsewhere import Ended
 from tests.whole.test_imports import ROOT, imported
 
@@ -35,6 +35,9 @@ THROUGH = 1e-5
 
 IN_EXUDYN = 1e-3
 """Of a turn in 314 steps of its trapezoidal rule; measured 1.2e-4."""
+
+IN_PINOCCHIO = {True: 1e-6, False: 5e-3}
+"""Of a turn in 314 steps, by RK4 (measured 2e-7) and by the semi-implicit Euler method (3.3e-3)."""
 
 JUDGES = {"examine.py", "problems.py"}
 """The modules that state or judge by the formulas; every other hands things to a simulator."""
@@ -91,6 +94,20 @@ def test_mujoco_answers_at_states_and_through_a_turn() -> None:
     assert at_states.cost is None and through.cost is not None and through.gap < THROUGH
 
 
+@pytest.mark.usefixtures("sealed")
+def test_each_solver_of_pinocchio_carries_the_loop() -> None:
+    simulated = pytest.importorskip("fourbar_validation.lab.subjects.pinocchio_simulated", exc_type=ImportError)
+    scene = fourbar.load(PROBLEM)
+    for setting in simulated.SETTINGS:
+        found = examine.errors(scene, simulated.through(scene, 314, setting).plain())
+        assert set(found) == {"torque", *PIN_FORCES} and max(found.values()) < IN_PINOCCHIO["RK4" in setting], setting
+        if "RK4" in setting:
+            found = examine.errors(scene, simulated.states(scene, setting).plain())
+            assert max(found.values()) < IN_PINOCCHIO[True], setting
+        else:
+            assert simulated.states(scene, setting) is None
+
+
 def test_a_wrong_a_missing_and_a_nan_reading_show() -> None:
     mujoco_c = pytest.importorskip("fourbar_validation.lab.subjects.mujoco_c", exc_type=ImportError)
     scene = fourbar.load(PROBLEM)
@@ -131,7 +148,8 @@ def of_a_turn(**changes: Any) -> str:
     n = motion.SAMPLES
     reading = {"setting": "s", "steps": 100, "theta": [[1.0, 2.0, 3.0]] * n, "omega_2": [10.0] * n}
     reading |= {"alpha_2": [0.0] * n, "torque": [1.0] * n, "forces": {}, "gap": 0.0, "seconds": 1.0}
-    return json.dumps({"version": "1", "changed": "-", "device": "CPU", "readings": [reading | changes]})
+    answer = {"version": "1", "changed": "-", "device": "CPU", "python": "3", "not_run": {"a batch": "no GPU here"}}
+    return json.dumps({**answer, "apart": {"s": "not meant for it"}, "readings": [reading | changes]})
 
 
 @pytest.mark.parametrize(
@@ -159,7 +177,8 @@ def test_an_answer_that_cannot_be_read_is_left_out_and_the_page_goes_on(
     found = examine.examine(fourbar.load(PROBLEM), PROBLEM, [Path(sys.executable)], 1.0)
     assert why in found.left_out["One"] and "\x1b" not in found.left_out["One"]
     (line,) = found.lines
-    assert line.simulator == "Other" and math.isnan(line.errors["torque"])
+    assert line.simulator == "Other" and math.isnan(line.errors["torque"]) and line.apart == "not meant for it"
+    assert found.devices["Other"] == "CPU, Python 3" and found.left_out["Other, a batch"] == "no GPU here"
 
 
 @pytest.mark.parametrize("name", ["theta", "omega_2", "alpha_2"])
@@ -183,32 +202,55 @@ def test_what_a_simulator_prints_is_no_part_of_its_answer(tmp_path: Path) -> Non
     assert "hello" in done.stderr and "bye" in done.stderr
 
 
+LISTED = {"drake": ["1", "2", "3"], "exudyn": ["3", "4"]}
+
+
+@pytest.mark.parametrize(
+    ("error", "shown"),
+    [(0.0573, "6 %"), (9.6e-4, "0.1 %"), (9.4e-4, "9e-4"), (4.26e-7, "4e-7"), (10.4, "1000 %"), (0.0, "0e+00")],
+)
+def test_an_error_has_one_digit(error: float, shown: str) -> None:
+    assert standing.size(error) == shown and standing.size(math.nan) == "nan"
+
+
 def test_the_page_is_written_and_names_what_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     line = examine.Line("MuJoCo", "4", "generated file", 157, {"torque": 1e-7, "F43": math.nan}, 1e-8, 0.01, 1.5)
+    fine = replace(line, steps=314, errors={"torque": 4.4e-8, "F43": 0.012})
+    aside = replace(fine, setting="slack", errors={"torque": 0.99}, apart="not meant for it")
     pytest.importorskip("jinja2")
     pytest.importorskip("matplotlib")
-    given = examine.Examination([line], {"MuJoCo": "nothing"}, {"MuJoCo": "CPU"})
+    given = examine.Examination([line, fine, aside], {"MuJoCo": "nothing"}, {"MuJoCo": "CPU, Python 3"})
+    given.made_for["MuJoCo"] = "many worlds"
     given.left_out["PyBullet"] = "not installed under any --python"
     monkeypatch.setattr("fourbar_validation.lab.subjects.standing.examine", lambda *_: given)
-    done = CliRunner().invoke(standing.command, ["--out", str(tmp_path)], catch_exceptions=False)
-    assert done.exit_code == 0 and "not examined: PyBullet" in done.output
+    stated = [(finding, f"mended in {number}") for number, finding in enumerate(findings())]
+    monkeypatch.setattr("fourbar_validation.lab.subjects.standing.examined", lambda *_: stated)
+    compared = []
+
+    def history(**asked: Any) -> None:
+        compared.append((asked["engine"], asked["first"]))
+        if asked["engine"] == "exudyn":
+            raise DependencyError("fewer than two versions of exudyn can be judged")
+
+    monkeypatch.setattr(standing, "released", lambda engine, *_: LISTED[engine])
+    monkeypatch.setattr(standing.versions, "callback", history)
+    wanted = ["--out", str(tmp_path), "--history", "drake", "--history", "exudyn"]
+    done = CliRunner().invoke(standing.command, wanted, catch_exceptions=False)
+    assert (
+        done.exit_code == 0
+        and "not examined: PyBullet" in done.output
+        and compared == [("drake", "2"), ("exudyn", "3")]
+    )
+    assert "not examined: the two newest releases of exudyn: DependencyError: fewer" in done.output
     for name in ("standing.html", "standing.md"):
         text = (tmp_path / name).read_text()
-        assert (
-            "1.0e-07" in text and "nan" in text and "PyBullet" in text and all(each in text for each, _ in findings())
-        )
+        for each in ("1e-7", "nan", "PyBullet", "generated file: F43 alone and torque to 1 % in 314 steps.", "slack",
+                     "CPU, Python 3; made for many worlds; here one world", "CPU, Python 3; not meant for it",
+                     *(finding.script.name for finding, _ in stated), *(state for _, state in stated)):  # fmt: skip
+            assert each in text, each
+        assert text.index("in 314 steps.") < text.index("157 steps") < text.index("Apart") < text.rindex("slack")
+    assert len(standing.HEAD) <= 12
     assert (tmp_path / "standing.csv").read_text().splitlines()[1].startswith("MuJoCo,4,generated file,157,1e-07,")
-
-
-@pytest.mark.parametrize("script", sorted((ROOT / "docs" / "findings").glob("*.py")), ids=lambda path: path.stem)
-def test_each_finding_is_reproduced_where_its_simulator_is(script: Path) -> None:
-    tree = ast.parse(script.read_text())
-    names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
-    names |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
-    for name in {name.partition(".")[0] for name in names}:
-        if find_spec(name) is None:
-            pytest.skip(f"not run: {name} is not installed")
-    subprocess.run([sys.executable, str(script)], check=True, capture_output=True)
 
 
 COARSE = 0.05

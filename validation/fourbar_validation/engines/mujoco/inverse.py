@@ -19,7 +19,7 @@ from fourbar_validation.engines.tree import Tree
 
 def refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := unknown_effect(scene, TERM_OF):
+    if reason := unknown_effect(scene, TERM_OF, linear=True):
         return reason
     for part in parts(scene.linkage):
         if min(part.mass, part.inertia) < LIGHTEST.boundary:

@@ -112,7 +112,8 @@ class ResidualMonitor:
         seen = self._motion(q, v, a)
         power = torque * float(self.e_drive @ v)
         self._keep("acceleration_gap", float(np.hypot(*seen.jerk)), float(np.hypot(*seen.a_B)))
-        terms = abs(power) + float(np.abs(seen.needed * v).sum())
+        # at a pole of T3 or T4 the speed of the driven bar, which vanishes, is as uncertain as the others
+        terms = abs(torque) * float(np.abs(v).max()) + float(np.abs(seen.needed * v).sum())
         self._keep("power_gap", abs(power - float(seen.needed @ v)), terms)
         carried = seen.jacobian.T @ loop_force
         unbalanced = float(np.linalg.norm(seen.needed - carried - self.e_drive * torque))

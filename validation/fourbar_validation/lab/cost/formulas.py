@@ -53,8 +53,8 @@ def single(scene: Scene, at: Command) -> Quantities:
         state = case.state(path, theta_2, changed(position, _single), at.branch, speed, growth)
         state = changed(state, _single)
         result = case.dynamics(state, growth, rounded=_single)
-    assert result.torque.dtype == np.float32
-    return {"torque": result.torque, **{name: _stack(getattr(result.pins, name), len(theta_2)) for name in PIN_FORCES}}
+    assert result.drive.dtype == np.float32
+    return {"torque": result.drive, **{name: _stack(getattr(result.pins, name), len(theta_2)) for name in PIN_FORCES}}
 
 
 def _single(value: Any, *, turned: bool = False) -> Any:

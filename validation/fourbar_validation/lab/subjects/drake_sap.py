@@ -1,4 +1,4 @@
-"""Drake's own simulation of the SDF file: a discrete plant, its SAP solver, a ball constraint at B."""
+"""Drake's own simulation of the SDF file: a discrete plant, its SAP solver, the loop closed in two ways."""
 
 from importlib.metadata import version
 from typing import Any
@@ -16,8 +16,14 @@ from fourbar_validation.lab.subjects.motion import Instant, Readings, run_throug
 
 VERSION = version("drake")
 STEPS = (628, 2512)
-CHANGED = "SDF with Drake's ball constraint in place of a fourth joint; its force cannot be read"
-SETTINGS = {"SAP": None}
+CHANGED = (
+    "a flywheel is the rotor of an actuator; by default a loop of four joints is refused, so a ball constraint stands "
+    "in for the fourth (its force is not offered in Python); SetEnableLoopTopology(True) takes the SDF of four joints"
+)
+SETTINGS = {"ball constraint at B": "drake"}
+if hasattr(MultibodyPlant, "SetEnableLoopTopology"):  # from Drake 1.57 on, marked as internal
+    SETTINGS["four joints, SetEnableLoopTopology"] = "gazebo"
+"""For whom the SDF is written: Gazebo's has the fourth joint."""
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
@@ -26,7 +32,9 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     begin, inertia = start(scene), flywheel(scene)
     plant = MultibodyPlant(timestep)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
-    Parser(plant).AddModelsFromString(sdf(scene, "drake", begin), "sdf")
+    if SETTINGS[setting] == "gazebo":
+        plant.SetEnableLoopTopology(True)
+    Parser(plant).AddModelsFromString(sdf(scene, SETTINGS[setting], begin), "sdf")
     plant.mutable_gravity_field().set_gravity_vector(weight(scene))
     joints = [plant.GetJointByName(name) for name in FIRST_PIN.values()]
     actuator = plant.AddJointActuator("drive", joints[0])
@@ -37,6 +45,9 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
     plant.get_actuation_input_port().FixValue(context, np.zeros(plant.num_actuators()))  # also one of every other joint
     for joint, speed in zip(joints, begin.qvel, strict=True):
         joint.set_angular_rate(context, speed)
+    closing = plant.GetJointByName("B") if SETTINGS[setting] == "gazebo" else None  # bar 3 on bar 4
+    if closing is not None:
+        closing.set_angular_rate(context, begin.qvel[0] + begin.qvel[1] - begin.qvel[2])
     simulator = Simulator(plant, context)
     done = 0
 
@@ -48,9 +59,13 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         reactions = plant.get_reaction_forces_output_port().Eval(context)
         on_child = (reactions[int(joint.index())].translational()[:2] for joint in joints)
         O2, A, O4 = (np.array(rotate(angle, *force)) for angle, force in zip(theta, on_child, strict=True))
+        forces = {"F12": O2, "F32": -A, "F14": O4}
+        if closing is not None:
+            on_coupler = reactions[int(closing.index())].translational()[:2]
+            forces["F43"] = np.array(rotate(theta[1], *on_coupler))
         done += n
         simulator.AdvanceTo(done * timestep)
-        return theta, speed, {"F12": O2, "F32": -A, "F14": O4}
+        return theta, speed, forces
 
     def read(before: tuple[list[float], float, dict[str, Any]]) -> Instant:
         theta, speed, forces = before

@@ -19,6 +19,7 @@ from fourbar_validation.run.elsewhere import ended, of_the_harness
 
 SIMULATORS = {
     "mujoco_c": ("MuJoCo", "mujoco"),
+    "pinocchio_simulated": ("Pinocchio", "pinocchio"),
     "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
     "mujoco_mjx": ("MJX", "mujoco.mjx"),
     "newton_mujoco": ("Newton, MuJoCo solver", "newton"),
@@ -48,6 +49,13 @@ class Line:
     """Seconds of the processor for one simulated second."""
     order: float | None = None
     """Of the torque's error, from the number of steps before to this one."""
+    apart: str = ""
+    """Why it does not stand with the others: what the setting is not meant for."""
+
+    @property
+    def worst(self) -> float:
+        """The greatest of the errors, NaN where one is."""
+        return float(np.max(list(self.errors.values())))
 
 
 @dataclass(slots=True)
@@ -58,6 +66,8 @@ class Examination:
     changed: dict[str, str] = field(default_factory=dict)
     devices: dict[str, str] = field(default_factory=dict)
     """What each ran on."""
+    made_for: dict[str, str] = field(default_factory=dict)
+    """Of simulators that are made for something else than what is asked here."""
     left_out: dict[str, str] = field(default_factory=dict)
 
 
@@ -77,12 +87,16 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Ex
             continue
         try:
             answer = json.loads(done.out)
-            judged, about = lines(scene, name, answer), (answer["changed"], answer["device"])
+            judged, changed = lines(scene, name, answer), str(answer["changed"])
+            ran_on = f"{answer['device']}, Python {answer['python']}"
+            not_run = {f"{name}, {what}": str(why) for what, why in answer.get("not_run", {}).items()}
         except (AttributeError, IndexError, KeyError, TypeError, ValueError, FourBarError) as error:
             found.left_out[name] = f"no answer that can be read: {in_words(error)}"
             continue
         found.lines += judged
-        found.changed[name], found.devices[name] = map(str, about)
+        found.changed[name], found.devices[name] = changed, ran_on
+        found.made_for[name] = str(answer.get("made_for", ""))
+        found.left_out |= not_run
     return found
 
 
@@ -101,6 +115,7 @@ def lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
             found,
             reading["gap"] / max(scene.linkage.lengths),
             None if steps is None else reading["seconds"] / turn,
+            apart=answer.get("apart", {}).get(reading["setting"], ""),
         )
         before = made[-1] if made else None
         if before is not None and steps and before.steps and before.setting == line.setting:

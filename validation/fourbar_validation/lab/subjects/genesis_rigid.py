@@ -14,23 +14,31 @@ from fourbar_validation.lab.subjects.mujoco_c import text
 VERSION = version("genesis-world")
 DEVICE = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"
 STEPS = (314, 628)
-CHANGED = "precision 64 and default_armature=None; timestep, gravity and the keyframe's speeds given by hand"
-SETTINGS = {"no armature added": None, "its defaults": 0.1}
-"""Armature of the joints for which the file states none, kg m^2."""
+CHANGED = "precision 64; timestep, gravity and the keyframe's speeds given by hand"
+SETTINGS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "enable_mujoco_compatibility": ({}, {"enable_mujoco_compatibility": True}),
+    "default_armature=None": ({"default_armature": None}, {}),
+    "its defaults": ({}, {}),
+}
+"""What is given to the MJCF morph and to the rigid solver's options."""
+WITHOUT = {"enable_collision": False, "enable_joint_limit": False}
 genesis.init(backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu, precision="64", logging_level="error")
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """Simulate a turn; torque and force are those with which the step began."""
     timestep, _ = turn(scene, steps)
+    of_morph, of_solver = SETTINGS[setting]
     common: dict[str, Any] = {"dt": timestep, "gravity": weight(scene)}
     world = genesis.Scene(
         sim_options=genesis.options.SimOptions(**common),
-        rigid_options=genesis.options.RigidOptions(**common, enable_collision=False, enable_joint_limit=False),
+        rigid_options=genesis.options.RigidOptions(
+            **common, enable_collision=False, enable_joint_limit=False, **of_solver
+        ),
         show_viewer=False,
     )
     with as_file(text(scene, steps, "genesis"), "four_bar.xml") as file:
-        bars = world.add_entity(genesis.morphs.MJCF(file=file, default_armature=SETTINGS[setting]))
+        bars = world.add_entity(genesis.morphs.MJCF(file=file, **of_morph))
         world.build()
     world.step()  # compiled before the clock runs
     world.reset()

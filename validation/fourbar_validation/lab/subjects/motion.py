@@ -81,19 +81,25 @@ def turn(scene: Scene, steps: int) -> tuple[float, list[int]]:
 
 
 def run_through(
-    scene: Scene, steps: int, setting: str, advance: Callable[[int], Any], read: Callable[[Any], Instant]
+    scene: Scene,
+    steps: int,
+    setting: str,
+    advance: Callable[[int], Any],
+    read: Callable[[Any], Instant],
+    clock: Callable[[], float] = time.process_time,
 ) -> Readings:
     """Simulate a turn in so many steps.
 
     Parameters
     ----------
-    advance : so many steps further, by the processor's clock; what it returns is read.
+    advance : so many steps further, by the clock; what it returns is read.
+    clock : of the processor; of a GPU that of the wall.
     """
     found, done = Readings(setting, steps), 0
     for stop in turn(scene, steps)[1]:
-        began = time.process_time()
+        began = clock()
         reached = advance(stop - done)
-        found.seconds += time.process_time() - began
+        found.seconds += clock() - began
         done = stop
         found.read(scene, read(reached))
     return found

@@ -18,6 +18,8 @@ DEVICE = "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].devic
 STEPS = (157, 314, 628)
 CHANGED = "a closure of two timesteps (--for mjx), and jax_enable_x64"
 SETTINGS = {"written for MJX": "mjx", "as for MuJoCo": "mujoco"}
+APART = {"as for MuJoCo": "a closure of ten timesteps, not meant for MJX"}
+"""The one written for MJX yields within two timesteps and so makes up for the term that MJX leaves out."""
 jax.config.update("jax_enable_x64", True)
 forward = jax.jit(mjx.forward)
 

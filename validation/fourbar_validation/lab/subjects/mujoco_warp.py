@@ -1,5 +1,6 @@
 """MuJoCo Warp, in single precision; `forward` once as a user of MuJoCo would, and twice as the file's comment says."""
 
+import time
 from typing import Any
 
 import mujoco_warp as mjw
@@ -15,21 +16,33 @@ VERSION = mjw.__version__ if hasattr(mjw, "__version__") else ""
 DEVICE = str(warp.get_preferred_device().name)
 """Its arrays lie on a GPU where there is one."""
 STEPS = (78, 157)
+MADE_FOR = "many worlds at once on a GPU"
 CHANGED = "a light flywheel and no pads (--for warp): single precision; midphase may not be switched off"
-SETTINGS = {"forward twice": 2, "forward once": 1}
+SETTINGS = {"forward twice": (2, 1), "forward once": (1, 1)}
+"""How often a state is evaluated, and how many worlds are simulated; the last is read."""
+BATCHES = (64, 4096)
+if warp.get_preferred_device().is_cuda:
+    SETTINGS |= {f"forward twice, {worlds} worlds": (2, worlds) for worlds in BATCHES}
+else:
+    NOT_RUN = {f"batches of {' and '.join(map(str, BATCHES))} worlds": "no GPU here"}
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:
     """Simulate a turn in so many steps."""
     model, data = opened(text(scene, steps, "warp"))
-    theirs, state = mjw.put_model(model), mjw.put_data(model, data)
-    mjw.step(theirs, mjw.put_data(model, data))  # compiled before the clock runs
+    times, worlds = SETTINGS[setting]
+    theirs, state = mjw.put_model(model), mjw.put_data(model, data, nworld=worlds)
+    mjw.step(theirs, mjw.put_data(model, data, nworld=worlds))  # compiled before the clock runs
 
     def advance(n: int) -> None:
         for _ in range(n):
             mjw.step(theirs, state)
+        warp.synchronize()
 
-    return run_through(scene, steps, setting, advance, lambda _: _evaluated(model, theirs, state, SETTINGS[setting]))
+    clock = time.perf_counter if warp.get_preferred_device().is_cuda else time.process_time
+    found = run_through(scene, steps, setting, advance, lambda _: _evaluated(model, theirs, state, times), clock)
+    found.seconds /= worlds
+    return found
 
 
 def states(scene: Scene, setting: str) -> Readings:
@@ -40,13 +53,13 @@ def states(scene: Scene, setting: str) -> Readings:
     for q, v in states_of(written, scene):
         state.qpos.assign(np.array([q], dtype=np.float32))
         state.qvel.assign(np.array([v], dtype=np.float32))
-        found.read(scene, _evaluated(model, theirs, state, SETTINGS[setting]))
+        found.read(scene, _evaluated(model, theirs, state, SETTINGS[setting][0]))
     return found
 
 
 def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> Instant:
     for _ in range(times):
         mjw.forward(theirs, state)
-    q, v, a, drive = (x.numpy()[0].astype(float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
-    closing = state.efc.force.numpy()[0, :2].astype(float)
+    q, v, a, drive = (x.numpy()[-1].astype(float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    closing = state.efc.force.numpy()[-1, :2].astype(float)
     return reading(model, q, v, a, drive[model.actuator("drive").id], closing)

@@ -13,6 +13,7 @@ from fourbar_validation.lab.subjects.mujoco_c import reading, text
 VERSION = version("newton")
 DEVICE = str(warp.get_preferred_device().name)
 STEPS = (78, 157)
+MADE_FOR = "many worlds at once on a GPU"
 CHANGED = "add_mjcf takes neither timestep, gravity nor keyframe: all three given by hand; --for newton"
 SETTINGS = {"SolverMuJoCo": None}
 

@@ -8,7 +8,8 @@ import click
 import numpy as np
 
 import fourbar
-from fourbar.effects import Gravity
+from fourbar.effects import Friction, Gravity, Springs, Viscous
+from fourbar.effects.spring import Spring
 from fourbar.errors import LimitError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import PIN_FORCES, UNITS
@@ -28,6 +29,8 @@ CONVENTIONS = (
     "bar j. torque: the couple that the ground exerts on bar 2. branch 1: B left of the line from A to O4, -1: right. "
     "error: how far off the value may be, besides the rounding of its last digit; of a vector, its Euclidean norm."
 )
+DESCRIBED = (Gravity, Springs, Viscous, Friction)
+"""Effects that `given` has a place for."""
 PROMISED = 1e-9
 """rad in 5 s of a released motion, held by test_free_motion_reference.py; beyond them in proportion."""
 PROMISED_FOR = 5.0
@@ -37,11 +40,11 @@ PROMISED_FOR = 5.0
 def problem(file: Path) -> dict[str, Any]:
     """Collect what is given and what is to be answered, each with an error bar.
 
-    Raises LimitError for a scene with more than weights: the description in numbers has no place for it.
+    Raises LimitError for a scene with loads or other effects: the description in numbers has no place for them.
     """
     scene = fourbar.load(file)
-    if scene.loads or any(not isinstance(effect, Gravity) for effect in scene.effects) or scene.drive_bar != 2:
-        raise LimitError(f"{file.name}: a problem of the set has weights alone and drives bar 2")
+    if scene.loads or any(not isinstance(effect, DESCRIBED) for effect in scene.effects) or scene.drive_bar != 2:
+        raise LimitError(f"{file.name}: a problem has weights, springs, dampers and friction alone and drives bar 2")
     found = fourbar.solve(scene, "error")
     answers = _released(found) if scene.motion.free is not None else _prescribed(found)
     named = {name: {"unit": UNITS.get(name, "Hz"), **answer} for name, answer in answers.items()}
@@ -63,12 +66,27 @@ def _given(scene: Scene, found: Solution) -> dict[str, Any]:
     fields = [effect.vector for effect in scene.effects if isinstance(effect, Gravity)]
     given = {"ground": linkage.ground, "ground_angle": linkage.ground_angle, "bars": bars, "branch": motion.branch}
     given["gravity"] = [float(x) for x in (fields[0] if fields else (0.0, 0.0))]
+    for effect in scene.effects:
+        if isinstance(effect, Viscous):
+            given["viscous"] = dict(effect.coefficients)
+        elif isinstance(effect, Friction):
+            given["friction"] = dict(effect.torques)
+        elif isinstance(effect, Springs):
+            given["springs"] = [_spring(spring) for spring in effect.springs]
     if motion.free is None:
         prescribed = {"theta_2": found.theta_2.tolist(), "omega_2": motion.omega_2, "alpha_2": motion.alpha_2}
         return {**given, "motion": "prescribed", **prescribed}
     assert found.time is not None
     begin = {"theta_2": motion.theta_2, "omega_2": motion.omega_2, "through": motion.through}
     return {**given, "motion": "released", "start": begin, "time": found.time.tolist()}
+
+
+def _spring(spring: Spring) -> dict[str, Any]:
+    ends = []
+    for end in (spring.start, spring.end):
+        ends.append({"bar": end.bar, "at": [float(end.in_bar.real), float(end.in_bar.imag)]})
+    size = {"stiffness": spring.stiffness, "length": spring.length, "preload": spring.preload}
+    return {"from": ends[0], "to": ends[1], **size}
 
 
 def _prescribed(found: Solution) -> dict[str, Any]:

@@ -20,6 +20,7 @@ MODULES = {extra: module for module, extra in EXTRA.items() if extra != "exact"}
 """By engine: what must be importable, and which witnesses it is (`Witness.library`)."""
 LISTED = "Available versions:"
 """What pip's list begins with; the newest comes first."""
+CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-versions"
 DONE = "installed"
 """In the folder of a version that was installed wholly."""
 
@@ -72,11 +73,13 @@ def released(engine: str, first: str | None, last: str | None) -> list[str]:
     return chosen
 
 
-def installed(engine: str, version: str, cache: Path, more: Sequence[str] = ()) -> tuple[Path | None, str]:
+def installed(
+    engine: str, version: str, cache: Path, more: Sequence[str] = (), module: str | None = None
+) -> tuple[Path | None, str]:
     """Install a version: the interpreter that loads it and no other, or None, and why it does not install or load.
 
     The environment has the engine and what it requires, and `more` where that does not contradict it; all else it takes
-    from the one that runs here.
+    from the one that runs here. `module` is what is imported of an engine that has no adapter.
     """
     folder = (cache / re.sub(r"[^\w.+-]", "_", "-".join([engine, version, *more]))).absolute()
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
@@ -93,7 +96,7 @@ def installed(engine: str, version: str, cache: Path, more: Sequence[str] = ()) 
         own = dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib"))
         (site / "zz_of_the_harness.pth").write_text("\n".join(own) + "\n", encoding="utf-8")  # read after all others
         (folder / DONE).touch()
-    done = ended([python, "-c", f"import {MODULES[engine]} as engine; print(engine.__file__)"])
+    done = ended([python, "-c", f"import {module or MODULES[engine]} as engine; print(engine.__file__)"])
     if done.why:
         return None, f"does not load: {done.why}"
     if not (printed := done.out.strip()):

@@ -1,6 +1,6 @@
 """`python -m validation standing`: what simulators say of one closed loop, on one page."""
 
-import ast
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -8,18 +8,23 @@ from typing import Any
 import click
 
 import fourbar
-from fourbar.errors import InputError
+from fourbar.errors import FourBarError, InputError
+from fourbar.quantities import PIN_FORCES
 from fourbar.writing import write_text
-from fourbar_validation.compare.rows import csv_text
+from fourbar_validation.compare.rows import csv_text, in_words
 from fourbar_validation.lab.subjects.examine import TORQUE_AND_FORCES, Examination, Line, examine
-from fourbar_validation.places import CHECKOUT, MODELS
+from fourbar_validation.lab.subjects.findings import examined
+from fourbar_validation.lab.subjects.releases import CACHE, module_of, released
+from fourbar_validation.lab.subjects.versions import command as versions
+from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import machine
 from fourbar_validation.report.svg import drawn, inline
 from fourbar_validation.report.templating import rendered
 
 PROBLEM = MODELS / "problems" / "crank_rocker.toml"
-FINDINGS = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
-HEAD = ("simulator", "version", "setting", "of", *TORQUE_AND_FORCES, "gap at B", "CPU s per s", "order")
+HEAD = ("setting", "of", *TORQUE_AND_FORCES, "gap at B", "CPU s per s", "order")
+PERCENT = 9.5e-4
+"""Errors from here on are written in percent, smaller ones as a power of ten."""
 EXPLAINED = (
     "Torque and pin forces: the largest error, divided by the largest value in a turn. The simulator is compared with "
     "the formulas at the angle, speed and acceleration that it had itself. 'states': single states; 'N steps': a turn "
@@ -36,26 +41,49 @@ EXPLAINED = (
     "--python", "pythons", type=click.Path(path_type=Path), multiple=True, help="An environment of simulators."
 )
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("results/standing"), show_default=True)
-@click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each simulator.")
-def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float) -> None:
-    """Examine every simulator that is installed here or under a --python, and write one page (repeat --python)."""
+@click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each simulator and each finding.")
+@click.option(
+    "--history", "engines", metavar="ENGINE", multiple=True, help="Compare its two newest releases too (repeat)."
+)
+@click.pass_context
+def command(
+    ctx: click.Context, scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float, engines: tuple[str, ...]
+) -> None:
+    """Examine every simulator that is installed here or under a --python, and write one page (repeat --python).
+
+    It runs the findings too, and says what could not run: the command of a night.
+    """
     for python in pythons:
         if not python.is_file():
             raise InputError("--python", str(python), "must be a Python interpreter, such as .venv-warp/bin/python")
+    for engine in engines:
+        module_of(engine)  # before anything is examined
     given = fourbar.load(scene)
     out.mkdir(parents=True, exist_ok=True)
-    found = examine(given, scene, [Path(sys.executable), *(path.absolute() for path in pythons)], time_limit)
+    interpreters = [Path(sys.executable), *(path.absolute() for path in pythons)]
+    found = examine(given, scene, interpreters, time_limit)
     if not found.lines:
         raise InputError("--python", ", ".join(map(str, pythons)) or None, "no simulator answered there")
+    for engine in engines:
+        try:
+            before, _ = released(engine, None, None)[-2:]
+            ctx.invoke(versions, engine=engine, first=before, jobs=1, cache=CACHE, out=out / f"versions-{engine}")
+        except FourBarError as error:
+            found.left_out[f"the two newest releases of {engine}"] = in_words(error)
     chart = work_precision(found)
-    versions = dict.fromkeys(f"{line.simulator} {line.version}" for line in found.lines)
+    examined_versions = dict.fromkeys(f"{line.simulator} {line.version}" for line in found.lines)
     page = {
         "title": given.title,
-        "made": f"{machine()}; {', '.join(versions)}",
+        "made": f"{machine()}; {', '.join(examined_versions)}",
+        "verdicts": verdicts(found),
         "explained": EXPLAINED,
         "head": HEAD,
-        "rows": [cells(line) for line in found.lines],
+        "tables": [
+            ("The table", groups(found, apart=False)),
+            ("Apart: settings not meant for the simulator", groups(found, apart=True)),
+        ],
         "lists": [(heading, texts) for heading, texts in _lists(found).items() if texts],
+        "findings": examined(interpreters, time_limit),
         "svg": inline(chart),
     }
     for ending in ("html", "md"):
@@ -76,19 +104,54 @@ def _lists(found: Examination) -> dict[str, list[str]]:
     return {
         "What had to be changed, and what it ran on": changed,
         "Not examined": [f"{name}: {why}" for name, why in found.left_out.items()],
-        "Findings, each with a script that reproduces it (docs/findings)": [
-            f"{sentence} ({script})" for script, sentence in findings()
-        ],
     }
+
+
+def size(error: float) -> str:
+    """Write an error with one digit: in percent, or as a power of ten where it is small."""
+    if not error >= PERCENT:
+        return "nan" if math.isnan(error) else f"{error:.0e}".replace("e-0", "e-")
+    return f"{float(f'{100.0 * error:.1g}'):g} %"
+
+
+def verdicts(found: Examination) -> list[tuple[str, str]]:
+    """State for each simulator in one sentence what its settings reach in their finest turn, and at single states."""
+    made: dict[str, dict[str, list[Line]]] = {}
+    for line in found.lines:
+        if not line.apart:
+            made.setdefault(f"{line.simulator} {line.version}", {}).setdefault(line.setting, []).append(line)
+    return [(name, f"{'; '.join(map(_reached, settings.values()))}.") for name, settings in made.items()]
+
+
+def _reached(lines: list[Line]) -> str:
+    """Summarise one setting; the pins are named where it does not report all."""
+    turns, at_states = [line for line in lines if line.steps], [line for line in lines if not line.steps]
+    said = [f"{size(line.worst)} in {line.steps} steps" for line in turns[-1:]]
+    said += [f"{size(line.worst)} at single states" for line in at_states]
+    pins = [pin for pin in PIN_FORCES if pin in lines[0].errors]
+    read = "every force" if len(pins) == len(PIN_FORCES) else f"{', '.join(pins)} alone"
+    return f"{lines[0].setting}: {read} and torque to {', '.join(said)}"
+
+
+def groups(found: Examination, *, apart: bool) -> list[tuple[str, list[list[str]]]]:
+    """List the simulators with what they ran on and their rows of the table."""
+    made: dict[str, list[list[str]]] = {}
+    for line in found.lines:
+        if bool(line.apart) == apart:
+            told = [line.apart if apart else "", found.made_for.get(line.simulator, "")]
+            told[1] = told[1] and f"made for {told[1]}; here one world"
+            name = f"{line.simulator} {line.version}, {found.devices.get(line.simulator, '')}"
+            made.setdefault("; ".join(filter(None, [name, *told])), []).append(cells(line))
+    return list(made.items())
 
 
 def cells(line: Line) -> list[str]:
     """Format one line of the table."""
     of = "states" if line.steps is None else f"{line.steps} steps"
-    numbers = [f"{line.errors[name]:.1e}" if name in line.errors else "" for name in TORQUE_AND_FORCES]
-    cost = "" if line.cost is None else f"{line.cost:.2g}"
+    numbers = [size(line.errors[name]) if name in line.errors else "" for name in TORQUE_AND_FORCES]
+    cost = "" if line.cost is None else f"{float(f'{line.cost:.2g}'):g}"
     order = "" if line.order is None else f"{line.order:.1f}"
-    return [line.simulator, line.version, line.setting, of, *numbers, f"{line.gap:.1e}", cost, order]
+    return [line.setting, of, *numbers, size(line.gap), cost, order]
 
 
 def table(found: Examination) -> str:
@@ -102,39 +165,34 @@ def table(found: Examination) -> str:
 
 
 def work_precision(found: Examination) -> str:
-    """Draw the error of the torque through a turn over the cost of a simulated second, as SVG."""
+    """Draw the greatest error through a turn over the cost of a simulated second, a colour a simulator, as SVG."""
     from matplotlib import colormaps
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.5, 4.2), layout="constrained")
+    figure = Figure(figsize=(4.8, 8.2), layout="constrained")
     axes = figure.add_subplot()
     series: dict[tuple[str, str], list[Line]] = {}
     for line in found.lines:
         if line.cost:
             series.setdefault((line.simulator, line.setting), []).append(line)
-    names = list(dict.fromkeys(simulator for simulator, _ in series))
-    for index, ((simulator, setting), lines) in enumerate(series.items()):
-        nth = [own for name, own in series if name == simulator].index(setting)
+    simulators = list(dict.fromkeys(simulator for simulator, _ in series))
+    settings: dict[str, int] = {}
+    for (simulator, setting), lines in series.items():
+        nth = settings[simulator] = settings.get(simulator, -1) + 1
         axes.loglog(
             [line.cost or 0.0 for line in lines],
-            [line.errors["torque"] for line in lines],
-            color=[0.8 * part for part in colormaps["turbo"]((names.index(simulator) + 0.5) / len(names))[:3]],
-            marker="osD^vP*Xh<>"[index % 11],
+            [line.worst for line in lines],
+            marker="osD^vP*Xh<>"[simulators.index(simulator) % 11],
+            color=[
+                0.8 * part for part in colormaps["turbo"]((simulators.index(simulator) + 0.5) / len(simulators))[:3]
+            ],
             linestyle=("-", "--", ":", "-.")[nth % 4],
             markersize=4,
             linewidth=1,
             label=f"{simulator}: {setting}",
         )
     axes.set_xlabel("processor seconds for one simulated second")
-    axes.set_ylabel("error of the torque by its greatest value")
+    axes.set_ylabel("greatest error of torque and pin forces")
     axes.grid(alpha=0.3)
-    figure.legend(loc="outside right upper", fontsize=7, frameon=False)
+    figure.legend(loc="outside lower center", fontsize=7, frameon=False)
     return drawn(figure, "standing")
-
-
-def findings() -> list[tuple[str, str]]:
-    """List the name of each script of a checkout and the first sentence of its docstring."""
-    return [
-        (path.name, (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0])
-        for path in sorted(FINDINGS.glob("*.py") if FINDINGS else ())
-    ]

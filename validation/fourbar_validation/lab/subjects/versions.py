@@ -16,7 +16,7 @@ from fourbar.scene import command as on_path
 from fourbar.writing import write_text
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
 from fourbar_validation.engines.workers import each
-from fourbar_validation.lab.subjects.releases import Release, installed, module_of, released
+from fourbar_validation.lab.subjects.releases import CACHE, Release, installed, module_of, released
 from fourbar_validation.lab.subjects.versions_page import changed, written
 from fourbar_validation.places import MODELS
 from fourbar_validation.regression.change import Change, Kind
@@ -26,7 +26,6 @@ from fourbar_validation.regression.record import read_run
 from fourbar_validation.regression.steps import NO_CHANGE
 from fourbar_validation.run.elsewhere import ElsewhereError, of_the_harness, run_elsewhere
 
-CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-versions"
 OF_VERDICTS = (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE, Kind.GONE_FAILURE, Kind.GONE)
 """What a bisection looks for, where its two ends differ in any of them; else for any change."""
 REPEATED = 3

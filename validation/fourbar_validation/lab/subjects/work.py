@@ -5,6 +5,7 @@ It needs numpy, mpmath, pint and the simulator.
 
 import json
 import os
+import platform
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -12,17 +13,22 @@ from typing import TextIO
 
 import fourbar
 
+FURTHER = ("APART", "MADE_FOR", "NOT_RUN")
+"""What a simulator's module may say of settings that stand apart, of its purpose, and of what did not run."""
+
 
 def main(module: str, file: str, answers: TextIO) -> None:
     """Try every setting: a turn at each number of steps, and single states where the simulator takes them."""
     simulator, scene = import_module(f"fourbar_validation.lab.subjects.{module}"), fourbar.load(Path(file))
     found = []
     for setting in simulator.SETTINGS:
-        if hasattr(simulator, "states"):
-            found.append(simulator.states(scene, setting))
+        at_states = simulator.states(scene, setting) if hasattr(simulator, "states") else None
+        if at_states is not None:  # a setting may have none
+            found.append(at_states)
         found += [simulator.through(scene, steps, setting) for steps in simulator.STEPS]
     answer = {"version": simulator.VERSION, "changed": simulator.CHANGED, "readings": [each.plain() for each in found]}
-    answer["device"] = getattr(simulator, "DEVICE", "CPU")
+    answer |= {"device": getattr(simulator, "DEVICE", "CPU"), "python": platform.python_version()}
+    answer |= {name.lower(): getattr(simulator, name) for name in FURTHER if hasattr(simulator, name)}
     answers.write(json.dumps(answer))
 
 

@@ -135,8 +135,7 @@ def held_to(question: Question, engine: str, scene: Scene, solution: Solution, a
     reference = reference_of(scene, answer)
     rows = Comparison(question.name, scene, answer, solution, EQUIVALENCE, COMPARED, predicted, reference).rows()
     if scene.points and reference is not None:
-        moved = Question(question.name, scene, answer.at)
-        rows.append(replace(points(moved, solution, reference, WELL_CONDITIONED), engine=engine))
+        rows.append(replace(points(question, scene, solution, reference, WELL_CONDITIONED), engine=engine))
     return rows
 
 

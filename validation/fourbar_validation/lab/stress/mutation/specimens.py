@@ -9,6 +9,7 @@ from fourbar.effects import (
     Flywheel,
     Friction,
     Gravity,
+    LinearDrive,
     Load,
     PinFriction,
     Spring,
@@ -47,6 +48,23 @@ SPECIMENS: dict[str, Scene] = {
     "crank-rocker": CRANK_ROCKER,
     "coupler driven": replace(CRANK_ROCKER, motion=replace(TURN, branch=CROSSED), drive_bar=3),
     "output driven": replace(CRANK_ROCKER, motion=Motion(Sweep(0.5, 1.5, 12), -10.0, 5.0), drive_bar=4),
+    "cylinder": replace(
+        CRANK_ROCKER,
+        motion=replace(TURN, branch=CROSSED),
+        drive_bar=None,  # type: ignore[arg-type]
+        drive=LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7)),
+    ),
+    "stroke": replace(
+        CRANK_ROCKER,
+        motion=Motion(stroke=Sweep(0.25, 0.35, 12), stroke_speed=0.2, stroke_acceleration=0.1, side="left"),
+        drive_bar=None,  # type: ignore[arg-type]
+        drive=LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)),
+    ),
+    "cylinder on the ground": replace(
+        CRANK_ROCKER,
+        drive_bar=None,  # type: ignore[arg-type]
+        drive=LinearDrive(SpringEnd(1, 0.17, -1.1), SpringEnd(3, 0.09, 0.7)),
+    ),
     "slender bars": Scene(SLENDER, TURN),
     "drag link": Scene(uniform(0.08, 0.24, 0.2, 0.26), TURN, 4, effects=(Gravity(),)),
     "limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)),

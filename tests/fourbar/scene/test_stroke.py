@@ -1,0 +1,126 @@
+"""A stroke commanded: it returns itself, its bar moves as when it is commanded alone, and what cannot be is refused."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar.effects import LinearDrive, SpringEnd
+from fourbar.errors import FourBarError, InputError
+from fourbar.files.scene_file import loads
+from fourbar.files.scene_text import dump
+from fourbar.scene.motion import Sweep
+from fourbar_validation.compare.rows import AGREES
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
+from tests.support.scenes import crank_rocker
+
+ROUND_OFF = 1e-11
+"""Relative: eps over the conditions of these sweeps, 1e-4 at least."""
+ENDS = {2: SpringEnd(2, 0.12, 0.4), 4: SpringEnd(4, 0.15, -0.6)}
+GROUND = SpringEnd(1, 0.3, 2.2)
+
+
+def scene(bar: int, stroke: Any, side: str = "left", *, turned: bool = False, **motion: Any) -> fourbar.Scene:
+    ends = (ENDS[bar], GROUND) if turned else (GROUND, ENDS[bar])
+    own = fourbar.Motion(stroke=stroke, side=side, **motion)
+    return crank_rocker(motion=own, drive=LinearDrive(*ends), effects=(fourbar.Gravity(),))
+
+
+def forwards(bar: int, theta: np.ndarray, branch: int = 1) -> tuple[fourbar.Scene, fourbar.Solution]:
+    own = {f"theta_{bar}": theta, f"omega_{bar}": 2.0, f"alpha_{bar}": 3.0}
+    given = fourbar.Motion(branch=branch, **own)  # type: ignore[arg-type]
+    there = crank_rocker(motion=given, drive=LinearDrive(GROUND, ENDS[bar]), effects=(fourbar.Gravity(),))
+    return there, fourbar.solve(there)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("bar", "low", "high"), [(2, 0.3, 1.4), (4, 1.9, 2.3)])
+def test_what_it_is_solved_to_at_angles_returns_it(bar: int, low: float, high: float, turned: bool) -> None:
+    """Position by position, with the rates that the stroke then has: the same angles, speeds and forces."""
+    _, s = forwards(bar, np.linspace(low, high, 7))
+    assert s.stroke is not None and s.stroke_speed is not None and (s.status_code == 0).all()
+    h = 1e-4
+    for i in range(7):
+        theta = float(getattr(s, f"theta_{bar}")[i])
+        # s'' by differences over time, the angle moving at 2 rad/s and 3 rad/s^2
+        around = np.array([theta + 2.0 * t + 1.5 * t * t for t in (-h, 0.0, h)])
+        strokes = forwards(bar, around)[1].stroke
+        assert strokes is not None
+        growth = float(strokes[0] - 2.0 * strokes[1] + strokes[2]) / h**2
+        rates = {"stroke_speed": float(s.stroke_speed[i]), "stroke_acceleration": growth}
+        found = []
+        for side in ("left", "right"):
+            own = fourbar.solve(scene(bar, float(s.stroke[i]), side, turned=turned, **rates))
+            angle = getattr(own, f"theta_{bar}")[0]
+            if abs(math.remainder(angle - theta, math.tau)) < 1e-9:
+                found.append(own)
+        (own,) = found
+        assert own.stroke is not None
+        assert own.stroke[0] == pytest.approx(s.stroke[i], rel=ROUND_OFF)
+        for name in ("omega_2", "omega_3", "omega_4"):
+            assert getattr(own, name)[0] == pytest.approx(getattr(s, name)[i], rel=1e-9, abs=1e-9)
+        for name in ("alpha_3", "alpha_4", "drive_force"):  # as far as the differences are exact
+            assert getattr(own, name)[0] == pytest.approx(getattr(s, name)[i], rel=1e-5, abs=1e-5)
+
+
+def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end() -> None:
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        s = fourbar.solve(scene(2, 0.3, side))
+        end = 0.12 * np.exp(1j * (s.theta_2[0] + 0.4))
+        ground = 0.3 * np.exp(1j * (2.2 + crank_rocker().linkage.ground_angle))
+        assert sign * (np.conj(ground) * end).imag > 0.0
+
+
+@pytest.mark.parametrize("bar", [2, 4])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_free_bodies_find_the_angle_by_halving_and_agree(bar: int, side: str) -> None:
+    free_body = [witness for witness in WITNESSES if witness.name == "free-body"]
+    strokes = {2: Sweep(0.25, 0.35, 8), 4: Sweep(0.45, 0.52, 8)}[bar]
+    rows = judge("", scene(bar, strokes, side, stroke_speed=0.2, stroke_acceleration=0.1), free_body).rows
+    assert not [row for row in rows if row.failed]
+    known = {row.quantity for row in rows if row.engine == "free-body" and row.verdict == AGREES}
+    assert known >= {"stroke", "stroke_speed", "drive_force", "omega_3", "alpha_3", "condition", "F43"}
+
+
+def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular() -> None:
+    s = fourbar.solve(scene(2, np.array([0.42, 0.3]), stroke_speed=0.1))
+    assert list(s.status) == ["singular", "ok"]
+    assert np.isnan(s.omega_3[0]) and s.condition[0] < 1e-7  # type: ignore[index]
+
+
+def test_it_reads_back_as_it_was_written() -> None:
+    own = scene(4, Sweep(0.4, 0.5, 5), "right", stroke_speed=0.2, stroke_acceleration=-0.1)
+    again = loads(dump(own))
+    assert again == own and again.motion.bar == 4
+
+
+@pytest.mark.parametrize(
+    ("motion", "says"),
+    [
+        ({"stroke": 0.9, "side": "left"}, "0.18 to 0.42 m"),
+        ({"stroke": 0.3}, "left"),
+        ({"stroke": 0.3, "side": "left", "theta_2": 1.0}, "alone"),
+        ({"stroke": -0.3, "side": "left"}, "above 0"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(motion: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=says) as caught:
+        own = crank_rocker(motion=fourbar.Motion(**motion), drive=LinearDrive(GROUND, ENDS[2]))
+        fourbar.solve(own)
+    assert "\n" not in str(caught.value)
+
+
+def test_who_does_not_take_it_says_so() -> None:
+    with pytest.raises(InputError, match=r"motion\.stroke.*cylinder"):
+        crank_rocker(motion=fourbar.Motion(stroke=0.3, side="left"))
+    own = scene(2, Sweep(0.25, 0.35, 8), stroke_speed=0.2)
+    for refuses in (fourbar.sensitivity, fourbar.extremes, fourbar.equilibrium, fourbar.ratio):
+        with pytest.raises(FourBarError, match=r"motion\.stroke"):
+            refuses(own)
+    with pytest.raises(FourBarError, match=r"motion\.stroke"):
+        fourbar.vary(own, {"lengths.input": np.array([0.1])})
+    assert replace(own, title="b") != own

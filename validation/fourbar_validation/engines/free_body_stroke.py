@@ -1,0 +1,45 @@
+"""A bar turned to a stroke by halving, apart from the law of cosines, and at its speed by the line's own lever."""
+
+import numpy as np
+
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.description import components, place
+
+HALVINGS = 80
+"""Of half a turn: beyond the last digit of an angle."""
+
+
+def turned_by(scene: Scene, command: Command) -> Command:
+    """Find the bar's angle where its cylinder has the stroke, on the side that is stated, and its rates."""
+    drive, motion = scene.drive, scene.motion
+    assert drive is not None and command.stroke is not None
+    own, other = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
+    pivot = 0.0j
+    if own.bar == 4:
+        pivot = complex(*components(scene.linkage.ground, scene.linkage.ground_angle))
+    ground = complex(*place(other, scene.linkage.ground_angle)) - pivot
+    arm, sense = complex(*components(own.distance, own.angle)), 1.0 if motion.side == "left" else -1.0
+    towards = float(np.angle(ground / arm))
+
+    def across(theta: Array) -> Array:
+        return np.asarray(arm * np.exp(1j * theta) - ground)
+
+    low, high = np.zeros(len(command.stroke)), np.full(len(command.stroke), np.pi)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        short = np.abs(across(towards + sense * middle)) < command.stroke
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    theta = towards + sense * 0.5 * (low + high)
+    if motion.stroke_speed is None:
+        return command._replace(angle=theta, speed=None)
+    line, velocity = across(theta), 1j * arm * np.exp(1j * theta)  # of the end, per rad/s
+    stroke = np.abs(line)
+    with np.errstate(all="ignore"):
+        slope = (np.conj(line) * velocity).real / stroke
+        omega = motion.stroke_speed / slope
+        # s s'' + s'^2 = |v|^2 + line . a, with a = alpha velocity - omega^2 arm
+        centripetal = (np.conj(line) * (-arm * np.exp(1j * theta))).real * omega**2
+        rest = stroke * motion.stroke_acceleration + motion.stroke_speed**2 - np.abs(velocity * omega) ** 2
+        alpha = (rest - centripetal) / (stroke * slope)
+    return command._replace(angle=theta, speed=omega, acceleration=alpha)
