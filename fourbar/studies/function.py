@@ -71,8 +71,8 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     for key in keys:
         if key not in (*known, theta):
             raise refusal(key, "a key", [*known, theta])
-    wanted = _wanted(scene, quantities, keys)
     _refuse_untraceable(scene, keys)
+    wanted = _wanted(scene, quantities, keys)
     stated = None if theta in keys else command(scene)
     shape = () if stated is None or isinstance(motion.angle, float) else stated.angle.shape
 
