@@ -158,7 +158,7 @@ class Springs(Effect):
                 continue
             across = spring.end.place(state) - spring.start.place(state)
             away = sum(state.lengths[:4]) + abs(spring.start.distance) + abs(spring.end.distance)
-            here = (abs(across) <= COINCIDE * away) & (spring.slack != 0.0)
+            here = (namespace(across).abs(across) <= COINCIDE * away) & (spring.slack != 0.0)
             codes = select(here, NO_DIRECTION, OK if codes is None else codes)
         return codes
 
@@ -167,6 +167,6 @@ def _per_distance(spring: Spring, across: Any, actions: Actions) -> Any:
     """Tension over distance, N/m."""
     if not anywhere(spring.slack != 0.0):
         return spring.stiffness
-    distance = actions.rounded(abs(across))
+    distance = actions.rounded(namespace(across).abs(across))
     slack = spring.preload - actions.rounded(spring.stiffness * spring.length)
     return spring.stiffness + slack / distance  # at a distance of 0 no number, which the status says
