@@ -60,6 +60,7 @@ if _TYPE_CHECKING:
     from fourbar.studies.derivatives import sensitivity as sensitivity
     from fourbar.studies.enclosure import extremes as extremes
     from fourbar.studies.equilibrium import equilibrium as equilibrium
+    from fourbar.studies.function import function as function
     from fourbar.studies.ratio import ratio as ratio
     from fourbar.studies.spread import tolerances as tolerances
     from fourbar.studies.study import Study as Study
@@ -77,6 +78,7 @@ _ON_FIRST_USE = {
     **{name: "fourbar.studies.study" for name in ("Study", "vary")},
     "extremes": "fourbar.studies.enclosure",
     "equilibrium": "fourbar.studies.equilibrium",
+    "function": "fourbar.studies.function",
     "ratio": "fourbar.studies.ratio",
     "tolerances": "fourbar.studies.spread",
     "in_units": "fourbar.show.notebook",

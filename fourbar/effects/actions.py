@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, anywhere, cross
+from fourbar.formulas.arithmetic import Number, anywhere, cross, sign
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies, Body, Wrenches
 from fourbar.linkage import PINS, FourBar
@@ -114,7 +114,7 @@ class Actions:
         """
         slip, turning = self.state.slip(pin), self.turning(pin)
         if not anywhere(self.side != 0):
-            return turning * np.sign(slip * self.state.speed)
+            return turning * sign(slip * self.state.speed)
         moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
         return np.where(np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving)
 
@@ -122,7 +122,7 @@ class Actions:
         """Whether the two bars turn against each other in a motion, as far as rounding lets it be known."""
         i, j = PINS[pin]
         h = self.state.coefficient
-        return np.abs(self.state.slip(pin)) > AT_REST * (np.abs(h(2)) + np.abs(h(i)) + np.abs(h(j)))
+        return abs(self.state.slip(pin)) > AT_REST * (abs(h(2)) + abs(h(i)) + abs(h(j)))
 
     def wrenches(self, inertia: Wrenches) -> Wrenches:
         """Everything that acts on each bar, with d'Alembert's forces and moments."""

@@ -4,10 +4,12 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.numbers import OF_EFFECT
-from fourbar.formulas.arithmetic import anywhere, polar, vector
+from fourbar.formulas.arithmetic import anywhere, namespace, polar, vector
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, require
 
@@ -31,6 +33,8 @@ class Gravity(Effect):
     def field(self) -> Any:
         """g_x + i g_y, m/s^2; a component that the angle as a double cannot tell from zero is zero."""
         u = polar(1.0, self.angle)
+        if namespace(u) is not np:  # it may be differentiated by the angle
+            return self.magnitude * u
         return self.magnitude * vector(u.real * (abs(u.real) > U), u.imag * (abs(u.imag) > U))
 
     @property

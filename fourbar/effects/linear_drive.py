@@ -77,7 +77,7 @@ class LinearDrive:
         """Push its ends apart."""
         push = force * self.line(actions.state, actions.rounded)[1]
         for sense, point in self.ends:
-            actions.force(point.bar, sense * push, point.in_bar * actions.state.direction(point.bar))
+            actions.force(point.bar, sense * push, point.arm(actions.state))
 
     def per_newton(self, actions: Actions) -> Actions:
         """Make what 1 N of it does to the bars, with the roundings of other actions."""

@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import angle, anywhere, polar, two_sum
+from fourbar.formulas.arithmetic import angle, anywhere, namespace, nearest, polar, two_sum
 from fourbar.formulas.motion import State
 from fourbar.linkage import FourBar, require, require_bar, require_numbers
 
@@ -42,14 +42,17 @@ class Table:
             raise InputError(key, (len(angles), len(factors)), "needs two or more angles and as many factors")
         if any(b <= a for a, b in pairwise(angles)):
             raise InputError(f"{key}.theta_2", angles, "must rise")
-        span = angles[-1] - angles[0]
-        whole = math.isclose(span, TURN, rel_tol=1e-12)
-        if span > TURN and not whole:
-            raise InputError(f"{key}.theta_2", angles, "must not exceed one turn")
-        if whole and factors[0] != factors[-1]:
-            raise InputError(f"{key}.factor", factors, "must end as it begins: its ends are one turn apart")
         object.__setattr__(self, "theta_2", angles)
         object.__setattr__(self, "factor", factors)
+        if angles[-1] - angles[0] > TURN and not self.covers_a_turn:
+            raise InputError(f"{key}.theta_2", angles, "must not exceed one turn")
+        if self.covers_a_turn and factors[0] != factors[-1]:
+            raise InputError(f"{key}.factor", factors, "must end as it begins: its ends are one turn apart")
+
+    @property
+    def covers_a_turn(self) -> bool:
+        """Whether every angle lies in it."""
+        return math.isclose(self.theta_2[-1] - self.theta_2[0], TURN, rel_tol=1e-12)
 
     def at(self, theta_2: Any) -> Any:
         """Interpolate the factor; InputError for a position that the table does not cover."""
@@ -61,24 +64,34 @@ class Table:
 
         The difference is theta_2 less the point and whole turns, of which nothing is rounded but the result.
         """
-        points, factors = np.array(self.theta_2), np.array(self.factor)
-        first, last = self.theta_2[0], self.theta_2[-1]
-        place = first + np.remainder(angle(polar(1.0, theta_2)) - first, TURN)
-        beyond = place > last + 1e-12 * TURN
-        if beyond.any():
-            # a position just below the first angle has come round to a whole turn above it
-            round_ = beyond & (first + TURN - place < 1e-12 * TURN)
-            if not (round_ == beyond).all():
-                raise InputError(
-                    "loads.table.theta_2", float(np.max(place)), f"covers {first:g} to {last:g} rad; this lies outside"
-                )
-            place = np.where(round_, first, place)
-        k = np.clip(np.searchsorted(points, place, "right") - 1, 0, len(points) - 2)
+        first, xp = self.theta_2[0], namespace(theta_2)
+        place = first + xp.remainder(angle(polar(1.0, theta_2)) - first, TURN)
+        points, factors = (xp.asarray(row, dtype=place.dtype) for row in (self.theta_2, self.factor))
+        if xp is np:
+            place = self._covered(place)
+            k = np.searchsorted(points, place, "right") - 1
+        else:  # what no library lacks, under no transformation of its own
+            k = xp.sum(xp.astype(place[..., None] >= points, xp.int32), axis=-1) - 1
+        k = xp.clip(k, 0, len(self.theta_2) - 2)
         away, lost = two_sum(theta_2, -points[k])
-        rest = np.fmod(away, TURN)
-        turns = np.rint((theta_2 - place) / TURN)
-        past = rest + (np.rint((away - rest) / TURN) - turns) * TURN + (lost - turns * BEYOND_TURN)
-        return factors[k], np.diff(factors)[k] * (past / np.diff(points)[k])
+        rest = xp.fmod(away, TURN)
+        turns = nearest((theta_2 - place) / TURN)
+        past = rest + (nearest((away - rest) / TURN) - turns) * TURN + (lost - turns * BEYOND_TURN)
+        return factors[k], xp.diff(factors)[k] * (past / xp.diff(points)[k])
+
+    def _covered(self, place: Any) -> Any:
+        """Return angles within a turn from the first, or raise an InputError for one that the table does not cover."""
+        first, last = self.theta_2[0], self.theta_2[-1]
+        beyond = place > last + 1e-12 * TURN
+        if not beyond.any():
+            return place
+        # a position just below the first angle has come round to a whole turn above it
+        round_ = beyond & (first + TURN - place < 1e-12 * TURN)
+        if not (round_ == beyond).all():
+            raise InputError(
+                "loads.table.theta_2", float(np.max(place)), f"covers {first:g} to {last:g} rad; this lies outside"
+            )
+        return np.where(round_, first, place)
 
 
 @dataclass(frozen=True, slots=True)

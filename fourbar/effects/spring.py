@@ -11,7 +11,7 @@ from fourbar.effects.effect import Effect
 from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING
 from fourbar.effects.pins import required
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import anywhere, polar
+from fourbar.formulas.arithmetic import anywhere, namespace, polar, select
 from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, FourBar, require, require_whole
 from fourbar.quantities import NO_DIRECTION, OK
@@ -32,9 +32,14 @@ class SpringEnd(NamedTuple):
         """In the bar's frame, along + i across its line, m; an array, whose products all round alike."""
         return np.asarray(polar(self.distance, self.angle))
 
+    def arm(self, state: State) -> Any:
+        """From the bar's first pin, complex, m, world axes."""
+        plain = namespace(state.at.u2) is np
+        return (self.in_bar if plain else polar(self.distance, self.angle)) * state.direction(self.bar)
+
     def place(self, state: State) -> Any:
         """Where it is, complex, m."""
-        return state.point(self.bar, self.in_bar)
+        return state.foot(self.bar) + self.arm(state)
 
 
 def require_ends(key: str, start: object, end: object) -> tuple[SpringEnd, SpringEnd]:
@@ -143,7 +148,7 @@ class Springs(Effect):
             across = end - start
             force = _per_distance(spring, across, actions) * across
             for point, sign in ((spring.start, 1.0), (spring.end, -1.0)):
-                actions.force(point.bar, sign * force, point.in_bar * state.direction(point.bar))
+                actions.force(point.bar, sign * force, point.arm(state))
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
         """NO_DIRECTION where the two points of a spring with slack coincide."""
@@ -153,8 +158,8 @@ class Springs(Effect):
                 continue
             across = spring.end.place(state) - spring.start.place(state)
             away = sum(state.lengths[:4]) + abs(spring.start.distance) + abs(spring.end.distance)
-            here = (np.abs(across) <= COINCIDE * away) & (spring.slack != 0.0)
-            codes = np.where(here, NO_DIRECTION, OK if codes is None else codes).astype(np.uint8)
+            here = (namespace(across).abs(across) <= COINCIDE * away) & (spring.slack != 0.0)
+            codes = select(here, NO_DIRECTION, OK if codes is None else codes)
         return codes
 
 
@@ -162,6 +167,6 @@ def _per_distance(spring: Spring, across: Any, actions: Actions) -> Any:
     """Tension over distance, N/m."""
     if not anywhere(spring.slack != 0.0):
         return spring.stiffness
-    distance = actions.rounded(np.abs(across))
+    distance = actions.rounded(namespace(across).abs(across))
     slack = spring.preload - actions.rounded(spring.stiffness * spring.length)
     return spring.stiffness + slack / distance  # at a distance of 0 no number, which the status says

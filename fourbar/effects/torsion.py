@@ -12,7 +12,7 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.pins import checked, rows_of
 from fourbar.errors import expect
-from fourbar.formulas.arithmetic import Number
+from fourbar.formulas.arithmetic import Number, conjugate, namespace, nearest
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES
 from fourbar.formulas.position import lengths_read_from
@@ -58,7 +58,8 @@ class Torsion(Effect):
         """M on bar j = -(preload + k (theta_j - theta_i - rest)), its opposite on bar i."""
         for pin, k, rest, preload in self.springs:
             i, j = PINS[pin]
-            angle = actions.rounded(np.angle(state.direction(j) * np.conj(state.direction(i))))
+            turned = state.direction(j) * conjugate(state.direction(i))
+            angle = actions.rounded(namespace(turned).atan2(turned.imag, turned.real))
             actions.couple(pin, -(preload + k * _wound(actions.rounded(angle - rest))))
 
     def counted_from(self, start: State, branch: Number) -> "Torsion":
@@ -84,7 +85,7 @@ class Torsion(Effect):
         return [angles[PINS[pin][1]] - angles[PINS[pin][0]] for pin, *_ in self.springs]
 
 
-def _continuous(state: State, branch: Number) -> dict[int, Array]:
+def _continuous(state: State, branch: Number) -> dict[int, Number]:
     """theta_1 .. theta_4 without jumps at a whole turn, on one branch, as the loop is read from the commanded bar.
 
     The diagonal from A to O4 swings about the ground's line where a < d, and otherwise about the input's, never by
@@ -100,7 +101,7 @@ def _continuous(state: State, branch: Number) -> dict[int, Array]:
     line = np.where(a < d, theta_1, theta_2 + math.pi)
     phi = line + _wound(phi - line)
 
-    def beyond(angle: Array) -> Array:
+    def beyond(angle: Number) -> Number:
         """Wrap the angle into half a turn, or as far outside as rounding puts it."""
         return _wound(angle - 0.5 * math.pi) + 0.5 * math.pi
 
@@ -112,6 +113,6 @@ def _continuous(state: State, branch: Number) -> dict[int, Array]:
     return {1: np.full_like(theta_2, theta_1 - turned), **dict(zip(ROLES[bar], own, strict=True))}
 
 
-def _wound(angle: Array | float) -> Array:
+def _wound(angle: Number) -> Number:
     """Wrap the angle into [-pi, pi]; an angle that lies there stays as it is."""
-    return angle - math.tau * np.rint(angle / math.tau)
+    return angle - math.tau * nearest(angle / math.tau)

@@ -74,9 +74,9 @@ def _fields(of: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(of)) if is_dataclass(of) and not getattr(of, "as_given", False) else ()
 
 
-def undecided(factor: Any, constant: Any, size: Any) -> Any:
+def undecided(factor: Any, constant: Any, size: Any, part: float = UNDECIDED) -> Any:
     """Where doubles cannot decide the sign of a factor of Heron's formula, the constant and 4 a d times a square."""
-    return (constant < 0.0) & (np.abs(factor) < UNDECIDED * (np.abs(constant) + size))
+    return (constant < 0.0) & (abs(factor) < part * (abs(constant) + size))
 
 
 class Dynamics(NamedTuple):

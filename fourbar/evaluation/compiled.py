@@ -25,12 +25,21 @@ from fourbar.evaluation.error_bars import (
     rounded_real,
 )
 from fourbar.formulas import arithmetic, motion, path, pin_forces, position, torque
-from fourbar.formulas.arithmetic import anywhere, cross, select, square_root, vector
+from fourbar.formulas.arithmetic import anywhere, conjugate, cross, divisor, select, square_root, vector
 from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates, with_sines_of_rates
 from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine_of_triangle
 from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, coupler_about_B, inertia_wrenches
 from fourbar.formulas.pin_forces import pin_forces as pin_forces_of
-from fourbar.formulas.position import HalfAngle, Loop, Position, close_loop, direction_of_tangent, half_angle_of_tangent
+from fourbar.formulas.position import (
+    HAIR,
+    HalfAngle,
+    Loop,
+    Position,
+    close_loop,
+    direction_of_tangent,
+    hair,
+    half_angle_of_tangent,
+)
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.solution import Array
 
@@ -299,6 +308,9 @@ def make_known() -> None:
     overload(select)(lambda mask, x, y: lambda mask, x, y: x if mask else y)
     overload(square_root)(lambda x: lambda x: np.sqrt(x))  # noqa: PLW0108
     overload(vector)(lambda x, y: lambda x, y: complex(x, y))  # noqa: PLW0108
+    overload(conjugate)(lambda u: lambda u: u.conjugate())
+    overload(divisor)(lambda x, where: lambda x, where: x)
+    overload(hair)(lambda t: lambda t: np.copysign(HAIR, t))
     of_one, of_each = (lambda rows, row, i: rows[row]), (lambda rows, row, i: rows[row * BLOCK + i])
     overload(number)(lambda rows, row, i: of_each if isinstance(rows, types.Array) else of_one)
     leaves = [getattr(module, name) for module, names in LEAVES for name in names.split()]

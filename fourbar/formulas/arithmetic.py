@@ -1,4 +1,4 @@
-"""Arithmetic over plain floats, arrays and numbers that carry derivatives alike; sums that lose nothing."""
+"""Arithmetic over plain floats, arrays of any library and numbers that carry derivatives; sums that lose nothing."""
 
 import cmath
 import math
@@ -10,18 +10,64 @@ Number = Any
 """A float, or an array that broadcasts over positions and linkages."""
 PLAIN = (int, np.generic)
 """One truth value or code."""
+_OF_TYPE: dict[type, Any] = {float: np, int: np, complex: np, np.ndarray: np}
+
+
+def namespace(*numbers: Number) -> Any:
+    """Return the functions of the library that numbers are of: NumPy's own unless one is an array of another.
+
+    Raises TypeError where they are of two other libraries.
+    """
+    found: Any = np
+    for number in numbers:
+        own = _OF_TYPE.get(type(number)) or _namespace_of(number)
+        if own is not np and found not in (np, own):
+            raise TypeError("arrays of two libraries")
+        found = found if own is np else own
+    return found
+
+
+def _namespace_of(number: Number) -> Any:
+    """Of a type seen for the first time: what takes part in NumPy's functions, and what is no array, is NumPy's."""
+    found: Any = np
+    array = hasattr(number, "__array_namespace__") or hasattr(number, "__dlpack__")
+    if array and not isinstance(number, np.generic) and not hasattr(number, "__array_ufunc__"):
+        from array_api_compat import array_namespace
+
+        found = array_namespace(number)
+    _OF_TYPE[type(number)] = found
+    return found
 
 
 def anywhere(mask: Number) -> bool:
     """Whether a mask may hold at any entry; `np.any` costs a plain number fifty times as much."""
-    return bool(mask) if isinstance(mask, PLAIN) else bool(mask.any())
+    if isinstance(mask, PLAIN):
+        return bool(mask)
+    if isinstance(mask, np.ndarray) or namespace(mask) is np:
+        return bool(mask.any())
+    return True  # arrays of another library may be traced
+
+
+def is_zero(x: Number) -> Number:
+    """Where a number is 0 whatever it is differentiated by: an array of another library, which may be, nowhere."""
+    return (type(x) is float or namespace(x) is np) and x == 0.0
 
 
 def select(mask: Number, x: Number, y: Number) -> Number:
     """Of two forms of one number x where a mask holds, y elsewhere; for a plain one the number itself."""
     if isinstance(mask, PLAIN):
         return x if mask else y
-    return np.where(mask, x, y) if isinstance(mask, np.ndarray) else mask.of_one(x, y)
+    if isinstance(mask, np.ndarray):
+        return np.where(mask, x, y)
+    return mask.of_one(x, y) if hasattr(mask, "of_one") else namespace(mask).where(mask, x, y)
+
+
+def divisor(x: Number, where: Number) -> Number:
+    """Return what divides where a mask holds; elsewhere 0 would leave no number in the derivatives of what it divides.
+
+    Numbers of NumPy stay as they are: their derivatives are taken of what is selected alone.
+    """
+    return x if (xp := namespace(x, where)) is np else xp.where(where, x, 1.0)
 
 
 def two_sum(x: Number, y: Number) -> tuple[Number, Number]:
@@ -50,7 +96,7 @@ def vector(x: Number, y: Number) -> Number:
     if hasattr(x, "slopes") or hasattr(y, "slopes"):  # numbers that carry their derivatives
         return x + 1j * y
     if not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray):
-        return np.complex128(complex(x, y))
+        return np.complex128(complex(x, y)) if namespace(x, y) is np else x + 1j * y
     z = np.empty(np.broadcast(x, y).shape, dtype=complex)
     z.real, z.imag = x, y
     return z[()]
@@ -60,28 +106,48 @@ def polar(r: Number, phi: Number) -> Number:
     """Compute r e^{i phi} with the cosine and the sine of the library, exact where phi = 0."""
     if type(r) is type(phi) is float:
         return cmath.rect(r, phi)
-    return r * np.cos(phi) + 1j * (r * np.sin(phi))
+    of = namespace(r, phi)
+    if of is not np and type(phi) is float:
+        of = math
+    return r * of.cos(phi) + 1j * (r * of.sin(phi))
 
 
 def angle(u: Number) -> Number:
     """Angle of a complex number, rad, in [-pi, pi]."""
-    return cmath.phase(u) if type(u) is complex else np.arctan2(u.imag, u.real)
+    return cmath.phase(u) if type(u) is complex else namespace(u).atan2(u.imag, u.real)
+
+
+def conjugate(u: Number) -> Number:
+    """u*, of a complex number; by its parts in PyTorch, which maps no conjugate over many numbers at once."""
+    return u.conjugate() if hasattr(u, "conjugate") else vector(u.real, -u.imag)
+
+
+def sign(x: Number) -> Number:
+    """-1, 0 or 1; for arrays of other libraries 0 of what is no number, which PyTorch else does not map."""
+    xp = namespace(x)
+    return np.sign(x) if xp is np else xp.astype(x > 0.0, x.dtype) - xp.astype(x < 0.0, x.dtype)
+
+
+def nearest(x: Number) -> Number:
+    """Nearest whole number, the even one of two."""
+    return np.rint(x) if (xp := namespace(x)) is np else xp.round(x)
 
 
 def tangent(x: Number) -> Number:
     """Compute tan x, of Python's own floats as such."""
-    t = np.tan(x)
-    return t.item() if type(x) is float else t
+    return np.tan(x).item() if type(x) is float else namespace(x).tan(x)
 
 
 def square_root(x: Number) -> Number:
     """sqrt(x), NaN where x < 0, of Python's own floats as such."""
-    return math.sqrt(x) if type(x) is float and x >= 0.0 else np.sqrt(x)
+    return math.sqrt(x) if type(x) is float and x >= 0.0 else namespace(x).sqrt(x)
 
 
 def power_of_two(x: Number) -> Number:
-    """Return the power of two just above a positive number."""
-    return math.ldexp(1.0, math.frexp(x)[1]) if type(x) is float else np.ldexp(1.0, np.frexp(x)[1])
+    """Return the power of two just above a positive number; 1 for arrays of libraries that do not tell exponents."""
+    if type(x) is float:
+        return math.ldexp(1.0, math.frexp(x)[1])
+    return np.ldexp(1.0, np.frexp(x)[1]) if namespace(x) is np else 1.0
 
 
 def sine(u: Number, v: Number) -> Number:
@@ -91,9 +157,9 @@ def sine(u: Number, v: Number) -> Number:
 
 def cross(u: Number, v: Number) -> Number:
     """z-component of u x v, the imaginary part of u* v; over arrays least work where u is one number."""
-    return (u.conjugate() * v).imag
+    return (conjugate(u) * v).imag
 
 
 def dot(u: Number, v: Number) -> Number:
     """Scalar product u . v."""
-    return (u.conjugate() * v).real
+    return (conjugate(u) * v).real

@@ -9,9 +9,7 @@ Source: R. L. Norton, Design of Machinery, ch. 6 and 7; B. Paul, Kinematics and 
 
 from typing import NamedTuple
 
-import numpy as np
-
-from fourbar.formulas.arithmetic import Number, anywhere, select, vector
+from fourbar.formulas.arithmetic import Number, anywhere, conjugate, divisor, namespace, select, vector
 from fourbar.formulas.position import Loop, Position
 
 FAST = 4.0
@@ -44,8 +42,9 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     for both triangles on e, with S = 4 a d sin h cos h, y = d^2 - a^2:
         w = -(E2 (d + a)^2 outer + E1 (b - c)^2 4 a d sin^2 h)/(2 root (x S + y root)).
 
+    >>> from math import radians
     >>> from fourbar.formulas.position import close_loop, direction, half_angle, loop
-    >>> lengths, theta_2 = loop(100, 40, 120, 80), np.radians(40)  # mm; Norton, examples 6-7 and 7-1
+    >>> lengths, theta_2 = loop(100, 40, 120, 80), radians(40)  # mm; Norton, examples 6-7 and 7-1
     >>> at = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)
     >>> found = rates(coefficients(lengths, at), 25.0, 15.0)
     >>> f"{found.omega_4:.3f} {found.alpha_4:.3f}"
@@ -64,7 +63,7 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     if anywhere(side_may_turn_fast(lengths)):
         fast = side_turns_fast(lengths, at)
         heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
-        w = select(fast, -heron * per_root / (x * S + y * at.root), w)
+        w = select(fast, -heron * per_root / divisor(x * S + y * at.root, fast), w)
         n, rest = select(fast, 0.5 + w, n), select(fast, 0.5 - w, rest)
     dg = ((2.0 * ad * E2) * kk / inner - (2.0 * ad * E1) * ss / outer) * per_root
     dn = (x * dg - S * w) * per_e2
@@ -93,7 +92,7 @@ def with_sines_of_rates(lengths: Loop, at: Position, k: Coefficients) -> Positio
     if not anywhere(side_may_turn_fast(lengths)):
         return at
     fast, scale = side_turns_fast(lengths, at), at.sin_mu / d
-    u3, u4 = at.u3 * at.u1.conjugate(), at.u4 * at.u1.conjugate()
+    u3, u4 = at.u3 * conjugate(at.u1), at.u4 * conjugate(at.u1)
     u3 = select(fast, vector(u3.real, c * scale * (k.h23 - k.h43)) * at.u1, at.u3)
     u4 = select(fast, vector(u4.real, b * scale * k.h23) * at.u1, at.u4)
     return Position(at.u1, at.u2, u3, u4, at.sin_mu, at.diagonal, at.e2, at.root, at.half)
@@ -101,10 +100,10 @@ def with_sines_of_rates(lengths: Loop, at: Position, k: Coefficients) -> Positio
 
 def with_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coefficients:
     """Put in the exact coefficients of bars that stay parallel: h3, h4 = 0, 1 where `first`, 1, 0 where `second`."""
-    either = first | second
-    h3, h4 = np.where(either, 1.0 * second, k.h3), np.where(either, 1.0 * first, k.h4)
-    h23, h43 = np.where(either, 1.0 * first, k.h23), np.where(either, 1.0 * first - 1.0 * second, k.h43)
-    return Coefficients(k.h2, h3, h4, h23, h43, k.dh2, np.where(either, 0.0, k.dh3), np.where(either, 0.0, k.dh4))
+    either, xp = first | second, namespace(first)
+    h3, h4 = xp.where(either, 1.0 * second, k.h3), xp.where(either, 1.0 * first, k.h4)
+    h23, h43 = xp.where(either, 1.0 * first, k.h23), xp.where(either, 1.0 * first - 1.0 * second, k.h43)
+    return Coefficients(k.h2, h3, h4, h23, h43, k.dh2, xp.where(either, 0.0, k.dh3), xp.where(either, 0.0, k.dh4))
 
 
 class Rates(NamedTuple):

@@ -13,7 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, anywhere, polar, power_of_two, sine, vector
+from fourbar.formulas.arithmetic import (
+    Number,
+    anywhere,
+    is_zero,
+    namespace,
+    polar,
+    power_of_two,
+    select,
+    sign,
+    sine,
+    vector,
+)
 from fourbar.formulas.motion import Coefficients, State, coefficients, rates, with_sines_of_rates
 from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
 from fourbar.formulas.position import (
@@ -65,12 +76,12 @@ class Path(NamedTuple):
         half : of q.
         branch : sign of the root in that order, which is that of `drive_sine` for a drive on the bar itself.
         """
-        turned, along = self.theta_1 != 0.0, anywhere(self.theta_1 == 0.0)
+        turned, along = self.theta_1 != 0.0, anywhere(is_zero(self.theta_1))
         u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
         if along and self.bar == 4:
             u2 = -u2
-        if isinstance(turned, np.ndarray):  # of linkages
-            u2 = np.where(turned, direction(q), u2)
+        if along and anywhere(turned):  # of linkages
+            u2 = select(turned, direction(q), u2)
         at = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
             at = parallel_position(at, *parallel_pairs(self.lengths, half, branch))
@@ -100,7 +111,7 @@ class Path(NamedTuple):
         at = with_sines_of_rates(self.lengths, at, k)
         if self.may_stay_parallel:
             first, second = parallel_pairs(self.lengths, at.half, branch)
-            known = ~np.isnan(at.root)
+            known = ~namespace(at.root).isnan(at.root)
             k = parallel_motion(k, first & known, second & known)
         return (at, k) if self.bar == 2 else (self.in_order(at), read_from(self.bar, k))
 
@@ -127,9 +138,9 @@ class Path(NamedTuple):
             return at.sin_mu if self.bar == 2 else at.root * (0.5 / (self.lengths.b * self.lengths.c))
         found = drive_sine_of_triangle(self.lengths, at, role)
         if self.may_stay_parallel:  # with the sine of the angle that all of them make
-            first, second = parallel_pairs(self.lengths, at.half, np.sign(at.root))
+            first, second = parallel_pairs(self.lengths, at.half, sign(at.root))
             with_first, with_second = (0.0, 2.0 * at.half.sk) if role == 3 else (-2.0 * at.half.sk, 0.0)
-            found = np.where(first, with_first, np.where(second, with_second, found))
+            found = select(first, with_first, select(second, with_second, found))
         return -found if self.bar + drive_bar == 7 else found  # there the two bars have changed places
 
 
@@ -138,7 +149,7 @@ def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     d, a, b, c, _, _ = lengths
     unit = power_of_two(0.25 * (d + a + b + c))
     own, u1 = loop(*lengths_read_from(bar, (d / unit, a / unit, b / unit, c / unit))), polar(1.0, theta_1)
-    meets = anywhere((own.E1 == 0.0) & (own.E2 == 0.0))
+    meets = anywhere(is_zero(own.E1) & is_zero(own.E2))
     return Path(bar, own, theta_1, -u1 if bar == 4 else u1, unit, meets)
 
 

@@ -16,7 +16,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, anywhere, exact_difference, select, square_root, tangent, vector
+from fourbar.formulas.arithmetic import (
+    Number,
+    anywhere,
+    exact_difference,
+    namespace,
+    select,
+    sign,
+    square_root,
+    tangent,
+    vector,
+)
 
 HAIR = 1e-100
 """Added to the size of tan h: with A on O4 bars 3, 4 get the directions to which they tend from theta_2 > theta_1."""
@@ -101,7 +111,7 @@ def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAng
     t = tangent(0.5 * psi)
     meets = lengths.E1 == 0.0
     if anywhere(meets):
-        t = select(meets, t + np.copysign(HAIR, t), t)
+        t = select(meets, t + hair(t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
     return with_factors(lengths, kk, t * sk, -sk)
@@ -111,7 +121,7 @@ def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
     """Compute the same from t = tan h."""
     meets = lengths.E2 == 0.0
     if anywhere(meets):
-        t = select(meets, t + np.copysign(HAIR, t), t)
+        t = select(meets, t + hair(t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
     return with_factors(lengths, t * sk, kk, sk)
@@ -128,6 +138,12 @@ def with_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAngle
             select(short & (kk <= ss), four_bc - outer, inner),
         )
     return HalfAngle(ss, kk, sk, outer, inner)
+
+
+def hair(t: Number) -> Number:
+    """HAIR with the sign of a tangent."""
+    xp = namespace(t)
+    return np.copysign(HAIR, t) if xp is np else xp.copysign(0.0 * t + HAIR, t)
 
 
 def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: Number, unit: Number = 1.0) -> Position:
@@ -170,13 +186,14 @@ def parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Numb
     Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c = d).
     """
     d, a, b, c, _, _ = lengths
-    side = branch * np.sign(half.sk)
+    side = branch * sign(half.sk)
     return (a == c) & (b == d) & (side > 0), (a == b) & (c == d) & (side < 0)
 
 
 def with_parallel_pairs(at: Position, first: Number, second: Number) -> Position:
     """Put in the exact directions u3 = u1, u4 = u2 where `first`, u3 = -u2, u4 = -u1 where `second`."""
-    u3 = np.where(first, at.u1, np.where(second, -at.u2, at.u3))
-    u4 = np.where(first, at.u2, np.where(second, -at.u1, at.u4))
-    sine = np.where(first | second, np.sign(at.root) * 2.0 * np.abs(at.half.sk), at.sin_mu)
+    xp = namespace(first, at.u2)
+    u3 = xp.where(first, at.u1, xp.where(second, -at.u2, at.u3))
+    u4 = xp.where(first, at.u2, xp.where(second, -at.u1, at.u4))
+    sine = xp.where(first | second, sign(at.root) * 2.0 * abs(at.half.sk), at.sin_mu)
     return at._replace(u3=u3, u4=u4, sin_mu=sine)

@@ -10,7 +10,7 @@ h3 = 0, T4 where h4 = 0.
 Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); M. Eksergian, Dynamical analysis of machines (1930).
 """
 
-from fourbar.formulas.arithmetic import Number, anywhere, dot
+from fourbar.formulas.arithmetic import Number, anywhere, conjugate, dot
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.pin_forces import Bodies, about_first_pin
 from fourbar.formulas.position import Position
@@ -37,7 +37,7 @@ def half_slope(a: Number, bodies: Bodies, at: Position, k: Coefficients) -> Numb
         G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R + h2 h3 (h2 - h3) A x R.
     """
     two, three, four = bodies
-    AR = ((a * k.h2 * three.m * three.z) * at.u3) * at.u2.conjugate()  # m h2 (A.R + i A x R)
+    AR = ((a * k.h2 * three.m * three.z) * at.u3) * conjugate(at.u2)  # m h2 (A.R + i A x R)
     half = about_first_pin(three) * (k.h3 * k.dh3) + about_first_pin(four) * (k.h4 * k.dh4)
     half = half + k.dh3 * AR.real + (k.h3 * k.h23) * AR.imag
     if anywhere(k.dh2 != 0.0):  # q is not theta_2

@@ -11,7 +11,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from fourbar.effects.numbers import ANY, AT_LEAST_ZERO, OF_EFFECT, POSITIVE, ROWS
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import polar
+from fourbar.formulas.arithmetic import namespace, polar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 
@@ -36,7 +36,7 @@ class SceneNumber(NamedTuple):
     def holds(self, values: Any) -> Any:
         """Where a scene would take the numbers."""
         low = {ANY: True, AT_LEAST_ZERO: values >= 0.0, POSITIVE: values > 0.0}[self.bound]
-        return np.isfinite(values) & low
+        return namespace(values).isfinite(values) & low
 
 
 def _pair(key: str, place: Place, unit: str, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, SceneNumber]:
@@ -131,7 +131,7 @@ class ManyBars(Bar):
     def to_centre(self) -> Any:
         """As of one bar, whose cosine and sine are those of the C library, not of NumPy."""
         r, phi = self.mass_centre
-        if isinstance(phi, NDArrayOperatorsMixin):  # with its derivatives
+        if isinstance(phi, NDArrayOperatorsMixin) or namespace(r, phi) is not np:  # with its derivatives, or traced
             return polar(r, phi)
         if np.ndim(phi):
             angles = np.asarray(phi).tolist()

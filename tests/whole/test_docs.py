@@ -9,7 +9,9 @@ import math
 import re
 import runpy
 import shlex
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -263,3 +265,32 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
     curve = fourbar.coupler_curve(load(GALLERY / "hoecken.toml").linkage, 0.5, 0.0, steps=720)
     straight = curve.y < 0.4015
     assert straight.mean() > 0.5 and curve.y.min() > 0.3999 and curve.x[straight].max() - curve.x[straight].min() > 0.44
+
+
+def test_the_wiper_of_the_page_needs_less_torque_by_other_means(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of `solve`, `swing` and `transmission_extremes`, which know nothing of the optimiser's functions."""
+    for library in ("jax", "scipy", "array_api_compat"):
+        pytest.importorskip(library)
+    import jax
+
+    monkeypatch.chdir(ROOT)
+    text, double = read("docs/design-by-gradient.md"), jax.config.jax_enable_x64
+    found: dict[str, Any] = {}
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        try:
+            for program in blocks("python", text):
+                exec(program, found)
+        finally:
+            jax.config.update("jax_enable_x64", double)
+    shown = re.findall(r"\d+\.\d+", blocks("text", text)[0])
+    assert re.findall(r"\d+\.\d+", printed.getvalue())[-len(shown) :] == shown
+
+    scene, lengths = found["scene"], [float(length) for length in found["lengths"]]
+    bars = [replace(bar, length=length) for bar, length in zip(scene.linkage.moving, lengths[1:], strict=True)]
+    better = replace(scene, linkage=fourbar.FourBar(lengths[0], *bars))
+    before, after = (abs(fourbar.solve(each).torque).max() for each in (scene, better))
+    assert after < 0.95 * before
+    assert fourbar.swing(better.linkage) == pytest.approx(fourbar.swing(scene.linkage), abs=1e-6)
+    worst = fourbar.transmission_extremes(better.linkage).worst
+    assert math.degrees(worst) > 40.0 - 1e-3
+    assert all(0.5 <= new / old <= 2.0 for new, old in zip(better.linkage.lengths, scene.linkage.lengths, strict=True))

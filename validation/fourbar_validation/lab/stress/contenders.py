@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar import vary
-from fourbar.errors import DependencyError
+from fourbar.errors import DependencyError, installing
 from fourbar.quantities import UNKNOWNS, VECTORS
 from fourbar.solve import solve
+from fourbar.studies.function import function
 from fourbar_validation.lab.stress.bench_picture import Times
 from fourbar_validation.lab.stress.in_c import Loop, c_loop
 from fourbar_validation.lab.stress.timed import command, example, in_turns, seconds
@@ -51,6 +52,7 @@ def loops() -> Peers:
     except DependencyError as error:
         result["compiled"] = str(error)
     result["C"] = c_loop()
+    result |= {name: _by_library(name) for name in ("JAX", "PyTorch")}
     reasons = {name: each for name, each in result.items() if isinstance(each, str)}
     return Peers({name: each for name, each in result.items() if not isinstance(each, str)}, reasons)
 
@@ -64,6 +66,35 @@ def _by_solve(compiled: bool) -> Loop:
             row = next(rows)
             into[name] = out[row : next(rows) + 1].T if name in VECTORS else out[row]
         solve(scene, at=command(len(theta_2))._replace(angle=theta_2), out=into, compiled=compiled)
+
+    return call
+
+
+def _by_library(name: str) -> Loop | str:
+    """Evaluate the scene's function, by JAX compiled, by PyTorch as it stands, on the CPU in doubles."""
+    try:
+        if name == "JAX":
+            import jax
+        else:
+            import torch
+        import array_api_compat  # noqa: F401
+    except ModuleNotFoundError as error:
+        extra = "jax" if name == "JAX" else "torch"
+        return f"{error.name} is not installed: {installing(extra)}"
+    f = function(example(), ["motion.theta_2"], UNKNOWNS)
+    run = jax.jit(f) if name == "JAX" else f
+
+    def call(theta_2: Any, out: Any) -> None:
+        if name == "JAX":
+            with jax.enable_x64(True):
+                found = run(jax.numpy.asarray(theta_2))
+        else:
+            found = run(torch.from_numpy(theta_2))
+        row = 0
+        for unknown in UNKNOWNS:
+            values = np.atleast_2d(np.asarray(found[unknown]).T)
+            out[row : row + len(values)] = values
+            row += len(values)
 
     return call
 

@@ -1,0 +1,230 @@
+"""A scene as a pure function of some of its numbers: to be compiled, mapped and differentiated by an array library."""
+
+from collections.abc import Callable, Iterable, Sequence
+from difflib import get_close_matches
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.evaluation.case import Case, undecided
+from fourbar.evaluation.stages import kinematics, of_command
+from fourbar.formulas.arithmetic import namespace
+from fourbar.formulas.mobility import change_points
+from fourbar.quantities import OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, STAGE_OF, is_scalar
+from fourbar.scene import Scene, command
+from fourbar.scene.motion import FromLimit
+from fourbar.scene.point import OF_POINTS
+from fourbar.studies.keys import angle_key, at_place, entries, refusal, with_numbers
+
+NO_DIGIT_LEFT, UNDECIDED = 8.0, 16.0
+"""Times the spacing of the numbers at 1: of |sin mu|, and of what decides whether the loop closes, as `solve` has them
+for doubles."""
+NEVER = {*OF_DRY_FRICTION, *OF_PIN_LOADS, *OF_LINE, *(name for name, stage in STAGE_OF.items() if stage == "error")}
+"""Quantities of searches and of many digits."""
+
+
+class Given(NamedTuple):
+    """Numbers as arrays of one library."""
+
+    values: dict[str, Any]
+    xp: Any
+    zero: Any
+    """Of the shape and the kind of the results."""
+    eps: float
+    """The spacing of its numbers at 1."""
+
+
+def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("torque",)) -> Callable[..., Any]:
+    """Make a pure function of some numbers of a scene, for any array library: JAX, PyTorch or NumPy.
+
+    The function takes one value for each key, a number or an array of shape () or (n,), and returns a dict: each
+    quantity with the shape that the values have together, () or (n,), a vector with 2 more. Where solve has a status
+    other than "ok" the result is NaN, and so it is where a loop is so near a limit that only many digits tell whether
+    it closes; a derivative of the other positions is not touched by those. A torsion spring counts its turns at each
+    position anew, and the angles are in (-pi, pi].
+
+    Parameters
+    ----------
+    keys : as of `vary`; without "motion.theta_2" the positions are those of the scene.
+    quantities : as in a solution, those of the scene's own points too.
+
+    Raises
+    ------
+    InputError : an unknown key or quantity; what cannot be traced: friction that depends on the pin forces, a free
+        motion, a position stated from a limit, a path that is followed through change points, a table that covers
+        less than a turn, a drive along a line. The function: values that are no real floating-point numbers of one
+        library, or whose shapes do not broadcast.
+    DependencyError : array-api-compat is missing, without which other libraries than NumPy are not known.
+
+    >>> from fourbar import Motion, uniform
+    >>> f = function(Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 10.0)), ["lengths.input"])
+    >>> f(np.array([0.1, 0.11, 2.0]))["torque"].round(3).tolist()
+    [-0.009, -0.011, nan]
+    """
+    expect("scene", scene, Scene)
+    for name, names in (("keys", keys), ("quantities", quantities)):
+        expect(name, names, tuple, list)
+        if len(set(names)) < len(names) or not names:
+            raise InputError(name, names, "must be one or more, each once")
+    known, theta, motion = entries(scene), angle_key(scene), scene.motion
+    for key in keys:
+        if key not in (*known, theta):
+            raise refusal(key, "a key", [*known, theta])
+    _refuse_untraceable(scene, keys)
+    wanted = _wanted(scene, quantities, keys)
+    stated = None if theta in keys else command(scene)
+    shape = () if stated is None or isinstance(motion.angle, float) else stated.angle.shape
+
+    def of_numbers(*values: Any) -> dict[str, Any]:
+        given = _given(keys, values, shape)
+        xp, zero, numbers, holds = given.xp, given.zero, {}, True
+        with np.errstate(all="ignore"):
+            for key, value in given.values.items():
+                entry = known.get(key)
+                inside = xp.isfinite(value) if entry is None else entry.holds(value)
+                own = None if entry is None else at_place(scene, entry.place)
+                holds, numbers[key] = holds & inside, xp.where(inside, value, 1.0 if own is None else own)
+            q, changed = numbers.pop(theta, None), with_numbers(scene, numbers)
+            speed, acceleration = changed.motion.speed, changed.motion.acceleration
+            if stated is not None:
+                q = _like(stated.angle.reshape(shape), given)
+                if motion.law is not None:
+                    speed, acceleration = (_like(x, given) for x in (stated.speed, stated.acceleration))
+            case, moved = Case.of(changed, motion.bar), (0.0 if speed is None else speed, acceleration)
+            found, ok = _evaluated(case, q + zero, float(motion.branch), moved, given, wanted)
+            ok = ok & holds
+            parts = {
+                name: (found[name] + zero,) if is_scalar(name) else (found[name].real + zero, found[name].imag + zero)
+                for name in wanted
+            }
+        kept = {name: [xp.where(ok, part, xp.nan) for part in of] for name, of in parts.items()}
+        return {name: of[0] if is_scalar(name) else xp.stack(of, axis=-1) for name, of in kept.items()}
+
+    return of_numbers
+
+
+def _evaluated(
+    case: Case, q: Any, branch: float, motion: tuple[Any, Any], given: Given, wanted: dict[str, str]
+) -> tuple[dict[str, Any], Any]:
+    """Evaluate quantities, and where they have a value; elsewhere they are finite, as in their derivatives.
+
+    A loop that does not close is evaluated with a right angle at B in its place, its sides those of the bars.
+    """
+    xp, path, (speed, acceleration) = given.xp, case.path, motion
+    lengths, half = path.lengths, path.half_angle(q)
+    square = 2.0 * lengths.b * lengths.c
+    size, part = 4.0 * lengths.a * lengths.d, UNDECIDED * given.eps
+    least = NO_DIGIT_LEFT * given.eps * square
+    ok = (half.outer > 0.0) & (half.inner > 0.0) & (half.outer * half.inner > least * least)
+    for factor, constant in ((half.outer, lengths.E1), (half.inner, lengths.E2)):
+        ok = ok & ~undecided(factor, constant, size, part)
+    half = half._replace(outer=xp.where(ok, half.outer, square), inner=xp.where(ok, half.inner, square))
+    stages = set(wanted.values())
+    at = path.position(q, half, branch)
+    state = case.state(path, q, at, branch, speed, acceleration, moving=stages != {"position"})
+    found = kinematics(case, state, wanted.keys()) | of_command(case, at, state, q)
+    if "force" in stages:
+        done = case.dynamics(state, acceleration)
+        found |= {**done.pins._asdict(), "torque": done.drive, "power": done.drive * case.drive_speed(state)}
+        found["drive_condition"] = case.drive_condition(state)
+        for term in case.terms:
+            if (status := term.status(state, None)) is not None:
+                ok = ok & (status == OK)
+    return found, ok
+
+
+def _given(keys: Sequence[str], values: Sequence[Any], positions: tuple[int, ...]) -> Given:
+    """Check the values, and make arrays of one library of them."""
+    if len(values) != len(keys):
+        raise InputError("values", f"{len(values)} of them", f"must be {len(keys)}, one for each of {', '.join(keys)}")
+    arrays = {key: value for key, value in zip(keys, values, strict=True) if not _is_plain(value)}
+    found: dict[Any, str] = {}
+    for key, value in arrays.items():
+        found.setdefault(_library(key, value), key)
+    if len(found) > 1:
+        raise InputError("values", [f"{key} of {xp.__name__}" for xp, key in found.items()], "must be of one library")
+    xp: Any = next(iter(found), np)
+    first = next(iter(arrays.values()), np.float64(0.0))
+    try:
+        shape = np.broadcast_shapes(positions, *(tuple(value.shape) for value in arrays.values()))
+    except ValueError:
+        shapes = {key: tuple(value.shape) for key, value in arrays.items()}
+        raise InputError(
+            "values", shapes, f"must have shapes that broadcast to one of {positions or '() or (n,)'}"
+        ) from None
+    kind = xp.result_type(*arrays.values()) if arrays else np.float64
+    zero = xp.zeros_like(xp.broadcast_to(xp.astype(first, kind) * 0.0, shape))
+    like = Given({}, xp, zero, float(xp.finfo(kind).eps))
+    for key, value in zip(keys, values, strict=True):
+        like.values[key] = value if key in arrays else _like(value, like)
+    return like
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether a value is one number of Python or NumPy."""
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
+def _like(value: Any, given: Given) -> Any:
+    """Make numbers of Python or NumPy an array like the others."""
+    return given.xp.asarray(value, dtype=given.zero.dtype)
+
+
+def _library(key: str, value: Any) -> Any:
+    """Return the functions of an array's library; an InputError for what the formulas do not take."""
+    try:
+        xp = namespace(value)
+    except ModuleNotFoundError:
+        raise DependencyError(f"array-api-compat is needed for arrays of this library: {installing('jax')}") from None
+    if xp is np and not isinstance(value, np.ndarray):
+        raise InputError(key, value, "must be a number or an array of numbers")
+    if not hasattr(xp, "complex64"):
+        raise InputError(key, xp.__name__, "is a library without complex numbers, in which forces are written")
+    if not xp.isdtype(value.dtype, "real floating"):
+        raise InputError(key, str(value.dtype), "must be an array of real floating-point numbers")
+    if len(value.shape) > 1:
+        raise InputError(key, f"shape {tuple(value.shape)}", "must have the shape () or (n,)")
+    return xp
+
+
+def _wanted(scene: Scene, quantities: Iterable[str], keys: Sequence[str]) -> dict[str, str]:
+    """Return the stages of the quantities asked for."""
+    stages = {name: stage for name, stage in STAGE_OF.items() if name not in NEVER}
+    stages |= {start + point.name: stage for point in scene.points for start, stage in OF_POINTS.items()}
+    for name in quantities:
+        if name not in stages:
+            close = get_close_matches(str(name), stages, 1, 0.0)
+            raise InputError("quantities", name, f'is none of a function\'s; did you mean "{close[0]}"?')
+    wanted = {name: stages[name] for name in quantities}
+    motion, omega = scene.motion, f"motion.{scene.motion.names[1]}"
+    at_rest = motion.speed is None and motion.law is None and omega not in keys
+    if at_rest and set(wanted.values()) - {"position"}:
+        raise InputError(omega, None, "is needed for more than positions")
+    return wanted
+
+
+def _refuse_untraceable(scene: Scene, keys: Sequence[str]) -> None:
+    """Raise an InputError that names what is searched for, integrated or decided in many digits."""
+    motion = scene.motion
+    if motion.free is not None:
+        raise InputError("motion.free", motion.free, "is integrated step by step, which cannot be traced")
+    if scene.drive is not None:
+        raise InputError("drive", "a line between two points", "cannot be traced; a couple on a bar can")
+    for effect in scene.effects:
+        if effect.loaded_pins:
+            allowed = "depends on the pin forces, which are searched for and cannot be traced"
+            raise InputError(f"effects.{effect.key}", effect.loaded_pins, allowed)
+    for index, load in enumerate(scene.loads):
+        if load.table is not None and not load.table.covers_a_turn:
+            raise InputError(f"loads.{index}.table", load.table.theta_2, "must cover a whole turn to be traced")
+    if motion.through == "follow" and change_points(scene.linkage):
+        raise InputError("motion.through", motion.through, 'cannot be traced through change points: "sign" can')
+    theta = angle_key(scene)
+    if theta in keys:
+        if motion.law is not None:
+            raise InputError(theta, "a key", "is that of the scene's motion law")
+    elif isinstance(motion.angle, FromLimit):
+        raise InputError(theta, motion.angle, "is evaluated in many digits, which cannot be traced")
+    elif motion.law is None and motion.angle is None:
+        raise InputError(theta, None, "depends on the linkage: state it, or make it one of the keys")

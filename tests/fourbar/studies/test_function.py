@@ -1,0 +1,282 @@
+"""A scene as a function of its numbers: in JAX and PyTorch as in NumPy, its derivatives, its edges, bad input."""
+
+import importlib.util
+from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar
+from fourbar import FromLimit, InputError, Motion, Point, Scene, uniform
+from fourbar.effects import (
+    Friction,
+    Gravity,
+    LinearDrive,
+    Load,
+    PinFriction,
+    Spring,
+    SpringEnd,
+    Springs,
+    Table,
+    Viscous,
+)
+from fourbar.formulas.arithmetic import namespace
+from fourbar.quantities import STAGE_OF
+from fourbar.scene.motion import Free
+from fourbar.studies.function import NEVER, function
+from fourbar.studies.keys import angle_key, at_place, entries, left_out
+from fourbar_validation.lab.stress.forward_error.families import FAMILIES
+
+EPS = 2.0**-52
+ROUNDED = 200.0 * EPS
+"""Of the greatest value: other libraries round sines otherwise and contract products and sums, on well-posed scenes."""
+DIFFERENCES = 1e-7
+"""What central differences of a step of 1e-6 leave of a derivative."""
+STEP = 1e-6
+LIBRARIES = ("jax", "torch")
+pytestmark = pytest.mark.filterwarnings("ignore:There is a performance drop")  # PyTorch maps no product's derivative
+
+
+class Library(SimpleNamespace):
+    """One array library: its name, arrays of doubles, compiled, mapped and differentiated functions."""
+
+
+def _jax() -> Library:
+    import jax
+
+    return Library(array=jax.numpy.asarray, jit=jax.jit, vmap=jax.vmap, grad=jax.grad, jacfwd=jax.jacfwd,
+                   jacrev=jax.jacrev, xp=jax.numpy)  # fmt: skip
+
+
+def _torch() -> Library:
+    import torch
+    from torch import func
+
+    return Library(array=lambda x: torch.asarray(np.asarray(x, dtype=float)), jit=lambda f: f, vmap=func.vmap, xp=torch,
+                   grad=func.grad, jacfwd=func.jacfwd, jacrev=func.jacrev)  # fmt: skip
+
+
+@pytest.fixture(params=LIBRARIES)
+def library(request: pytest.FixtureRequest) -> Iterator[Library]:
+    name = request.param
+    for needed in (name, "array_api_compat"):
+        if importlib.util.find_spec(needed) is None:
+            pytest.skip(f"{needed} is not installed")
+    if name == "jax":
+        import jax
+
+        with jax.enable_x64(True):
+            yield _jax()
+    else:
+        yield _torch()
+
+
+TURNING = Table((0.0, 2.0, 2.0 * np.pi), (1.0, -0.5, 1.0))
+LOADED = Scene(
+    uniform(0.3, 0.1, 0.25, 0.22, per_metre=2.0),
+    Motion(0.5, 8.0, 3.0),
+    loads=(Load(4, force=(5.0, 0.3), at=(0.02, 1.0), frame="bar"), Load(3, moment=-0.2, table=TURNING)),
+    effects=(
+        Gravity(),
+        Viscous.at(A=0.01),
+        Friction.at(B=0.02),
+        Springs((Spring(SpringEnd(1, 0.1, 1.0), SpringEnd(3, 0.1, -1.0), 50.0, 0.05, 1.0),)),
+    ),
+    points=(Point("P", 3, (0.1, 0.4)),),
+)
+EVERY = [*(name for name in STAGE_OF if name not in NEVER), "P", "v_P", "a_P"]
+ANGLES = np.linspace(0.0, 6.0, 13)
+
+
+def numbers_of(scene: Scene) -> dict[str, float]:
+    """Every number that a scene states, its angle too."""
+    found = {key: at_place(scene, entry.place) for key, entry in entries(scene).items() if not left_out(scene, entry)}
+    return {**found, angle_key(scene): float(np.ravel(scene.motion.angle)[0])}
+
+
+def of_solution(solution: Any, name: str) -> Any:
+    """A quantity, those of the scene's own points too."""
+    places = {"P": solution.points, "v_P": solution.velocity, "a_P": solution.acceleration}
+    return places[name]["P"] if name in places else getattr(solution, name)
+
+
+def wrapped(x: Any) -> Any:
+    return (x + np.pi) % (2.0 * np.pi) - np.pi
+
+
+@pytest.mark.parametrize("drive_bar", [2, 3, 4])
+def test_every_quantity_is_that_of_solve(library: Library, drive_bar: int) -> None:
+    scene = replace(LOADED, drive_bar=drive_bar)
+    solution = fourbar.solve(fourbar.vary(scene, {"motion.theta_2": ANGLES}))
+    keys = ["lengths.coupler", "effects.gravity.0", "motion.theta_2"]
+    found = library.jit(function(scene, keys, EVERY))(*map(library.array, (0.25, 9.81, ANGLES)))
+    assert set(found) == set(EVERY)
+    for name in EVERY:
+        ours, theirs = np.asarray(found[name]), of_solution(solution, name)[0]
+        gap = wrapped(ours - theirs) if name.startswith("theta") else ours - theirs
+        assert np.abs(gap).max() <= ROUNDED * max(1.0, np.abs(theirs).max()), name
+
+
+@pytest.mark.parametrize("motion", [Motion(theta_3=0.6, omega_3=2.0), Motion(theta_4=2.2, omega_4=-1.0, alpha_4=2.0)])
+def test_other_bars_command(library: Library, motion: Motion) -> None:
+    scene = replace(LOADED, motion=motion, loads=())
+    solution = fourbar.solve(scene)
+    f = function(scene, ["lengths.output", angle_key(scene)], ["torque", "F12", "condition"])
+    found = f(library.array(0.22), library.array(motion.angle))
+    for name, value in found.items():
+        assert np.asarray(value) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
+
+
+@pytest.mark.parametrize("family", [name for name in FAMILIES if name != "tables"])
+def test_derivatives_are_those_of_sensitivity(library: Library, family: str) -> None:
+    """Forwards in JAX and backwards in PyTorch, which are no derivation of ours."""
+    scene = FAMILIES[family](np.random.default_rng([3, list(FAMILIES).index(family)]))
+    wanted = fourbar.sensitivity(scene)
+    numbers = numbers_of(scene)
+    quantities = ["torque", "F12", "F43", "theta_4", "alpha_3"]
+    f = function(scene, list(numbers), quantities)
+    values = library.array(list(numbers.values()))
+    slopes = (library.jacrev if library.xp.__name__ == "torch" else library.jacfwd)(lambda x: f(*x))(values)
+    for name in quantities:
+        ours = np.asarray(slopes[name])
+        assert np.isfinite(ours).all()
+        exact = np.stack([wanted.by[name][list(wanted.keys).index(key), 0] for key in numbers], axis=-1)
+        weights = np.abs(list(numbers.values()))
+        size = np.abs(exact * weights).max() + np.abs(getattr(wanted.solution, name)).max()
+        assert np.abs((ours - exact) * weights).max() <= ROUNDED * size, name
+
+
+def test_peak_pin_force_of_a_thousand_positions(library: Library) -> None:
+    angles = np.linspace(0.0, 6.28, 1000)
+    f = function(LOADED, ["lengths.input", "motion.theta_2"], ["F32"])
+
+    def peak(a: Any) -> Any:
+        return library.xp.max(library.xp.sum(f(a, library.array(angles))["F32"] ** 2, axis=-1))
+
+    slope = float(library.jit(library.grad(peak))(library.array(0.1)))
+    ahead, back = (
+        (f(0.1 + step, angles)["F32"] ** 2).sum(axis=-1).max() for step in (STEP, -STEP)
+    )  # of NumPy, and no derivative at all
+    assert slope == pytest.approx((ahead - back) / (2.0 * STEP), rel=DIFFERENCES)
+
+
+def test_positions_that_do_not_close_leave_the_others_their_derivatives(library: Library) -> None:
+    """A sweep through both limits of a rocker, and lengths that close nowhere."""
+    scene = replace(LOADED, linkage=uniform(0.2, 0.3, 0.25, 0.15, per_metre=2.0))
+    angles = np.linspace(-3.0, 3.0, 61)
+    f = function(scene, ["lengths.input", "lengths.coupler", "motion.theta_2"], ["torque", "a_P", "F14"])
+    closes = np.isfinite(np.asarray(f(0.3, 0.25, angles)["torque"]))
+    assert 10 < closes.sum() < 50
+    assert (closes == (fourbar.solve(fourbar.vary(scene, {"motion.theta_2": angles})).status_code[0] == 0)).all()
+
+    def total(lengths: Any, at: Any) -> Any:
+        found = f(lengths[0], lengths[1], library.array(at))
+        return sum(library.xp.nansum(value**2) for value in found.values())
+
+    lengths = library.array([0.3, 0.25])
+    of_all, of_closed = (np.asarray(library.grad(total)(lengths, at)) for at in (angles, angles[closes]))
+    assert np.isfinite(of_all).all() and of_all == pytest.approx(of_closed, rel=1e-12)
+    assert (np.asarray(library.grad(total)(library.array([3.0, 0.25]), angles)) == 0.0).all()
+    assert (np.asarray(library.grad(total)(library.array([-1.0, np.nan]), angles)) == 0.0).all()
+
+
+def test_mapped_over_linkages_as_vary(library: Library) -> None:
+    lengths = np.linspace(0.05, 0.9, 10_000)
+    solution = fourbar.solve(fourbar.vary(LOADED, {"lengths.input": lengths}))
+    f = function(LOADED, ["lengths.input"], ["torque", "F43"])
+    found = library.vmap(f)(library.array(lengths))
+    closes = solution.status_code[:, 0] == 0
+    assert 0 < closes.sum() < len(lengths)
+    for name, value in found.items():
+        ours, theirs = np.asarray(value), getattr(solution, name)[:, 0]
+        assert (np.isfinite(ours).reshape(len(ours), -1).all(axis=1) == closes).all()
+        # beside a limit each library's rounding of a sine is amplified: 1/sin^2 of the transmission angle
+        gap = np.abs(ours - theirs)[closes] / np.nanmax(np.abs(theirs))
+        sine = np.abs(solution.sin_mu[closes, 0])
+        assert (gap.reshape(len(sine), -1).max(axis=1) * sine**2 <= ROUNDED).all()
+
+
+def test_single_precision_stays_single(library: Library) -> None:
+    f = function(LOADED, ["lengths.input", "motion.theta_2"], ["torque"])
+    kind = library.xp.float32
+    found = f(library.xp.asarray(0.1, dtype=kind), library.xp.asarray(ANGLES, dtype=kind))["torque"]
+    assert found.dtype == kind
+    exact = f(0.1, ANGLES)["torque"]
+    assert np.abs(np.asarray(found) - exact).max() <= 1e-5 * np.abs(exact).max()  # some 80 of its roundings
+
+
+def test_scenes_state_the_positions_and_shapes_are_broadcast() -> None:
+    one, many = (
+        function(LOADED, ["bars.input.mass"]),
+        function(replace(LOADED, motion=Motion(ANGLES, 8.0)), ["lengths.ground"]),
+    )
+    assert one(1.0)["torque"].shape == () and one(np.ones(3))["torque"].shape == (3,)
+    assert many(0.3)["torque"].shape == (13,)
+    assert (many(0.3)["torque"] == fourbar.solve(replace(LOADED, motion=Motion(ANGLES, 8.0))).torque).all()
+
+
+REFUSED = {
+    "effects.pin_friction": replace(LOADED, effects=(PinFriction((("A", 0.1, 0.01),)),)),
+    "motion.free": replace(LOADED, motion=Motion(0.5, 0.0, free=Free(1.0, 10))),
+    "motion.theta_2": replace(LOADED, motion=Motion(FromLimit(1, 0.1), 1.0)),
+    "motion.through": replace(LOADED, linkage=uniform(0.3, 0.1, 0.3, 0.1), motion=Motion(1.0, 1.0, through="follow")),
+    "loads.0.table": replace(LOADED, loads=(Load(3, moment=1.0, table=Table((0.0, 1.0), (1.0, 2.0))),)),
+    "drive": replace(LOADED, drive_bar=None, drive=LinearDrive(SpringEnd(1, 0.1, 1.0), SpringEnd(3, 0.1, -1.0))),
+    "motion.omega_2": replace(LOADED, motion=Motion(0.5)),
+}
+
+
+@pytest.mark.parametrize("key", REFUSED)
+def test_what_cannot_be_traced_is_refused_when_the_function_is_made(key: str) -> None:
+    with pytest.raises(InputError) as error:
+        function(REFUSED[key], ["bars.input.mass"])
+    assert error.value.key == key and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("keys", "quantities", "named"),
+    [(["lengths.inptu"], ["torque"], "lengths.inptu"), (["lengths.input"], ["torqe"], "quantities"),
+     (["motion.branch"], ["torque"], "motion.branch"), ([], ["torque"], "keys"), ("lengths.input", ["torque"], "keys"),
+     (["lengths.input"] * 2, ["torque"], "keys"), (["lengths.input"], ["torque_error"], "quantities")],
+)  # fmt: skip
+def test_unknown_keys_and_quantities(keys: Any, quantities: Any, named: str) -> None:
+    with pytest.raises(InputError) as error:
+        function(LOADED, keys, quantities)
+    assert error.value.key == named and "\n" not in str(error.value)
+
+
+class Poor:
+    """An array of a library that has no complex numbers."""
+
+    shape, dtype = (), "float64"
+
+    def __array_namespace__(self, api_version: Any = None) -> Any:
+        return SimpleNamespace(__name__="poor", float64="float64")
+
+
+@pytest.mark.parametrize(
+    "values",
+    [(1, np.array([1, 2])), (0.1, np.ones((2, 2))), (np.ones(2), np.ones(3)), (0.1,), ("0.1", 0.2), (True, 0.2),
+     (0.1, 1j), (0.1, np.array([1j])), (0.1, Poor())],
+)  # fmt: skip
+def test_values_of_the_wrong_kind(values: Any) -> None:
+    if isinstance(values[-1], Poor):
+        pytest.importorskip("array_api_compat")
+    with pytest.raises(InputError) as error:
+        function(LOADED, ["lengths.input", "motion.theta_2"])(*values)
+    assert "\n" not in str(error.value)
+
+
+def test_mixed_libraries(library: Library) -> None:
+    f = function(LOADED, ["lengths.input", "motion.theta_2"])
+    with pytest.raises(InputError, match="one library"):
+        f(library.array(0.1), ANGLES)
+    with pytest.raises(InputError, match="floating-point"):
+        f(0.1, library.xp.asarray([1, 2]))
+
+
+def test_numbers_of_numpy_need_no_other_library() -> None:
+    assert namespace(1.0, 2, 1j, np.float64(1.0), np.ones(2)) is np
