@@ -24,7 +24,7 @@ line of a cell show themselves.
 """
 MEANINGS = {quantity.name: quantity for quantity in QUANTITIES}
 METHODS = {
-    "Solution": ("power", "status", "assembled", "evaluated", "to_csv", "to_pandas"),
+    "Solution": ("status", "assembled", "evaluated", "to_csv", "to_pandas"),
     "Bar": ("moment_of_inertia",),
     "Scene": ("plot",),
     "Sensitivity": ("of", "value", "to_pandas"),

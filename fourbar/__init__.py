@@ -34,7 +34,7 @@ from fourbar.scene.tolerance import Tolerance as Tolerance
 from fourbar.solution import Solution as Solution
 from fourbar.solve import solve as solve
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 if _TYPE_CHECKING:
     from fourbar.effects import Flywheel as Flywheel
@@ -146,3 +146,6 @@ def __dir__() -> list[str]:
     """List the public names; the modules behind them stay out of the list."""
     own = [name for name, value in globals().items() if name[0] != "_" and not isinstance(value, _ModuleType)]
     return sorted([*own, *_ON_FIRST_USE, "__version__"])
+
+
+__all__ = __dir__()  # noqa: PLE0605 - the names above, once

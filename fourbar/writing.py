@@ -42,8 +42,8 @@ def require_file(target: Path, *read: Path) -> None:
         raise InputError("path", str(target), "is read here, and would be lost")
 
 
-def write_bytes(path: str | Path, data: bytes) -> None:
-    """Write a file whole; on any failure the old file, or none, stays.
+def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None:
+    """Write a file whole, `private`: readable by its owner alone; on any failure the old file, or none, stays.
 
     Raises InputError as `require_file` does, OSError for what fails otherwise (full disk, read-only folder).
     """
@@ -63,7 +63,8 @@ def write_bytes(path: str | Path, data: bytes) -> None:
                 os.fsync(file.fileno())
             umask = os.umask(0)
             os.umask(umask)
-            os.chmod(temporary, 0o666 & ~umask)  # mkstemp makes it private; a result is an ordinary file
+            if not private:
+                os.chmod(temporary, 0o666 & ~umask)  # mkstemp makes it private; a result is an ordinary file
             os.replace(temporary, target)
         except BaseException:
             Path(temporary).unlink(missing_ok=True)

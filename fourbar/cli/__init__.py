@@ -5,6 +5,7 @@ import sys
 import click
 
 from fourbar import __version__
+from fourbar.cli.edit import edit
 from fourbar.cli.evaluate import analyze, classify, extremes, new, tolerance
 from fourbar.cli.export import animate, mjcf, plot, sdf, usd
 from fourbar.cli.rest import equilibrium, ratio
@@ -32,7 +33,7 @@ def group(context: click.Context, traceback: bool) -> None:
         click.echo(context.get_help())
 
 
-for command in (classify, new, analyze, tolerance, extremes, equilibrium, ratio, mjcf, sdf, usd, plot, animate):
+for command in (classify, new, analyze, tolerance, extremes, equilibrium, ratio, mjcf, sdf, usd, plot, animate, edit):
     group.add_command(command)
 
 

@@ -141,7 +141,7 @@ def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, si
 
 
 def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: Any) -> Coefficients:
-    """Compute the coefficients from parts rounded each: h3 = m - g, h4 = m + g with m = t + q g, and so their slopes.
+    """Compute the coefficients from parts rounded each: h3 = n - g, h4 = n + g, n = t + x g/e^2, and so their slopes.
 
     Parameters
     ----------
@@ -150,21 +150,21 @@ def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: An
     """
     d, a, b, c, _, _ = lengths
     g, dg = 0.5 * k.h43, 0.5 * (k.dh4 - k.dh3)
-    m, x = k.h3 + g, ((b - c) * (b + c)) / at.e2
-    of_qg, w = x * g, x * g - 0.5 * ((d - a) * (d + a)) / at.e2
-    of_t = m - of_qg
+    n, x = k.h3 + g, ((b - c) * (b + c)) / at.e2
+    of_g, w = x * g, x * g - 0.5 * ((d - a) * (d + a)) / at.e2
+    of_t = n - of_g
     if anywhere(side_may_turn_fast(lengths)):
         fast = side_turns_fast(lengths, at)
-        of_t, of_qg, w = select(fast, m, of_t), select(fast, 0.5, of_qg), select(fast, m - 0.5, w)
+        of_t, of_g, w = select(fast, n, of_t), select(fast, 0.5, of_g), select(fast, n - 0.5, w)
     of_slope, of_side = x * dg, (4.0 * a * d * at.half.sk) * w / at.e2
-    g_moved, dg_moved, qg_moved = g * signs[0], dg * signs[1], of_qg * signs[2]
-    m_moved = of_t * signs[3] + qg_moved
+    g_moved, dg_moved, of_g_moved = g * signs[0], dg * signs[1], of_g * signs[2]
+    n_moved = of_t * signs[3] + of_g_moved
     slope_moved = of_slope * signs[4] + of_side * signs[5]
     return Coefficients(
         k.h2,
-        rounded_real(k.h3, signs[6]) + m_moved - g_moved,
-        rounded_real(k.h4, signs[7]) + m_moved + g_moved,
-        rounded_real(k.h23, signs[8]) + (1.0 - of_t) * signs[9] - qg_moved + g_moved,
+        rounded_real(k.h3, signs[6]) + n_moved - g_moved,
+        rounded_real(k.h4, signs[7]) + n_moved + g_moved,
+        rounded_real(k.h23, signs[8]) + (1.0 - of_t) * signs[9] - of_g_moved + g_moved,
         rounded_real(k.h43, signs[10]) + 2.0 * g_moved,
         k.dh2,
         rounded_real(k.dh3, signs[11]) + slope_moved - dg_moved,

@@ -33,13 +33,13 @@ class Coefficients(NamedTuple):
 
 
 def coefficients(lengths: Loop, at: Position) -> Coefficients:
-    """Compute the coefficients by theta_2 from the triangle A, B, O4: its side e turns by t, its height changes by g.
+    """Compute the coefficients by theta_2 from the triangle A, B, O4: side e turns by t, the angle at B opens by 2 g.
 
-        h3 = m - g,   h4 = m + g,   m = t + q g = 1/2 + w,
-        t = (a (a - d) + 2 a d sin^2 h)/e^2,   g = 2 a d sin h cos h/root,   q = (b^2 - c^2)/e^2.
+        h3 = n - g,   h4 = n + g,   n = t + (x/e^2) g = 1/2 + w,
+        t = (a (a - d) + 2 a d sin^2 h)/e^2,   g = 2 a d sin h cos h/root,   x = b^2 - c^2.
 
     Where e is short its sides turn fast and the bars do not; there w comes without e, from Heron's formula
-    for both triangles on e, with S = 4 a d sin h cos h, x = b^2 - c^2, y = d^2 - a^2:
+    for both triangles on e, with S = 4 a d sin h cos h, y = d^2 - a^2:
         w = -(E2 (d + a)^2 outer + E1 (b - c)^2 4 a d sin^2 h)/(2 root (x S + y root)).
 
     >>> from math import radians
@@ -57,17 +57,17 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     S, grown = (4.0 * ad) * sk, (2.0 * ad) * ss
     g = S * per_root
     xg = x * g
-    qg = xg * per_e2
-    m, rest = (grown + a * (a - d)) * per_e2 + qg, (grown + d * (d - a)) * per_e2 - qg
+    leaning = xg * per_e2
+    n, rest = (grown + a * (a - d)) * per_e2 + leaning, (grown + d * (d - a)) * per_e2 - leaning
     w = (xg - 0.5 * y) * per_e2
     if anywhere(side_may_turn_fast(lengths)):
         fast = side_turns_fast(lengths, at)
         heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
         w = select(fast, -heron * per_root / divisor(x * S + y * at.root, fast), w)
-        m, rest = select(fast, 0.5 + w, m), select(fast, 0.5 - w, rest)
+        n, rest = select(fast, 0.5 + w, n), select(fast, 0.5 - w, rest)
     dg = ((2.0 * ad * E2) * kk / inner - (2.0 * ad * E1) * ss / outer) * per_root
-    dm = (x * dg - S * w) * per_e2
-    return Coefficients(1.0, m - g, m + g, rest + g, 2.0 * g, 0.0, dm - dg, dm + dg)
+    dn = (x * dg - S * w) * per_e2
+    return Coefficients(1.0, n - g, n + g, rest + g, 2.0 * g, 0.0, dn - dg, dn + dg)
 
 
 def side_may_turn_fast(lengths: Loop) -> Number:
@@ -76,7 +76,7 @@ def side_may_turn_fast(lengths: Loop) -> Number:
 
 
 def side_turns_fast(lengths: Loop, at: Position) -> Number:
-    """Where t and q g are large and cancel: |d^2 - a^2| > FAST e^2, and x S, y root of one sign."""
+    """Where t and x g/e^2 are large and cancel: |d^2 - a^2| > FAST e^2, and x S, y root of one sign."""
     d, a, b, c, _, _ = lengths
     y = (d - a) * (d + a)
     return (abs(y) > FAST * at.e2) & ((y * at.root) * ((b - c) * at.half.sk) > 0.0)

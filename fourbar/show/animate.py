@@ -9,6 +9,7 @@ import hashlib
 import html
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -22,6 +23,8 @@ from fourbar.writing import write_text
 
 FORMATS = ("html", "gif", "mp4")
 SCRIPTS = ("linkage.js", "numbers.js", "picture.js", "acting.js", "chart.js", "tolerances.js", "page.js")
+LIVE_SCRIPTS = ("fields.js", "drag.js", "edit.js")
+"""Of the workbench besides."""
 
 
 def write(
@@ -65,15 +68,23 @@ def write(
 
 
 def page(
-    scene: Scene, pictures: Mapping[str, str | Path] | None = None, units: Conversion = SI, vectors: bool = False
+    scene: Scene,
+    pictures: Mapping[str, str | Path] | None = None,
+    units: Conversion = SI,
+    vectors: bool = False,
+    live: str = "",
 ) -> str:
-    """Write the page as text."""
+    """Write the page as text; `live`: the address of the line to the workbench, which a saved page has not."""
     from fourbar import __version__
 
-    assets = files("fourbar.show").joinpath("page")
-    style = assets.joinpath("page.css").read_text(encoding="utf-8")
-    script = "".join(assets.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
-    return Template(assets.joinpath("page.html").read_text(encoding="utf-8")).substitute(
+    def asset(*names: str) -> str:
+        folder = files("fourbar.show").joinpath("page")
+        return "".join(folder.joinpath(name).read_text(encoding="utf-8") for name in names)
+
+    style, script = asset("page.css"), asset(*SCRIPTS)
+    if live:
+        style, script = style + asset("edit.css"), script + asset(*LIVE_SCRIPTS)
+    return Template(asset("page.html")).substitute(
         title=html.escape(plain(scene.title, 200) or "Four-bar linkage"),
         source=html.escape(plain(scene.source, 400)),
         version=__version__,
@@ -81,7 +92,13 @@ def page(
         style_hash=_content_hash(style),
         script=script,
         script_hash=_content_hash(script),
-        data=embedded(page_data(scene, pictures or {}, units) | {"vectors": vectors}),
+        connect=f"connect-src ws://{live.split('/')[2]}; " if live else "",
+        panel=asset("edit.html") if live else "",
+        results=asset("bench.html") if live else "",
+        data=embedded(
+            page_data(replace(scene, tolerances=()) if live else scene, pictures or {}, units)
+            | {"vectors": vectors, "live": live}
+        ),
     )
 
 

@@ -28,18 +28,46 @@ MAX_ROWS = 1441
 WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
-SCALARS = (*ANGLES, "condition", *RATES, "torque", "drive_force", "stroke")
+SCALARS = (
+    *ANGLES,
+    "condition",
+    *RATES,
+    "torque",
+    "torque_error",
+    "power",
+    "drive_force",
+    "drive_force_error",
+    "stroke",
+)
 
 
 def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
     """Everything the page's script needs: SI units, radians, null where there is no value."""
+    data = live_data(scene, units, signs=(1, -1))
+    for columns in data["branches"].values():
+        columns |= {name: nulled(each) for name, each in columns.items() if isinstance(each, np.ndarray)}
+    given = {str(number): picture for number, picture in _pictures(scene, pictures).items()}
+    found = embedded_tolerances(scene, data["theta_2"]) if scene.tolerances else None
+    return data | {"pictures": given, "tolerances": found, "toml": _scene_file(scene)}
+
+
+def live_data(
+    scene: Scene, units: Conversion = SI, *, signs: tuple[int, ...] = (), stage: str | None = None
+) -> dict[str, Any]:
+    """Collect what the page's script draws, columns as arrays, without tolerances, pictures and the file.
+
+    Parameters
+    ----------
+    signs : the branches of a sweep; left out: the scene's.
+    stage : the last one evaluated; left out: as of `solve`.
+    """
     require_input(scene, "a page")
     linkage, motion = scene.linkage, scene.motion
-    shown = _through_time(scene) if over_time(scene) else _sweep(scene)
-    closes = [theta_3 is not None for theta_3 in shown["branches"][str(motion.branch)]["theta_3"]]
-    if not any(closes):
+    shown = _through_time(scene, stage) if over_time(scene) else _sweep(scene, signs or (motion.branch,), stage)
+    closes = np.isfinite(shown["branches"][str(motion.branch)]["theta_3"])
+    if not closes.any():
         raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
-    shown["start"] = closes.index(True) if shown["start"] is None else shown["start"]
+    shown["start"] = int(closes.argmax()) if shown["start"] is None else shown["start"]
     factor, unit = length_unit(max(linkage.lengths), units)
     return {
         "lengths": list(linkage.lengths),
@@ -56,11 +84,8 @@ def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversio
             {"name": p.name, "bar": p.bar, "at": [p.from_pin[0] * f(p.from_pin[1]) for f in (math.cos, math.sin)]}
             for p in scene.points
         ],
-        "tolerances": embedded_tolerances(scene, shown["theta_2"]) if scene.tolerances else None,
         "acting": [_symbol(symbol, shown["theta_2"]) for symbol in acting(scene)],
-        "toml": _scene_file(scene),
         "followed": motion.through == "follow",
-        "pictures": {str(number): picture for number, picture in _pictures(scene, pictures).items()},
         **shown,
     }
 
@@ -84,8 +109,8 @@ def _scene_file(scene: Scene) -> str | None:
         return None
 
 
-def _sweep(scene: Scene) -> dict[str, Any]:
-    """Both branches over theta_2."""
+def _sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> dict[str, Any]:
+    """Branches over theta_2."""
     motion = scene.motion
     swept = sweep_command(scene)
     where = thinned(swept)
@@ -99,26 +124,26 @@ def _sweep(scene: Scene) -> dict[str, Any]:
         "time": None,
         "rate": None,
         "start": start,
-        "branches": {str(sign): _on_branch(scene, sign, where.theta_2) for sign in (1, -1)},
+        "branches": {str(sign): _on_branch(scene, sign, where.theta_2, stage) for sign in signs},
         "pace": None,
         "positions": len(swept.theta_2),
     }
 
 
-def _through_time(scene: Scene) -> dict[str, Any]:
+def _through_time(scene: Scene, stage: str | None) -> dict[str, Any]:
     """Collect the one motion that the scene makes: released, or by a law."""
     whole = solve(scene)
     assert whole.time is not None and whole.omega_2 is not None and whole.alpha_2 is not None
     where = thinned(Command(whole.theta_2, whole.branch, whole.omega_2, whole.alpha_2, time=whole.time))
     assert where.time is not None
-    solution = solve(scene, at=where)
+    solution = solve(scene, stage, at=where)
     solution.time = where.time
     columns = _columns(solution)
     columns["theta_2"] = where.theta_2.tolist()
     if scene.motion.free is not None:
-        for name in ("torque", "drive_force"):
+        for name in ("torque", "torque_error", "power", "drive_force", "drive_force_error"):
             columns.pop(name, None)
-        columns["energy"] = nulled(energies(scene, solution).kinetic)
+        columns["energy"] = energies(scene, solution).kinetic
     duration = float(where.time[-1] - where.time[0])
     rate = _rate(duration)
     return {
@@ -168,20 +193,21 @@ def _pace_in_time(whole: Solution, rate: float, shown: int) -> str:
     return words + "."
 
 
-def _on_branch(scene: Scene, sign: int, theta_2: Array) -> dict[str, Any]:
+def _on_branch(scene: Scene, sign: int, theta_2: Array, stage: str | None) -> dict[str, Any]:
     own = replace(scene, motion=replace(scene.motion, theta_2=theta_2, branch=sign))
-    return _columns(solve(own))
+    return _columns(solve(own, stage))
 
 
 def _columns(solution: Solution) -> dict[str, Any]:
-    """Quantity by quantity, as lists."""
+    """Quantity by quantity."""
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
     if (solution.status_code != OK).any():
         columns["status"] = solution.status
     for name in (*SCALARS, *PIN_FORCES):
         values = getattr(solution, name)
         if values is not None:
-            columns[name] = nulled(values)
+            columns[name] = values
+    columns["transmission"] = np.arcsin(solution.condition)
     return columns
 
 

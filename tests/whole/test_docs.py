@@ -7,6 +7,7 @@ import contextlib
 import io
 import math
 import re
+import runpy
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -20,18 +21,22 @@ import fourbar
 import fourbar.cli
 import fourbar_validation.cli
 from fourbar.cli import status
-from fourbar.errors import HOLDS
+from fourbar.errors import FAILED, HOLDS
 from fourbar.files import load
 from fourbar.files.effects import REGISTRY
 from fourbar_validation.cli import COMMANDS, group
+from fourbar_validation.cli import status as harness
+from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.lab.effects.work import EFFECTS
 from fourbar_validation.scenes.suites import suite_file
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 GALLERY = ROOT / "models" / "gallery"
-GROUPS = {"fourbar": fourbar.cli.group, "validation": fourbar_validation.cli.group}
-PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+HARNESS = fourbar_validation.cli.group
+GROUPS = {"fourbar": fourbar.cli.group, "validation": HARNESS, "fourbar-validation": HARNESS}
+TOP = ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")
+PAGES = [*(ROOT / f"{name}.md" for name in TOP), *sorted(DOCS.rglob("*.md"))]
 
 
 def read(name: str) -> str:
@@ -45,12 +50,27 @@ def blocks(language: str, text: str) -> list[str]:
 def test_the_examples_of_continuous_integration_use_commands_and_options_that_exist() -> None:
     for file in sorted((DOCS / "ci").glob("*.yml")):
         text = re.sub(r"\\\n\s*|>\n\s*|(?<=\S)\n\s+(?=--)", " ", file.read_text())
-        lines = re.findall(r"-m validation (\w+)(.*)", text)
-        assert {name for name, _ in lines} >= {"run", "accept"}
+        lines = re.findall(r"(?:-m |fourbar-)validation (\w+)(.*)", text)
+        assert "run" in {name for name, _ in lines}
         for name, options in lines:
             known = {option for each in group.get_command(None, name).params for option in each.opts}  # type: ignore[arg-type,union-attr]
             wanted = set(re.findall(r"(?<=\s)--[a-z-]+", options))
             assert wanted <= known and wanted, (file.name, name, wanted - known)
+
+
+def test_every_long_part_is_run_in_the_night() -> None:
+    (parts,) = re.findall(r"^LONG := (.*)$", read("Makefile"), re.MULTILINE)
+    (nightly,) = re.findall(r"part: \[(.*)\]", read(".github/workflows/nightly.yml"))
+    assert nightly.split(", ") == parts.split()
+
+
+def test_one_version_stands_everywhere() -> None:
+    for name, line in (
+        ("pyproject.toml", 'version = "{}"'),
+        ("CITATION.cff", "version: {}"),
+        ("CHANGELOG.md", "## {}"),
+    ):
+        assert line.format(fourbar.__version__) in read(name).splitlines(), name
 
 
 @pytest.fixture
@@ -63,8 +83,10 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize(
     ("name", "count"),
-    [("README.md", 2), ("docs/commands.md", 9), ("docs/gallery.md", 8)],
-    ids=["readme", "commands", "gallery"],
+    [
+        *(("README.md", 2), ("docs/commands.md", 9), ("docs/gallery.md", 8)),
+        *(("docs/guide-designer.md", 3), ("docs/guide-teacher.md", 1), ("docs/guide-roboticist.md", 4)),
+    ],
 )
 def test_every_command_prints_what_is_shown(
     name: str, count: int, checkout: Path, capsys: pytest.CaptureFixture[str]
@@ -84,17 +106,46 @@ def test_every_command_prints_what_is_shown(
 
 
 @pytest.mark.usefixtures("checkout")
-def test_the_programs_print_what_is_shown() -> None:
-    programs, texts = blocks("python", read("README.md")), blocks("text", read("README.md"))
-    assert len(programs) == 2
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("README.md", 1),
+        *((f"docs/{name}.md", 1) for name in ("theory-motion", "theory-forces", "guide-designer", "guide-roboticist")),
+    ],
+)
+def test_the_programs_print_what_is_shown(name: str, count: int) -> None:
+    programs, texts = blocks("python", read(name)), blocks("text", read(name))
+    assert len(programs) == count
     for program, shown in zip(programs, texts, strict=True):
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
-            exec(compile(program, "README.md", "exec"), {})
+            exec(compile(program, name, "exec"), {})
         ours, theirs = (re.split(r"(?<=take )(.*)", text) for text in (printed.getvalue(), shown))
         assert ours[::2] == theirs[::2]
         # the error bar is itself rounding: it may differ a little from one machine to the next
         assert [float(x) for x in ours[1::2]] == pytest.approx([float(x) for x in theirs[1::2]], rel=0.4, abs=0.0)
+
+
+def test_the_table_of_the_teacher_is_right(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (table,) = blocks("text", read("docs/guide-teacher.md"))
+    (checkout / "theirs.csv").write_text(table, encoding="utf-8")
+    assert harness(["check", "models/crank_rocker.toml", "theirs.csv"]) == HOLDS
+    assert "4 of 4 numbers agree" in capsys.readouterr().out
+    (checkout / "theirs.csv").write_text(table.replace("0.4467", "0.4476"), encoding="utf-8")
+    assert harness(["check", "models/crank_rocker.toml", "theirs.csv"]) == FAILED
+
+
+def test_the_witness_of_the_guide_agrees(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (program,) = blocks("python", read("docs/guide-simulator.md"))
+    (checkout / "closure.py").write_text(program, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(checkout))
+    line = "run models/crank_rocker.toml --witness closure:Closure --engines free-body --no-pictures --out out"
+    assert harness(line.split()) == HOLDS
+    rows = [row for row in read_columns(checkout / "out" / "results.csv") if row.engine == "closure"]
+    assert {row.quantity for row in rows if row.passed} >= {"theta_3", "theta_4", "omega_3", "omega_4"}
+    capsys.readouterr()
 
 
 def test_the_scene_file_is_one(checkout: Path) -> None:
@@ -109,7 +160,7 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
 def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> None:
     """Those in running text and shell blocks run for minutes or name a SCENE: they are parsed as they stand."""
     text = page.read_text(encoding="utf-8")
-    lines = re.findall(r"`((?:fourbar|python -m validation) [^`]+)`", text)
+    lines = re.findall(r"`((?:fourbar|python -m validation|fourbar-validation) [^`]+)`", text)
     lines += re.findall(r"^(python -m validation .*)$", "".join(blocks("sh", text)), re.MULTILINE)
     for line in lines:
         words = shlex.split(line.removeprefix("python -m "), comments=True)
@@ -123,7 +174,7 @@ def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> N
 def options() -> list[set[str]]:
     """The names of each option of each command, its short one among them."""
     found = []
-    for program in GROUPS.values():
+    for program in {id(each): each for each in GROUPS.values()}.values():
         context = click.Context(program)
         names = COMMANDS if program is group else program.list_commands(context)
         for command in (program, *(program.get_command(context, each) for each in names)):
@@ -155,19 +206,37 @@ def test_every_command_of_the_harness_is_listed() -> None:
     assert sorted(listed) == sorted(COMMANDS)
 
 
+def anchors(page: Path) -> set[str]:
+    """Of the headings, as GitHub and the site name them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_link_leads_somewhere(page: Path) -> None:
-    for target in re.findall(r"\]\(([^)#\s]+)\)", page.read_text(encoding="utf-8")):
-        assert target.startswith("http") or (page.parent / target).is_file(), target
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        file, _, anchor = target.partition("#")
+        to = page.parent / file if file else page
+        assert target.startswith("http") or to.is_file(), target
+        assert not anchor or target.startswith("http") or anchor in anchors(to), target
 
 
 def test_the_index_lists_every_page_for_readers_and_for_the_site() -> None:
     text = read("docs/index.md")
-    pages = {page.relative_to(DOCS).as_posix() for page in PAGES[1:]} - {"index.md"}
+    pages = {page.relative_to(DOCS).as_posix() for page in PAGES if DOCS in page.parents} - {"index.md"}
     assert pages == set(re.findall(r"\]\(([^)]+\.md)\)", text))
-    (tree,) = blocks(r"\{toctree\}", text)
-    lines = [line for line in tree.splitlines() if not line.startswith(":")]
-    assert pages == {re.sub(r".* <(.*)>", r"\1", line) + ".md" for line in lines}
+    lines = [line for tree in blocks(r"\{toctree\}", text) for line in tree.splitlines() if not line.startswith(":")]
+    assert sorted(pages) == sorted(re.sub(r".* <(.*)>", r"\1", line) + ".md" for line in lines)
+
+
+def test_pages_keep_to_their_length() -> None:
+    for name, most in {"README.md": 500, **{f"docs/{page.name}": 800 for page in DOCS.glob("guide-*.md")}}.items():
+        assert len(read(name).split()) <= most, name
+    assert len(read("CHANGELOG.md").splitlines()) <= 60
+
+
+def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
+    assert read("docs/theory.svg") == runpy.run_path(str(DOCS / "theory.py"))["text"]()
 
 
 def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "mujoco", "pinocchio", "flint", "mpmath")
+HEAVY = ("pint", "click", "rich", "jinja2", "matplotlib", "scipy", "mujoco", "pinocchio", "flint", "mpmath", "tornado")
 ENGINES = {name: name.removeprefix("py") for name in ("mujoco", "pinocchio", "exudyn", "opensim", "pydrake")}
 PACKAGES = {"fourbar": ROOT / "fourbar", "fourbar_validation": ROOT / "validation" / "fourbar_validation"}
 LAYERS = {
@@ -26,6 +26,7 @@ LAYERS = {
         "solve",
         "files mjcf studies",
         "show",
+        "edit",
         "cli",
     ),
     "fourbar_validation": (
@@ -46,7 +47,7 @@ ON_ONE_FLOOR = {
     ("published", "engines"),
 }
 """Of two layers on one floor the first may use the second."""
-MOST = {"fourbar": 15, "fourbar_validation": 13}
+MOST = {"fourbar": 16, "fourbar_validation": 13}
 """Entries at a package's own level, dunder files not counted: what a stranger can take in at a glance."""
 
 

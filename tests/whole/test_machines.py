@@ -1,6 +1,7 @@
 """The numbers hold on another machine: another BLAS kernel, other vectorised functions of NumPy, in a child process.
 
-`MACHINES=all` (part of `make long-test`) tries every kernel that the CPU can run, and the whole `validation run`.
+`MACHINES=all` (part of `make long-test`) tries every kernel that the CPU can run, on every numerical test
+file, and the whole `validation run`.
 """
 
 import os
@@ -13,12 +14,15 @@ import pytest
 from tests.support.another_machine import BEFORE, CORES, ROOT, environment, machine, why_not
 
 ALL = os.environ.get("MACHINES") == "all"
-NUMERICAL = ["fourbar/formulas/test_pin_forces.py", "validation/regression/test_accepted.py"]
-NUMERICAL += ["validation/published/test_published.py", "validation/engines/test_engines.py"] * ALL
-"""Identities, the accepted state of the exact engines; with all kernels printed figures and each engine by itself."""
+TESTS = ROOT / "tests"
+SAMPLE = [TESTS / "fourbar/formulas/test_pin_forces.py", TESTS / "validation/regression/test_accepted.py"]
+"""Identities, and the accepted state of the exact engines."""
+BUT = {*(TESTS / "whole").glob("*.py"), *TESTS.rglob("test_bench*.py")}
+"""Of no number, or of the time that it takes."""
+NUMERICAL = [file for file in sorted({*TESTS.rglob("test_*.py")} - BUT) if "numpy" in file.read_text(encoding="utf-8")]
 
 
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(3600 if ALL else 600)
 @pytest.mark.parametrize("core", CORES if ALL else ["another"])
 def test_the_numbers_hold_on_another_machine(core: str, tmp_path: Path) -> None:
     reasons = {name: why_not(name) for name in ([core] if ALL else CORES)}
@@ -26,8 +30,8 @@ def test_the_numbers_hold_on_another_machine(core: str, tmp_path: Path) -> None:
     if not possible:
         pytest.skip("not run: " + "; ".join(f"{name}: {reason}" for name, reason in reasons.items()))
     child = os.environ | environment(possible[0]) | {BEFORE: machine()}
-    files = ("support/another_machine.py", *NUMERICAL)
-    lines = [["pytest", "-p", "no:cacheprovider", "-p", "no:xdist", *(f"tests/{name}" for name in files)]]
+    files = [str(TESTS / "support/another_machine.py"), *map(str, NUMERICAL if ALL else SAMPLE)]
+    lines = [["pytest", "-p", "no:cacheprovider", *(("-n", "2") if ALL else ("-p", "no:xdist")), *files]]
     if ALL:
         lines.append(["validation", "run", "--against", "accepted", "--out", str(tmp_path)])
     for line in lines:

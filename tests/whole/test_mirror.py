@@ -14,7 +14,7 @@ SOURCES = {"fourbar": ROOT / "fourbar", "validation": ROOT / "validation" / "fou
 """Folder of tests, and folder of the modules that it mirrors."""
 JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
-    "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given rest; fourbar/show: progress tables words",
+    "fourbar/cli/test_cli.py": "fourbar/cli: edit evaluate export given rest; fourbar/show: progress tables words",
     "whole/test_exits.py": "fourbar: errors writing; validation: cli; validation/report: terminal; "
     "validation/lab/stress: mutants",
     "whole/test_kills.py": "validation/run: pool run selection store; validation/scenes: suites",
@@ -23,6 +23,8 @@ JUDGED_BY = {
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: actions cones effect flywheel friction gravity load "
     "numbers pin_friction pins torsion viscous",
+    "fourbar/edit/test_session.py": "fourbar/edit: answer document dragging exports",
+    "fourbar/edit/test_server.py": "fourbar/edit: witness",
     "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve holding zeros; fourbar/show: equilibrium; "

@@ -27,7 +27,7 @@ from tests.support.scenes import crank_rocker
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-PYTHONS = ("3.11", "3.12", "3.13")
+PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 MODELS = "fourbar_validation.models"
 MODULE_OF = {"python-flint": "flint", "pin": "pinocchio", "imageio-ffmpeg": "imageio_ffmpeg"}
 """Libraries that are imported under another name than they are installed by."""
@@ -51,6 +51,13 @@ def test_every_file_of_the_package_is_shipped(package: str, folder: str) -> None
             assert any(fnmatch.fnmatch(name, pattern) for pattern in patterns_of), name
         if path.suffix == ".py":
             assert (path.parent / "__init__.py").is_file(), path
+
+
+def test_the_source_archive_has_the_package_that_lies_elsewhere() -> None:
+    """The wheel is built from the archive, which has no module of a package that is mapped to another folder."""
+    for package in PROJECT["tool"]["setuptools"]["package-dir"]:
+        module = f"validation/{package.replace('.', '/')}/__init__.py"
+        assert (ROOT / module).is_file() and f"include {module}\n" in (ROOT / "MANIFEST.in").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("line", ["write", "write --problems", "faults", "bench --against HEAD"])

@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from shutil import copytree, ignore_patterns
 from tempfile import TemporaryDirectory
 
 import fourbar
@@ -34,5 +35,5 @@ def import_path() -> Iterator[str]:
         return
     with TemporaryDirectory(prefix="fourbar-") as folder:
         for package in (FORMULAS, PACKAGE):
-            (Path(folder) / package.name).symlink_to(package, target_is_directory=True)
+            copytree(package, Path(folder) / package.name, ignore=ignore_patterns("__pycache__"))
         yield os.pathsep.join([folder, *rest])

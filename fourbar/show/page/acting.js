@@ -82,7 +82,7 @@ function drawActing(p, i) {
     } else if (one.kind === "cylinder") {
       const a = toScreen(framed(p, one.bar, one.at)), b = toScreen(framed(p, ...one.end)), on = share => [0, 1].map(j => a[j] + share * (b[j] - a[j]));
       make(parts.acting, "path", { class: "act act-drive", d: pathOf([a, b]) });
-      make(parts.acting, "path", { class: "act act-drive", style: "stroke-width:5", d: pathOf([on(0.1), on(0.6)]) });
+      make(parts.acting, "path", { class: "act act-drive barrel", d: pathOf([on(0.1), on(0.6)]) });
       for (const [x, y] of [a, b]) make(parts.acting, "circle", { class: "act-head act-drive", cx: x, cy: y, r: 3 });
     } else if (one.kind === "force") {
       const foot = forceFoot(p, one), angle = one.turns ? { 2: p.theta2, 3: p.theta3, 4: p.theta4 }[one.bar] : 0;

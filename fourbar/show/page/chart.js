@@ -1,16 +1,18 @@
 // ---- chart ---------------------------------------------------------------------------------
 const angle = (name, label) => [name, `${label}, deg`, DEG], other = (name, label, si) => [name, `${label}, ${nameOf(si)}`, inUnit(si, 1)];
-const INPUT = [angle("theta_2", "\u03b8\u2082"), other("omega_2", "\u03c9\u2082", "rad/s"), other("alpha_2", "\u03b1\u2082", "rad/s^2")];
-const QUANTITIES = [
-  ...throughTime ? INPUT : [],
+const INPUT = () => [angle("theta_2", "\u03b8\u2082"), other("omega_2", "\u03c9\u2082", "rad/s"), other("alpha_2", "\u03b1\u2082", "rad/s^2")];
+const quantitiesOf = () => [
+  ...throughTime ? INPUT() : [],
   angle("theta_3", "\u03b8\u2083"), angle("theta_4", "\u03b8\u2084"),
   other("omega_3", "\u03c9\u2083", "rad/s"), other("omega_4", "\u03c9\u2084", "rad/s"),
   other("alpha_3", "\u03b1\u2083", "rad/s^2"), other("alpha_4", "\u03b1\u2084", "rad/s^2"),
   ...POINTS.flatMap(([name]) => [other(`v_${name}`, `speed of ${typeset(name)}`, "m/s"), other(`a_${name}`, `acceleration of ${typeset(name)}`, "m/s^2")]),
-  other("energy", "kinetic energy", "J"), other("torque", `torque on bar ${data.drive_bar}`, "N m"),
+  other("energy", "kinetic energy", "J"), other("torque", `torque on bar ${data.drive_bar}`, "N m"), other("power", "power of the drive", "W"),
+  angle("transmission", "transmission angle"),
   other("drive_force", "force of the drive", "N"), other("stroke", "stroke", "m"),
   ...FORCES.map(name => other(name, `|${typeset(name)}|`, "N")),
 ];
+let QUANTITIES = quantitiesOf(), reference = null;   // reference: the curves of another state, drawn thin behind
 const chart = byId("chart");
 let plotted = { values: [], x: () => 0, y: () => 0 };
 
@@ -48,31 +50,51 @@ function chartFrame(chart, low, high) {
     if (v === 0 && Math.min(y(low) - y(0), y(0) - y(high)) < 14 && low !== 0 && high !== 0) continue;
     if (v !== 0 || kind === "zero") make(chart, "text", { class: "small", x: left - 6, y: y(v) + 4, "text-anchor": "end" }).textContent = text(v, 3);
   }
-  return { over, x, y, height, bottom };
+  return { over, x, y, width, height, bottom };
+}
+
+// The curves of the data shown, as they stay when other data are.
+function captured(name) {
+  const values = Object.fromEntries(QUANTITIES.filter(q => q[0] in table() || /^[va]_/.test(q[0]) && "omega_3" in table()).map(q => [q[0], column(q[0])]));
+  return { name, over: throughTime ? data.time : grid, throughTime, values };
+}
+const peakOf = values => values.reduce((most, v) => Math.abs(v) > Math.abs(most) ? v : most, 0);
+function comparison(name, values) {
+  const before = reference?.values[name];
+  if (!before) return "";
+  const [then, now] = [peakOf(before), peakOf(values)].map(Math.abs), label = QUANTITIES.find(q => q[0] === name)[1], cut = label.lastIndexOf(", ");
+  const change = then > 0 ? ` (${now < then ? "\u2212" : "+"}${Math.abs(100 * (now / then - 1)).toFixed(Math.abs(now / then - 1) < 0.1 ? 1 : 0)} %)` : "";
+  return `peak ${label.slice(0, cut)} ${text(then, 3)} \u2192 ${text(now, 3)} ${label.slice(cut + 2)}${change}, against ${reference.name}`;
 }
 
 function drawChart() {
   const moves = edited ? data.omega_2 !== null : "omega_3" in table();
   const available = QUANTITIES.filter(([name]) => /^[va]_/.test(name) ? moves : edited ? /^(theta|omega|alpha)_[34]$/.test(name) && (moves || name.startsWith("theta")) : name in table());
-  const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => q[0] === "torque") ?? available[0])[0];
+  const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => ["torque", "drive_force"].includes(q[0])) ?? available[0])[0];
   select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
   const values = column(wanted);
-  const limit = wanted.startsWith("theta") ? { cut: false } : ceiling(values), finite = values.filter(Number.isFinite);
+  const behind = reference?.throughTime === timed() ? reference.values[wanted] ?? [] : [];
+  const limit = wanted.startsWith("theta") ? { cut: false } : ceiling([...values, ...behind]), finite = [...values, ...behind].filter(Number.isFinite);
   let low = Math.min(...finite), high = Math.max(...finite);
   if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }
   if (!wanted.startsWith("theta")) { low = Math.min(low, 0); high = Math.max(high, 0); }
   if (high - low < 1e-300) { high += 1; low -= 1; }
   byId("chart-note").textContent = limit.cut ? `cut at ${text(limit.top, 3)}; it reaches ${text(finite.reduce((m, v) => Math.abs(v) > Math.abs(m) ? v : m, 0), 4)}` : "";
   plotted = { ...chartFrame(chart, low, high), values, low, high };
-  const { over, x, y, height, bottom } = plotted;
-  let d = "", open = false;
-  values.forEach((v, i) => {
-    const jump = i > 0 && limit.cut && v * values[i - 1] < 0 && Math.abs(v - values[i - 1]) > limit.top;   // across a pole no line
-    if (!Number.isFinite(v) || v < low || v > high) { open = false; return; }
-    d += (open && !jump ? "L" : "M") + x(over[i]).toFixed(2) + " " + y(v).toFixed(2);
-    open = true;
-  });
-  make(chart, "path", { class: "curve", d });
+  const { over, x, y, width, height, bottom } = plotted;
+  const curve = (values, over, kind) => {
+    let d = "", open = false;
+    values.forEach((v, i) => {
+      const jump = i > 0 && limit.cut && v * values[i - 1] < 0 && Math.abs(v - values[i - 1]) > limit.top;   // across a pole no line
+      const inside = Number.isFinite(v) && v >= low && v <= high && x(over[i]) >= 60 && x(over[i]) <= width - 10;
+      if (inside) d += (open && !jump ? "L" : "M") + x(over[i]).toFixed(2) + " " + y(v).toFixed(2);
+      open = inside;
+    });
+    make(chart, "path", { class: kind, d });
+  };
+  if (behind.length) curve(behind, reference.over, "curve behind");
+  curve(values, over, "curve");
+  byId("compared").textContent = comparison(wanted, values);
   plotted.cursor = make(chart, "line", { class: "cursor", y1: 10, y2: height - bottom });
   plotted.dot = make(chart, "circle", { class: "dot", r: 4.5 });
 }

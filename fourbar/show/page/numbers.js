@@ -1,4 +1,5 @@
-const data = JSON.parse(document.getElementById("data").textContent);
+let data = JSON.parse(document.getElementById("data").textContent);
+const lineAddress = data.live;   // of the workbench; a saved page has none
 const byId = id => document.getElementById(id);
 const DEG = 180 / Math.PI, TURN = 2 * Math.PI, FORCES = ["F12", "F32", "F43", "F14"];
 const REASONS = {   // why a position has no forces, or more than one set of them
@@ -13,13 +14,13 @@ const REASONS = {   // why a position has no forces, or more than one set of the
 const FORCE_PIN = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
 const SWEEP_SECONDS = 6, ROWS = 360;   // one sweep at speed 1; positions of a sweep whose lengths were edited
 const ORDINARY = 0.95, OUTLIER = 3, CLIPPED = 1.6;   // a scale ends at CLIPPED times the 95th percentile where values diverge
-const unit = data.unit, still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-let lengths = data.lengths.slice(), edited = false, branch = data.branch, grid = data.theta_2, row = data.start;
-let phase = row, playing = false, direction = data.omega_2 < 0 ? -1 : 1, lastTime = null, lastDraw = 0;
+let unit, lengths, edited, branch, grid, throughTime, direction, POINTS, clock;   // of the data shown
+let row = data.start, phase = row, playing = false, lastTime = null, lastDraw = 0;
 let view = { width: 0, height: 0, k: 1, x: 0, y: 0 }, forceScale = { top: 0, cut: false };
 
-const throughTime = data.time !== null, timed = () => throughTime && !edited;   // edited lengths are swept over the angle
+const timed = () => throughTime && !edited;   // edited lengths are swept over the angle
 const table = () => data.branches[throughTime ? data.branch : branch];
 const signAt = i => edited ? branch : table().sign[Math.min(i, grid.length - 1)];
 const at = i => closeLoop(lengths, data.theta_1, grid[i], signAt(i));
@@ -59,7 +60,7 @@ function valuesAt(i) {
 }
 
 // Velocity and acceleration of a point: [name, its bar, from the bar's first pin in the bar's frame].
-const POINTS = [["A", 2, () => [lengths[1], 0]], ["B", 4, () => [lengths[3], 0]],
+const pointsOf = () => [["A", 2, () => [lengths[1], 0]], ["B", 4, () => [lengths[3], 0]],
   ...[2, 3, 4].filter(k => data.centres[k]).map(k => [`G${k}`, k, () => data.centres[k]]),
   ...data.points.map(point => [point.name, point.bar, () => point.at])];
 function pointMotion(i, [, bar, from]) {
@@ -73,7 +74,14 @@ function pointMotion(i, [, bar, from]) {
   return bar === 3 ? spin(2, [lengths[1], 0]).map((foot, n) => [foot[0] + own[n][0], foot[1] + own[n][1]]) : own;
 }
 
-const clock = throughTime ? Math.max(2, 3 - Math.floor(Math.log10(data.time[data.time.length - 1] || 1))) : 0;   // decimals of a second
+// Show other data from now on.
+function adopt(next) {
+  data = next; unit = data.unit; lengths = data.lengths.slice(); edited = false; branch = data.branch; grid = data.theta_2;
+  throughTime = data.time !== null; direction = data.omega_2 < 0 ? -1 : 1; POINTS = pointsOf();
+  clock = throughTime ? Math.max(2, 3 - Math.floor(Math.log10(data.time[data.time.length - 1] || 1))) : 0;   // decimals of a second
+}
+adopt(data);
+
 function showNumbers(i) {
   const v = valuesAt(i);
   for (const k of [2, 3, 4]) {
@@ -85,6 +93,8 @@ function showNumbers(i) {
   const across = v.theta_3 === undefined || v.theta_3 === null ? null : Math.atan2(Math.abs(Math.sin(v.theta_4 - v.theta_3)), Math.abs(Math.cos(v.theta_4 - v.theta_3)));
   byId("mu").textContent = degrees(across);
   byId("torque").textContent = text(inUnit("N m", v.torque));
+  byId("drive_force").textContent = text(inUnit("N", v.drive_force));
+  byId("torque-error").textContent = Number.isFinite(v.torque_error) ? `give or take ${text(inUnit("N m", v.torque_error), 2)}` : "";
   byId("energy").textContent = text(inUnit("J", v.energy));
   if (dynamic()) {
     for (const name of FORCES) {

@@ -1,5 +1,5 @@
 // ---- motion --------------------------------------------------------------------------------
-function draw(position = row) {
+let draw = (position = row) => {
   const i = Math.round(position), low = Math.floor(position), share = position - low;
   let p = at(i);
   if (share > 0 && p) {   // between two positions while it plays: the picture moves on, the numbers stay those of the nearest
@@ -9,7 +9,7 @@ function draw(position = row) {
   showNumbers(i);
   showSpreads(i);
   moveCursor(i);
-}
+};
 
 function stretch(i) {   // the positions around i that assemble without a gap
   let first = i, last = i;
@@ -123,10 +123,12 @@ function refresh() {
   byId("theta").max = grid.length - 1;
   byId("theta").disabled = grid.length < 2;
   byId("edited").hidden = !edited || !("F12" in table());
-  byId("branch").parentElement.hidden = timed();
+  byId("branch").parentElement.hidden = timed() || lineAddress !== "";
   for (const element of document.querySelectorAll(".swept")) element.hidden = timed();
   for (const element of document.querySelectorAll(".timed")) element.hidden = !timed();
   for (const element of document.querySelectorAll(".driven")) element.hidden = !shows("torque");
+  for (const element of document.querySelectorAll(".pushed")) element.hidden = !shows("drive_force");
+  for (const element of document.querySelectorAll(".erring")) element.hidden = !shows("torque_error");
   for (const element of document.querySelectorAll(".energy")) element.hidden = !shows("energy");
   byId("original").disabled = !edited;
   for (const element of document.querySelectorAll(".dynamic")) element.hidden = !dynamic();
@@ -180,6 +182,7 @@ function toggle(id) {
   if (!box.disabled) { box.checked = !box.checked; box.dispatchEvent(new Event("change")); }
 }
 function chooseBranch(value) {
+  if (lineAddress) return;   // there it is a field of the scene
   const wasPlaying = playing;
   if (playing) play(false);
   branch = value;
@@ -213,31 +216,46 @@ document.addEventListener("keydown", event => {
 });
 new ResizeObserver(() => { if (Math.max(280, picture.parentElement.clientWidth) !== view.width) refresh(); }).observe(picture.parentElement);
 
-byId("drive").textContent = data.drive_bar;
-for (const element of document.querySelectorAll("[data-unit]")) element.textContent = nameOf(element.dataset.unit);
-byId("branch").value = branch;
-for (const element of document.querySelectorAll(".unit")) element.textContent = unit.name;
-if (data.followed) byId("branch").options[branch === 1 ? 0 : 1].textContent += " (followed)";
-if (!Object.keys(data.pictures).length) byId("show-pictures").parentElement.hidden = true;
-if (!Object.values(data.centres).some(Boolean)) byId("show-centres").parentElement.hidden = true;
+// What of the page depends on the data: names, units, and what there is to show.
+function furnish() {
+  ceilings = {};
+  QUANTITIES = quantitiesOf();
+  furnishTolerances();
+  byId("drive").textContent = data.drive_bar;
+  for (const element of document.querySelectorAll("[data-unit]")) element.textContent = nameOf(element.dataset.unit);
+  byId("branch").value = branch;
+  for (const element of document.querySelectorAll(".unit")) element.textContent = unit.name;
+  [...byId("branch").options].forEach((option, n) => { option.textContent = ["open", "crossed"][n] + (data.followed && n === (branch === 1 ? 0 : 1) ? " (followed)" : ""); });
+  const hide = (id, hidden) => { byId(id).parentElement.hidden = hidden; };
+  hide("show-pictures", !Object.keys(data.pictures).length);
+  hide("show-centres", !Object.values(data.centres).some(Boolean));
+  for (const element of document.querySelectorAll(".moving")) element.hidden = !("omega_3" in table());
+  hide("show-acting", !data.acting.length);
+  hide("show-forces", !dynamic());
+  hide("arrow-scale", !dynamic());
+  byId("download").hidden = data.toml === null;
+  for (const [k, source] of Object.entries(data.pictures)) {
+    if (parts.image[k].getAttribute("href") === source) continue;
+    const probe = new Image();
+    probe.onload = () => { parts.image[k].ratio = probe.naturalHeight / probe.naturalWidth; draw(playing ? phase : row); };
+    parts.image[k].setAttribute("href", source);
+    probe.src = source;
+  }
+  data.lengths.forEach((value, k) => { byId(`length-${k + 1}`).value = shown(value); });
+}
 for (const letter of "va") byId(`show-${letter}`).checked = data.vectors;
-for (const element of document.querySelectorAll(".moving")) element.hidden = !("omega_3" in table());
-if (!data.acting.length) byId("show-acting").parentElement.hidden = true;
-if (!dynamic()) byId("show-forces").parentElement.hidden = true;
-if (!dynamic()) byId("arrow-scale").parentElement.hidden = true;
-else {   // one scale for all positions, unless most arrows would then be too short to see
+if (dynamic()) {   // one scale for all positions, unless most arrows would then be too short to see
   const sizes = FORCES.flatMap(name => table()[name].map(f => f[0] === null ? NaN : Math.hypot(f[0], f[1]))).filter(Number.isFinite).sort((x, y) => x - y);
   const most = ceiling(sizes);
   if (most.cut || sizes[Math.floor(0.5 * sizes.length)] < 0.1 * most.top) byId("arrow-scale").value = "position";
 }
-byId("download").hidden = data.toml === null;
 byId("download").addEventListener("click", event => {
   event.target.href = URL.createObjectURL(new Blob([sceneFile()], { type: "application/toml" }));
 });
-for (const [k, source] of Object.entries(data.pictures)) {
-  const probe = new Image();
-  probe.onload = () => { parts.image[k].ratio = probe.naturalHeight / probe.naturalWidth; draw(playing ? phase : row); };
-  probe.src = source;
-}
-data.lengths.forEach((value, k) => { byId(`length-${k + 1}`).value = shown(value); });
+chart.addEventListener("click", event => {   // a click on the curve sets the position
+  const at = (event.clientX - chart.getBoundingClientRect().left) * chart.viewBox.baseVal.width / chart.clientWidth;
+  const away = plotted.over.map(t => Math.abs(plotted.x(t) - at));
+  go(away.indexOf(Math.min(...away)));
+});
+furnish();
 refresh();

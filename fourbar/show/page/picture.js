@@ -12,7 +12,7 @@ const parts = { ground: make(picture, "g", {}), images: make(picture, "g", { id:
 parts.traces = make(picture, "g", { id: "traces" });
 parts.bars = {}; parts.image = {};
 for (const k of [2, 3, 4]) {
-  if (data.pictures[k]) parts.image[k] = make(parts.images, "image", { href: data.pictures[k], preserveAspectRatio: "none", id: `picture-${k}` });
+  parts.image[k] = make(parts.images, "image", { preserveAspectRatio: "none", id: `picture-${k}` });
   parts.bars[k] = make(picture, "line", { class: `bar b${k}`, id: `bar-${k}` });
 }
 parts.forces = make(picture, "g", { id: "arrows" });
@@ -23,7 +23,7 @@ parts.arrow = Object.fromEntries(FORCES.map(name => [name, {
 parts.pins = Object.fromEntries(["O2", "A", "B", "O4"].map(name => [name, make(picture, "circle", { class: "pin", r: 6, id: `pin-${name}` })]));
 parts.centres = make(picture, "g", { id: "centres" });
 parts.centre = {};
-for (const k of [2, 3, 4]) if (data.centres[k]) {
+for (const k of [2, 3, 4]) {
   const mark = parts.centre[k] = make(parts.centres, "g", { id: `centre-${k}` });
   make(mark, "circle", { class: "centre-disc", r: 7 });
   make(mark, "path", { class: "centre-fill", d: "M0 0H7A7 7 0 0 0 0 -7ZM0 0H-7A7 7 0 0 0 0 7Z" });
@@ -59,6 +59,7 @@ function barPoint(p, k, r) {
 
 const coupler = p => barPoint(p, 3, data.centres[3] ?? [0.5 * lengths[2], 0]);
 
+let held = false;   // while something is dragged the scale stays
 // Everything the sweep reaches fits into the picture, so that the scale does not change while it moves.
 function fit() {
   view.width = Math.max(280, picture.parentElement.clientWidth);
@@ -75,12 +76,11 @@ function fit() {
     const own = [...[2, 4].filter(k => data.centres[k]).map(k => barPoint(p, k, data.centres[k])), ...data.points.map(point => framed(p, point.bar, point.at))];
     own.forEach((place, n) => { traces[n] = (traces[n] ?? "") + `${broken ? "M" : "L"}${place[0]} ${place[1]} `; });
     points.push(...reached, ...actingPoints(p), ...own);
-    if (dynamic()) for (const name of FORCES) tips.push([p[FORCE_PIN[name]], ...arrowShares(name, i)]);
+    if (dynamic() && !held) for (const name of FORCES) tips.push([p[FORCE_PIN[name]], ...arrowShares(name, i)]);
     curve.push([broken ? "M" : "L", g]);
     broken = false;
   }
-  const frame = fitted(points, tips, small ? 30 : 58);
-  Object.assign(view, frame);
+  if (!held) Object.assign(view, fitted(points, tips, small ? 30 : 58));
   parts.curve.setAttribute("d", curve.map(([step, g]) => step + toScreen(g).map(v => v.toFixed(2)).join(" ")).join(""));
   parts.traces.replaceChildren();   // in metres: the group carries the scale
   parts.traces.setAttribute("transform", `translate(${view.x} ${view.y}) scale(${view.k} ${-view.k})`);
@@ -102,13 +102,14 @@ function arrowShares(name, i) {
 // The greatest scale at which pins keep a margin and arrows with their names stay inside, and the length of an arrow.
 function fitted(points, tips, margin) {
   const edge = 30, side = Math.min(view.width, view.height);
-  const reach = (j, k, arrow) => {
-    let low = Infinity, high = -Infinity;
-    const take = (value, around) => { low = Math.min(low, value - around); high = Math.max(high, value + around); };
-    for (const point of points) take(k * point[j], margin);
-    for (const [foot, ...shares] of tips) for (const share of shares) take(k * foot[j] + arrow * share[j], edge);
-    return [low, high];
+  // of all tips k foot + arrow share only those count that no other exceeds in both
+  const far = (j, sign) => {
+    let most = -Infinity;
+    const both = tips.flatMap(([foot, ...shares]) => shares.map(share => [sign * foot[j], sign * share[j]]));
+    return both.sort((p, q) => q[0] - p[0] || q[1] - p[1]).filter(([, share]) => share > most && ((most = share), true));
   };
+  const ends = [0, 1].map(j => [-1, 1].map(sign => ({ point: points.reduce((most, point) => Math.max(most, sign * point[j]), -Infinity), tips: far(j, sign), sign })));
+  const reach = (j, k, arrow) => ends[j].map(({ point, tips, sign }) => sign * Math.max(k * point + margin, ...tips.map(([foot, share]) => k * foot + arrow * share + edge)));
   const fits = (k, arrow) => [view.width, view.height].every((size, j) => { const [low, high] = reach(j, k, arrow); return high - low <= size; });
   const largest = arrow => {
     let low = 0, high = side / Math.max(...lengths);
@@ -209,8 +210,8 @@ function drawLinkage(p, i) {
   for (const k of [2, 3, 4]) {
     const p1 = s[FIRST_PIN[k]], p2 = s[LAST_PIN[k]], drawn = Boolean(p1 && p2);
     parts.bars[k].style.display = drawn ? "" : "none";
-    if (parts.image[k]) parts.image[k].style.display = drawn && show("show-pictures") ? "" : "none";
-    if (parts.centre[k]) parts.centre[k].style.display = drawn && show("show-centres") ? "" : "none";
+    parts.image[k].style.display = drawn && data.pictures[k] && show("show-pictures") ? "" : "none";
+    parts.centre[k].style.display = drawn && data.centres[k] && show("show-centres") ? "" : "none";
     if (!drawn) continue;
     set(parts.bars[k], { x1: p1[0], y1: p1[1], x2: p2[0], y2: p2[1] });
     visible(String(k), true);
@@ -219,12 +220,12 @@ function drawLinkage(p, i) {
     let side = (mid[0] - middle[0]) * normal[0] + (mid[1] - middle[1]) * normal[1] >= 0 ? 15 : -15;
     if (data.centres[k] && Math.abs(data.centres[k][1]) * view.k > 10) side = data.centres[k][1] > 0 ? 15 : -15;   // off the bar, G has the other side
     set(parts.label[k], { x: mid[0] + side * normal[0], y: mid[1] + side * normal[1] });
-    if (parts.image[k]) {
+    if (data.pictures[k]) {
       const height = long * (parts.image[k].ratio ?? 0.3), angle = Math.atan2(p2[1] - p1[1], p2[0] - p1[0]) * DEG;
       set(parts.image[k], { x: 0, y: -0.5 * height, width: long, height, transform: `translate(${p1[0]} ${p1[1]}) rotate(${angle})` });
       parts.bars[k].classList.toggle("pictured", show("show-pictures"));
     }
-    if (parts.centre[k]) {
+    if (data.centres[k]) {
       const g = toScreen(barPoint(known, k, data.centres[k]));
       parts.centre[k].setAttribute("transform", `translate(${g[0]} ${g[1]})`);
       visible(`G${k}`, show("show-centres"));

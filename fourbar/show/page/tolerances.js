@@ -1,6 +1,7 @@
 // ---- tolerances ------------------------------------------------------------------------------
 // Of the original lengths on the scene's branch: spreads at this position, their shares, and bands over the motion.
-const loose = data.tolerances, bands = byId("bands");
+let loose = data.tolerances;
+const bands = byId("bands");
 let banded = null;
 const factorOf = spread => ({ rad: DEG, m: unit.factor }[spread.unit] ?? inUnit(spread.unit, 1));   // lengths as everywhere on the page
 const spreadUnit = spread => ({ rad: "deg", m: unit.name }[spread.unit] ?? nameOf(spread.unit));
@@ -56,9 +57,12 @@ function drawBands() {
   byId("band-unit").textContent = `, ${spreadUnit(s)}`;
 }
 
-if (loose !== null) {
+function furnishTolerances() {
+  loose = data.tolerances;
+  if (loose === null) return;
   byId("tolerance-quantity").replaceChildren(...Object.keys(loose.parts).map(part => new Option(typeset(part), part)));
+  while (byId("shares").tHead.rows[0].cells.length > 1) byId("shares").tHead.rows[0].deleteCell(1);
   byId("shares").tHead.rows[0].append(...Object.keys(loose.parts).map(part => Object.assign(document.createElement("th"), { scope: "col", textContent: typeset(part) })));
-  byId("tolerance-quantity").addEventListener("change", () => { drawBands(); showSpreads(row); });
 }
+byId("tolerance-quantity").addEventListener("change", () => { drawBands(); showSpreads(row); });
 

@@ -201,6 +201,8 @@ CIRCLES = mp.mpf(10) ** -45
 """What 50 digits leave of the loop."""
 PATH = 64.0 * EPS
 """Roundings of a coefficient, divided by the sine squared and by e^2 over the lengths squared, both above 0.05 here."""
+READ_BACKWARDS = 16.0 * EPS
+"""Times 1/h4^2, of J/h4^2: theta_4 is rounded by some EPS, theta_2 follows it by 1/h4 and h4 by 1/h4 once more."""
 SHAPES = {
     "crank-rocker": (0.3, 0.1, 0.25, 0.22, 0.4),
     "a = d": (0.3, 0.3, 0.25, 0.22, -2.0),
@@ -312,7 +314,7 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(lengths: tuple[float, 
         other = State(state.lengths, linkage.ground_angle, theta_2, at, k, 1.0, rates(k, 1.0, 0.0))
         expected = ((slope - 2.0 * J * bend / rate) / rate**3)[same]
         size = float(np.max(np.abs(expected), initial=0.0))
-        assert J_of(linkage, other)[same] == pytest.approx((J / rate**2)[same], rel=1e-12)
+        assert np.all(np.abs(J_of(linkage, other) * rate**2 / J - 1.0)[same] <= READ_BACKWARDS / rate[same] ** 2)
         assert slope_of(linkage, other)[same] == pytest.approx(expected, rel=1e-10, abs=1e-10 * size)
         ok = ok & ~same
     assert not ok.any()

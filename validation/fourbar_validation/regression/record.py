@@ -77,7 +77,7 @@ def _commit() -> str:
     if CHECKOUT is None:
         return ""
     try:
-        done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True, check=True, timeout=10)
+        done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, encoding="utf-8", check=True, timeout=10)
     except (OSError, subprocess.SubprocessError):
         return ""
     return done.stdout.strip()

@@ -41,14 +41,14 @@ def ended(
     variables: Mapping[str, str] | None = None,
 ) -> Ended:
     """Run a command to its end, with these variables added to the environment."""
-    line, environment = [str(part) for part in command], {**os.environ, **(variables or {})}
+    line, environment = [str(part) for part in command], {**os.environ, "PYTHONUTF8": "1", **(variables or {})}
     try:
         done = subprocess.run(
             line,
             cwd=folder,
             env=environment,
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             errors="replace",
             timeout=seconds,
             check=False,

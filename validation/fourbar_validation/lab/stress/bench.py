@@ -93,7 +93,10 @@ def import_cost() -> float:
     """Compare the CPU time that `import fourbar` adds with that of `import numpy`: median over fresh interpreters."""
     clock = "time.process_time()"
     code = f"import time; a = {clock}; import numpy; b = {clock}; import fourbar; print(({clock} - b) / (b - a))"
-    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(7)]
+    runs = [
+        subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True)
+        for _ in range(7)
+    ]
     return median(float(run.stdout) for run in runs)
 
 

@@ -26,7 +26,7 @@ def c_loop() -> Loop | str:
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / "loop.so"
         line = [compiler, *FLAGS, "-fPIC", "-shared", str(SOURCE), "-o", str(library), "-lm"]
-        made = subprocess.run(line, capture_output=True, text=True, check=False)
+        made = subprocess.run(line, capture_output=True, encoding="utf-8", errors="replace", check=False)
         if made.returncode != 0:
             return f"{compiler} fails: {(made.stderr.strip().splitlines() or ['without a word'])[0]}"
         loop = ctypes.CDLL(str(library)).loop

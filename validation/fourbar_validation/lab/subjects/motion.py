@@ -134,7 +134,7 @@ def as_file(text: str, name: str) -> Iterator[str]:
     """Write a file that lasts as long as the context: for simulators that read no text."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / name
-        file.write_text(text)
+        file.write_text(text, encoding="utf-8")
         yield str(file)
 
 

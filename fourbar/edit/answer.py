@@ -1,0 +1,60 @@
+"""What the page is told of a scene: JSON, and its columns as doubles, for their text takes longer than to solve.
+
+The frame: four bytes with the length of the JSON (little-endian), the JSON padded to a multiple of eight bytes, then
+the columns one after the other, as the JSON lists them.
+"""
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+
+from fourbar.edit.dragging import handles
+from fourbar.errors import NotAssembledError
+from fourbar.scene import Scene
+from fourbar.show.page_data import live_data
+from fourbar.show.tables import heading
+from fourbar.show.words import type_lines
+from fourbar.solution import DEGREES, Conversion, Solution
+from fourbar.solve import last_stage, solve
+
+
+def scene_data(scene: Scene, plain: dict[str, Any], units: Conversion, *, settled: bool = False) -> dict[str, Any]:
+    """Evaluate a scene for the page; `settled`: with error bars and summary, which cost more than the rest.
+
+    Raises NotAssembledError where no position assembles, InputError as `solve` does.
+    """
+    stage = last_stage(scene) if settled else None
+    own = solve(scene, stage)
+    if not own.assembled.any():
+        raise NotAssembledError("motion.theta_2: the linkage assembles at none of the positions requested")
+    data = live_data(scene, units, stage=stage) | {"tolerances": None, "pictures": {}, "toml": None}
+    data["handles"] = [handle.drawn() for handle in handles(scene, plain)]
+    if settled:
+        data["summary"] = summary(scene, own, units)
+    return data
+
+
+def summary(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
+    """Write what `analyze` says above its table and `classify` of the linkage."""
+    shown = units if "rad" in units else {**units, **DEGREES}
+    return [*heading(scene, solution, shown), *type_lines(scene.linkage)]
+
+
+def frame(about: dict[str, Any]) -> bytes:
+    """Pack an answer: arrays in `about["data"]["branches"]` become columns."""
+    columns: list[tuple[str, str, int, int]] = []
+    arrays: list[bytes] = []
+    if "data" in about:
+        branches: dict[str, dict[str, Any]] = {}
+        for sign, table in about["data"]["branches"].items():
+            branches[sign] = {name: each for name, each in table.items() if not isinstance(each, np.ndarray)}
+            for name, each in table.items():
+                if isinstance(each, np.ndarray):
+                    columns.append((sign, name, len(each), each.ndim))
+                    arrays.append(np.ascontiguousarray(each, dtype="<f8").tobytes())
+        about = about | {"data": about["data"] | {"branches": branches}, "columns": columns}
+    text = json.dumps(about, allow_nan=False, separators=(",", ":")).encode()
+    text += b" " * (-(len(text) + 4) % 8)
+    return b"".join((struct.pack("<I", len(text)), text, *arrays))

@@ -1,0 +1,172 @@
+"""A scene file that is changed entry by entry: comments, order and units of the rest stay as they were."""
+
+import tomllib
+from collections.abc import Iterable, Sequence
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
+
+from fourbar.errors import InputError
+from fourbar.files.effects import REGISTRY
+from fourbar.files.scene_text import BRANCHES
+from fourbar.linkage import PINS
+from fourbar.scene.motion_law import ENDS
+
+Path = Sequence[str | int]
+WORDS = {"branch": [*BRANCHES], "through": ["sign", "follow"], "frame": ["world", "bar"], "ends": [*ENDS]}
+"""Entries that are one of a few words."""
+IN_LINE = ("points", "tolerances")
+"""Tables whose entries take one line each; so do the effects."""
+LONGEST_TEXT = 10_000
+"""Characters of one entry."""
+
+
+@cache
+def offers() -> dict[str, Any]:
+    """List the empty fields, the parts that can be added, and the words to choose from."""
+    found = tomllib.loads(files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8"))
+    for key, effect in REGISTRY.items():
+        value = tomllib.loads(effect.example)[key]
+        found["parts"].append({"at": ["effects", key], "value": value})
+        if isinstance(value, dict) and set(value) <= set(PINS):
+            found["parts"] += [{"at": ["effects", key, pin], "value": next(iter(value.values()))} for pin in PINS]
+        elif isinstance(value, list) and isinstance(value[0], dict):
+            found["parts"].append({"at": ["effects", key, -1], "label": "another", "value": value[0]})
+    return found | {"words": WORDS}
+
+
+class SceneDocument:
+    """The text of a scene file, entry by entry."""
+
+    def __init__(self, text: str) -> None:
+        try:
+            self.tree = tomlkit.parse(text)
+        except (TOMLKitError, RecursionError) as error:
+            raise InputError("TOML", text[:60], f"cannot be read: {error}") from None
+
+    def text(self) -> str:
+        """Write the file."""
+        return tomlkit.dumps(self.tree)
+
+    def at(self, path: Path) -> Any:
+        """Return the entry at a path of keys and indices; None where there is none."""
+        found: Any = self.tree
+        for step in path:
+            try:
+                found = found[step]
+            except (KeyError, IndexError, TypeError, TOMLKitError):
+                return None
+        return found
+
+    def set(self, path: Path, text: str) -> None:
+        """State one entry as it is typed: a text, or a number where the file has one; an empty text takes it away."""
+        if len(text) > LONGEST_TEXT:
+            raise InputError(dotted(path), text[:60], f"must have {LONGEST_TEXT} characters at most")
+        old = self.at(path)
+        if not text.strip() and old is not None and not isinstance(path[-1], int):
+            self.remove(path)
+        elif text.strip() or old is not None:
+            example = old if old is not None else _in(offers()["fields"], path)
+            self.put(path, text if isinstance(example, str) or example is None else _number(text))
+
+    def put(self, path: Path, value: Any) -> None:
+        """State an entry, with the tables that it stands in; an index of -1 appends to a list."""
+        *into, last = path
+        holder = self._holder(into)
+        if isinstance(last, int) and last < 0:
+            holder.append(_table(value, tomlkit.nl()) if isinstance(holder, AoT) else _inline(value))
+        elif isinstance(holder, (Table, InlineTable)) or holder is self.tree or isinstance(last, int):
+            old = self.at(path)
+            if isinstance(old, Table):  # a table of its own is written anew, with its heading
+                del holder[last]
+                old = None
+            holder[last] = _like(old, value) if old is not None else _written(path, value)
+        else:
+            raise InputError(dotted(path), value, "stands in no table")
+
+    def remove(self, path: Path) -> None:
+        """Take an entry away, and a table that it leaves empty."""
+        *into, last = path
+        holder = self.at(into)
+        if self.at(path) is None:
+            raise InputError(dotted(path), "", "is not there")
+        del holder[last]
+        if into and not len(holder) and into[0] not in ("lengths", "motion"):
+            self.remove(into)
+
+    def _holder(self, path: Path) -> Any:
+        found = self.at(path)
+        if found is not None:
+            return found
+        if path == ["loads"]:
+            made: Item = tomlkit.aot()
+        else:
+            made = tomlkit.table() if len(path) == 1 or path[0] == "bars" else tomlkit.inline_table()
+        if len(path) > 1:
+            self._holder(path[:-1])
+        parent = self.at(path[:-1])
+        parent[path[-1]] = made
+        return self.at(path)
+
+
+def dotted(path: Iterable[str | int]) -> str:
+    """Name an entry as errors do."""
+    return ".".join(map(str, path))
+
+
+def _in(table: Any, path: Path) -> Any:
+    for step in path:
+        table = table.get(step) if isinstance(table, dict) else None
+    return table
+
+
+def _number(text: str) -> int | float | str:
+    """Return a number without a unit; what is none stays a text, which the reader of the file refuses."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _like(old: Any, value: Any) -> Any:
+    """Return the value as an item with the comment and the blanks of what it replaces."""
+    made = tomlkit.item(_inline(value))
+    if isinstance(old, Item):
+        made.trivia.comment_ws, made.trivia.comment = old.trivia.comment_ws, old.trivia.comment
+        made.trivia.trail = old.trivia.trail
+    return made
+
+
+def _table(entries: dict[str, Any], *after: Whitespace) -> Table:
+    made = tomlkit.table()
+    for key, value in entries.items():
+        made[key] = _inline(value)
+    for blank in after:
+        made.add(blank)
+    return made
+
+
+def _inline(value: Any) -> Any:
+    """Write tables and lists in one line."""
+    if isinstance(value, dict):
+        made = tomlkit.inline_table()
+        for key, entry in value.items():
+            made[key] = _inline(entry)
+        return made
+    if isinstance(value, list):
+        row = tomlkit.array()
+        for entry in value:
+            row.append(_inline(entry))
+        return row
+    return value
+
+
+def _written(path: Path, value: Any) -> Any:
+    """Write a new entry: a table of its own at the top of the file, in one line anywhere else."""
+    return _table(value) if len(path) == 1 and isinstance(value, dict) else _inline(value)

@@ -1,0 +1,178 @@
+"""What a drag in the drawing means: from a place in the plane to the lengths, angles and forces of the file.
+
+A pin changes the lengths that meet in it, a point its distance and angle, an arrow its force; each number keeps the
+unit that it has in the file and gets no more digits than a pixel is worth.
+"""
+
+import cmath
+import math
+import re
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.edit.document import Path, SceneDocument
+from fourbar.errors import InputError
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.quantities.units import FRACTION, NUMBER, to_si
+from fourbar.scene import Command, Scene, command
+from fourbar.solve import solve
+
+PINS = ("A", "B", "O4")
+LEAST_DIGITS = 1e-12
+"""Of the number itself: the finest grain."""
+
+
+class Handle(NamedTuple):
+    """A point of the drawing that can be dragged, besides the pins."""
+
+    name: str
+    """What it is, for a reader."""
+    path: Path
+    """Of its pair (distance, angle)."""
+    bar: int
+    at: complex
+    """From the bar's first pin in its frame, m: of what the pair is measured from."""
+    beyond: complex = 0.0j
+    """The pair itself, m."""
+    turns: bool = True
+    """Whether the pair's angle turns with the bar."""
+    force: Path | None = None
+    """Of the force whose arrow stands here."""
+
+    def drawn(self) -> dict[str, Any]:
+        """Write it for the page."""
+        plain = {name: [z.real, z.imag] for name, z in (("at", self.at), ("beyond", self.beyond))}
+        return self._asdict() | plain
+
+
+def handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
+    """List everything that can be dragged: mass centres, points, loads, and the ends of what acts on a line."""
+    found = [
+        Handle(f"mass centre of {name}", ("bars", name, "centre"), n, 0j, scene.linkage.bar(n).to_centre)
+        for n, name in BAR_NAMES.items()
+        if n in MOVING_BARS and scene.linkage.bar(n).mass > 0.0
+    ]
+    for point in scene.points:
+        path = ("points", point.name, "from_pin")
+        found.append(Handle(f"point {point.name}", path, point.bar, 0j, cmath.rect(*point.from_pin)))
+    for n, load in enumerate(scene.loads):
+        if load.force is not None:
+            foot, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
+            force = ("loads", n, "force")
+            found.append(
+                Handle(f"load {n + 1}", ("loads", n, "at"), load.bar, foot, cmath.rect(*load.at), turns, force)
+            )
+    lines: list[tuple[tuple[str | int, ...], Any]] = [(("drive",), document.get("drive", {}))]
+    lines += [(("effects", "springs", n), s) for n, s in enumerate(document.get("effects", {}).get("springs", []))]
+    for path_of, entry in lines:
+        for end in ("from", "to"):
+            if isinstance(own := entry.get(end), dict):
+                distance, angle = own.get("at", ("0 m", "0 rad"))
+                z = cmath.rect(to_si(distance, "m"), to_si(angle, "rad"))
+                name = f"{end} of {path_of[-2:][0]} {path_of[-1] + 1 if isinstance(path_of[-1], int) else ''}".strip()
+                found.append(Handle(name, (*path_of, end, "at"), own["bar"], 0j, z))
+    return found
+
+
+class Dragged(NamedTuple):
+    """What the page says of a drag."""
+
+    what: str | list[str | int]
+    """A pin, or the path of a handle's pair or of its force."""
+    to: complex
+    """m, in world axes."""
+    grain: float
+    """m that a pixel is worth."""
+    theta_2: float
+    """Of the position shown, rad."""
+    stretch: float = 1.0
+    """Of an arrow: its length over the one that it is drawn with."""
+
+
+def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], given: Dragged) -> None:
+    """Change the numbers of the file for a drag that began in `scene`, whose entries are `plain`.
+
+    Raises InputError where nothing of that name can be dragged, or the linkage does not assemble there.
+    """
+    own = command(scene)
+    where = Command(np.array([given.theta_2]), own.branch[:1], None, 0.0)
+    at = solve(scene, "position", at=where)
+    pins = {"O2": 0j, "A": complex(*at.A[0]), "B": complex(*at.B[0])}
+    pins["O4"] = cmath.rect(scene.linkage.ground, scene.linkage.ground_angle)
+    if isinstance(given.what, str):
+        _drag_pin(document, given, pins)
+        return
+    turned = {1: scene.linkage.ground_angle, 2: given.theta_2, 3: float(at.theta_3[0]), 4: float(at.theta_4[0])}
+    if not all(map(cmath.isfinite, (*pins.values(), *turned.values()))):
+        raise InputError("theta_2", given.theta_2, "is no position of the linkage")
+    for handle in handles(scene, plain):
+        frame = cmath.rect(1.0, turned[handle.bar])
+        foot = pins[{1: "O2", 2: "O2", 3: "A", 4: "O4"}[handle.bar]] + frame * handle.at
+        own_frame = frame if handle.turns else 1.0 + 0.0j
+        if list(handle.path) == given.what:
+            pair = (given.to - foot) / own_frame
+            _put_pair(document, handle.path, abs(pair), cmath.phase(pair), given.grain)
+            return
+        if handle.force is not None and list(handle.force) == given.what:
+            arrow = (given.to - foot - own_frame * handle.beyond) / own_frame
+            size = str(plain["loads"][handle.force[1]]["force"][0])
+            unit = unit_of(size, "N")
+            force = to_si(size, unit) * given.stretch
+            angle = cmath.phase(arrow) + (0.0 if force >= 0.0 else math.pi)
+            document.put((*handle.force, 0), rounded(force, abs(force) / 50.0, unit))
+            document.put((*handle.force, 1), _angle(document.at((*handle.force, 1)), angle, 0.02))
+            return
+    raise InputError("drag", given.what, "is nothing that can be dragged")
+
+
+def _drag_pin(document: SceneDocument, given: Dragged, pins: dict[str, complex]) -> None:
+    if given.what not in PINS:
+        raise InputError("drag", given.what, "must be one of " + ", ".join(PINS))
+    of = {"A": {"input": "O2"}, "B": {"coupler": "A", "output": "O4"}, "O4": {"ground": "O2"}}[str(given.what)]
+    for bar, pin in of.items():
+        length = abs(given.to - pins[pin])
+        _put(document, ("lengths", bar), length, given.grain, "m")
+    if given.what == "O4":
+        angle, key = cmath.phase(given.to), ("lengths", "ground_angle")
+        document.put(key, _angle(document.at(key), angle, given.grain / max(abs(given.to), given.grain)))
+
+
+def _put_pair(document: SceneDocument, path: Path, size: float, angle: float, grain: float) -> None:
+    """State a distance and an angle, in the units that they have; where there is none, in those of the ground."""
+    unit = unit_of(document.at((*path, 0)) or document.at(("lengths", "ground")), "m")
+    texts = [rounded(size * to_si("1 m", unit), grain * to_si("1 m", unit), unit)]
+    texts.append(_angle(document.at((*path, 1)), angle, grain / max(size, grain)))
+    if document.at(path) is None:
+        document.put(path, texts)
+    else:
+        for index, text in enumerate(texts):
+            document.put((*path, index), text)
+
+
+def _put(document: SceneDocument, path: Path, value: float, grain: float, si: str) -> None:
+    unit = unit_of(document.at(path), si)
+    factor = to_si(f"1 {si}", unit)
+    document.put(path, rounded(value * factor, grain * factor, unit))
+
+
+def _angle(old: object, angle: float, grain: float) -> str:
+    unit = unit_of(old, "deg")
+    factor = to_si("1 rad", unit)
+    return rounded(angle * factor, grain * factor, unit)
+
+
+def unit_of(text: object, otherwise: str) -> str:
+    """Return the unit that a text has; another one where it has none."""
+    found = FRACTION.match(str(text).strip()) or NUMBER.match(str(text).strip())
+    unit = str(text).strip()[found.end() :].strip() if found else ""
+    unit = re.sub('[″”"]', "in", re.sub("[′’']", "ft", unit))
+    return unit or otherwise
+
+
+def rounded(value: float, grain: float, unit: str) -> str:
+    """Write a number with its unit, to the power of ten next below the grain."""
+    finest = max(grain, LEAST_DIGITS * abs(value), 1e-300)
+    digits = -math.floor(math.log10(finest))
+    shown = f"{round(value, digits):.{max(digits, 0)}f}"
+    return f"{shown.rstrip('0').rstrip('.') if '.' in shown else shown} {unit}"

@@ -1,0 +1,318 @@
+"""The server of the workbench: on the loopback address alone, for pages that know its token."""
+
+import asyncio
+import hmac
+import json
+import signal
+import socket
+import sys
+import threading
+import webbrowser
+from collections import deque
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from tornado.httpserver import HTTPServer
+from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
+
+from fourbar.edit.answer import frame
+from fourbar.edit.session import Session
+from fourbar.edit.witness import HarnessRun
+from fourbar.errors import FourBarError, InputError
+from fourbar.show.animate import page
+from fourbar.show.tolerances import embedded_tolerances
+
+LOOPBACK = "127.0.0.1"
+LARGEST_REQUEST = 2_000_000
+"""Bytes; a scene file has half a million at most."""
+MOST_PAGES = 16
+MOST_WAITING = 100
+"""Requests of all pages that wait; of a drag only the latest does."""
+GONE = 10.0
+"""s, after which the server ends when the last page has gone."""
+SETTLED = 0.15
+"""s without a change, after which error bars follow."""
+STILL = 1.0
+"""s without a change, after which the spreads of tolerances are sampled: that takes seconds."""
+KEPT = 0.3
+"""s, after which a change is written to the state file."""
+
+
+class Workbench:
+    """A session and the pages that show it."""
+
+    def __init__(self, session: Session) -> None:
+        self.session, self.ended = session, asyncio.Event()
+        self.loop = asyncio.get_running_loop()
+        self.address: asyncio.Future[str] = self.loop.create_future()
+        self.pages: set[PageLine] = set()
+        self.waiting: deque[tuple[PageLine, dict[str, Any]]] = deque()
+        self.one = ThreadPoolExecutor(1)  # the session is touched from this thread alone
+        self.aside = ThreadPoolExecutor(1)  # what takes seconds
+        self.working: asyncio.Task[None] | None = None
+        self.timers: dict[str, asyncio.TimerHandle] = {}
+        self.check = HarnessRun(session.exports.folder / "check", self.tell)
+
+    def later(self, name: str, seconds: float, what: Any) -> None:
+        """Do something after a while, once: asked for again, it waits anew."""
+        self.never(name)
+        self.timers[name] = self.loop.call_later(seconds, what)
+
+    def never(self, name: str) -> None:
+        """Take back what was to be done later."""
+        if name in self.timers:
+            self.timers.pop(name).cancel()
+
+    def join(self, line: "PageLine") -> None:
+        """Welcome a page."""
+        self.pages.add(line)
+        self.never("gone")
+
+    def leave(self, line: "PageLine") -> None:
+        """Forget a page; some time after the last one the server ends."""
+        self.pages.discard(line)
+        if not self.pages:
+            self.later("gone", GONE, self.ended.set)
+
+    def tell(self, about: dict[str, Any], *, to: "PageLine | None" = None) -> None:
+        """Send an answer to one page or to all."""
+        data = frame(about)
+        for line in [to] if to else list(self.pages):
+            with suppress(WebSocketClosedError):
+                line.write_message(data, binary=True)
+
+    def take(self, line: "PageLine", asked: dict[str, Any]) -> None:
+        """Put a request in the queue; a later one of the same gesture takes the place of one that waits."""
+        if asked.get("do") in ("check", "stop"):
+            self.check.start(self.session.now.text) if asked["do"] == "check" else self.check.stop()
+            self.tell({"for": asked.get("id")}, to=line)
+            return
+        last = self.waiting[-1] if self.waiting else None
+        if last and asked.get("gesture") and (line, asked["gesture"]) == (last[0], last[1].get("gesture")):
+            self.waiting.pop()
+        if len(self.waiting) >= MOST_WAITING:
+            self.tell({"for": asked.get("id"), "refused": "too many requests wait"}, to=line)
+            return
+        self.waiting.append((line, asked))
+        self.never("settle")
+        self.never("sample")
+        if self.working is None or self.working.done():
+            self.working = asyncio.create_task(self._work())
+
+    async def _work(self) -> None:
+        while self.waiting:
+            line, asked = self.waiting.popleft()
+            about = await self.loop.run_in_executor(self.one, self.session.do, asked)
+            about["for"] = asked.get("id")
+            alone = not {"data", "text"} <= about.keys() or asked.get("do") == "hello"
+            if about.pop("refer", False):
+                compared = await self.loop.run_in_executor(self.one, self._compared)
+                self.tell(compared, to=line if alone else None)
+            self.tell(about, to=line if alone or "refused" in about or "ask" in about else None)
+        self.later("settle", SETTLED, lambda: asyncio.create_task(self._settle()))
+        self.later("keep", KEPT, lambda: self.one.submit(self._keep))
+
+    def _compared(self) -> dict[str, Any]:
+        try:
+            return self.session.compared()
+        except FourBarError as error:
+            return {"note": str(error)}
+
+    def _keep(self) -> None:
+        try:
+            self.session.keep()
+        except OSError as error:
+            asyncio.run_coroutine_threadsafe(self._note(f"the state file cannot be written: {error}"), self.loop)
+
+    async def _note(self, text: str) -> None:
+        self.tell({"note": text})
+
+    async def _settle(self) -> None:
+        """Send the error bars, unless something has changed again."""
+        with suppress(FourBarError):
+            about = await self.loop.run_in_executor(self.one, lambda: self.session.answer(settled=True))
+            if not self.waiting:
+                self.tell(about)
+                self.later("sample", STILL, lambda: asyncio.create_task(self._sample(about["data"]["theta_2"])))
+
+    async def _sample(self, theta_2: list[float]) -> None:
+        """Send what the tolerances do, unless something has changed meanwhile."""
+        scene = self.session.now.scene
+        if scene.tolerances:
+            found = await self.loop.run_in_executor(self.aside, embedded_tolerances, scene, theta_2)
+            if scene is self.session.now.scene:
+                self.tell({"tolerances": found})
+
+    async def serve(self, port: int, browse: bool) -> None:
+        """Serve until all pages have gone, or until Ctrl-C."""
+        try:
+            listening = socket.create_server((LOOPBACK, port))
+        except (OSError, OverflowError) as error:
+            raise InputError("--port", port, f"cannot be listened to: {error}") from None
+        listening.setblocking(False)
+        own = listening.getsockname()[1]
+        server = HTTPServer(
+            application(self, own),
+            **{"max_body_size": LARGEST_REQUEST, "max_buffer_size": 2 * LARGEST_REQUEST, "max_header_size": 16_384},
+        )
+        server.add_socket(listening)
+        for name in (signal.SIGINT, signal.SIGTERM):
+            with suppress(NotImplementedError):  # Windows: KeyboardInterrupt
+                self.loop.add_signal_handler(name, self.ended.set)
+        address = f"http://{LOOPBACK}:{own}/{self.session.token}/"
+        self.one.submit(self._keep)
+        self.address.set_result(address)
+        print(address, flush=True)
+        if browse:
+            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+        await self.ended.wait()
+        server.stop()
+        gone = not self.pages
+        self.waiting.clear()
+        if self.working is not None:
+            await asyncio.wait({self.working})
+        for timer in self.timers.values():
+            timer.cancel()
+        for line in list(self.pages):
+            line.close(1001, "the server ends")
+        self.check.stop()
+        if self.check.task is not None:
+            await asyncio.wait({self.check.task}, timeout=5.0)
+        await self.loop.run_in_executor(self.one, lambda: self.session.end(gone=gone))
+        self.one.shutdown()
+        self.aside.shutdown(wait=False, cancel_futures=True)
+
+
+class Guarded(RequestHandler):
+    """Answers only requests for this address, with the token."""
+
+    def initialize(self, bench: Workbench, hosts: frozenset[str]) -> None:
+        """Know the workbench and the names of this address."""
+        self.bench, self.hosts = bench, hosts
+
+    def prepare(self) -> None:
+        """Refuse another Host or Origin (403), and a wrong token (404)."""
+        origin = self.request.headers.get("Origin")
+        wanted = {f"http://{host}" for host in self.hosts}
+        if self.request.host not in self.hosts or (origin is not None and origin not in wanted):
+            raise HTTPError(403)
+        if not hmac.compare_digest(self.path_kwargs["token"].encode(), self.bench.session.token.encode()):
+            raise HTTPError(404)
+
+    def set_default_headers(self) -> None:
+        """Keep the page and its address to this browser."""
+        for name, value in {
+            **{"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"},
+            **{"X-Frame-Options": "DENY", "Cross-Origin-Resource-Policy": "same-origin", "Server": "fourbar"},
+        }.items():
+            self.set_header(name, value)
+
+    def write_error(self, status_code: int, **details: Any) -> None:
+        """Say no more than the status."""
+        self.finish(f"{status_code}\n")
+
+
+class Page(Guarded):
+    """The page itself."""
+
+    async def get(self, token: str) -> None:
+        """Write the page with its first state."""
+        session = self.bench.session
+        text = await asyncio.get_running_loop().run_in_executor(
+            self.bench.one,
+            lambda: page(session.now.scene, units=session.units, live=f"ws://{self.request.host}/{token}/live"),
+        )
+        self.finish(text)
+
+
+class Report(Guarded):
+    """The report of the harness, in a sandbox: its origin is none, so it reaches nothing here."""
+
+    def get(self, token: str) -> None:
+        """Write the report; 404 before there is one."""
+        if not self.bench.check.report.is_file():
+            raise HTTPError(404)
+        self.set_header("Content-Security-Policy", "sandbox allow-scripts")
+        self.finish(self.bench.check.report.read_bytes())
+
+
+class PageLine(WebSocketHandler, Guarded):
+    """The line between a page and the session."""
+
+    def prepare(self) -> None:
+        """Refuse what is no page of this server: a browser always states the origin."""
+        Guarded.prepare(self)
+        if "Origin" not in self.request.headers:
+            raise HTTPError(403)
+        if len(self.bench.pages) >= MOST_PAGES:
+            raise HTTPError(503)
+
+    def check_origin(self, origin: str) -> bool:
+        """Return True: `prepare` has looked at it."""
+        return True
+
+    def open(self, *args: str, **kwargs: str) -> None:
+        """Welcome the page."""
+        self.set_nodelay(True)
+        self.bench.join(self)
+
+    def on_message(self, message: str | bytes) -> None:
+        """Take a request, one JSON object."""
+        try:
+            asked = json.loads(message)
+        except (ValueError, RecursionError):
+            asked = None
+        if isinstance(asked, dict):
+            self.bench.take(self, asked)
+        else:
+            self.close(1003, "no JSON object")
+
+    def on_close(self) -> None:
+        """Forget the page."""
+        self.bench.leave(self)
+
+
+def application(bench: Workbench, port: int) -> Application:
+    """Make the application of a workbench that listens at a port."""
+    known = {"bench": bench, "hosts": frozenset(f"{name}:{port}" for name in (LOOPBACK, "localhost"))}
+    routes = {"": Page, "report": Report, "live": PageLine}
+    return Application(
+        [(rf"/(?P<token>[A-Za-z0-9_-]+)/{place}", handler, known) for place, handler in routes.items()],
+        log_function=lambda handler: None,
+        websocket_max_message_size=LARGEST_REQUEST,
+        websocket_ping_interval=20.0,
+        default_handler_class=Nothing,
+    )
+
+
+class Nothing(RequestHandler):
+    """Any other address."""
+
+    def prepare(self) -> None:
+        """Refuse it, and say nothing."""
+        self.set_header("Server", "fourbar")
+        self.set_status(404)
+        self.finish("404\n")
+
+
+def edit(path: Path, exports: Path, port: int = 0, *, browse: bool = True) -> None:
+    """Open a scene in the workbench, and serve it until all pages have gone.
+
+    Parameters
+    ----------
+    path : the scene file; a new one is begun where it does not exist.
+    exports : the folder that exports and reports go to.
+    port : 0: any that is free.
+    """
+
+    async def run() -> None:
+        await Workbench(session).serve(port, browse)
+
+    session = Session(path, exports)
+    session.answer()  # what assembles nowhere has no page
+    with suppress(KeyboardInterrupt):
+        asyncio.run(run())
+    sys.stdout.flush()

@@ -1,0 +1,272 @@
+"""One scene that is being changed: its text, its history, and what is kept of it next to the file."""
+
+import hashlib
+import json
+import re
+import secrets
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fourbar.edit.answer import scene_data
+from fourbar.edit.document import SceneDocument, offers
+from fourbar.edit.dragging import Dragged, drag
+from fourbar.edit.exports import Exports
+from fourbar.errors import FourBarError, InputError
+from fourbar.files import loads, read_text
+from fourbar.files.new import new_scene
+from fourbar.files.reading import read_bytes
+from fourbar.files.scene_file import LARGEST_FILE
+from fourbar.scene import Scene
+from fourbar.show.units import units
+from fourbar.solution import Conversion
+from fourbar.studies.keys import at_place, entries
+from fourbar.writing import write_bytes
+
+SCHEMA = "fourbar-edit/1"
+ENDING = ".edit"
+MOST_STATES = 500
+"""That are kept for undo."""
+LARGEST_STATE = 100_000_000
+"""Bytes of a state file."""
+TOKEN = re.compile(r"[A-Za-z0-9_-]{32,100}")
+NEW = ("300 mm", "100 mm", "250 mm", "220 mm")
+"""Ground, input, coupler and output of a new scene."""
+
+
+class SceneState(NamedTuple):
+    """A scene file that can be read, and what was read."""
+
+    text: str
+    scene: Scene
+    plain: dict[str, Any]
+
+
+class Session:
+    """The scene file at `path`, changed step by step; whatever is refused leaves the last good state."""
+
+    def __init__(self, path: Path, exports: Path) -> None:
+        self.path, self.exports = path, Exports(exports, path.stem)
+        self.state_file = path.with_name(path.name + ENDING)
+        self.token = secrets.token_urlsafe(32)
+        self.unit_names, self.units = "SI", units("SI")
+        text = read_text(path) if path.exists() else new_scene(NEW)
+        self.disk = self._on_disk()
+        self.texts, self.place, self.kept = [text], 0, {"start": text}
+        self.reference, self.gesture = "start", ""
+        if self.state_file.exists():
+            self._resume()
+        self.now = self._read(self.texts[self.place])
+        self.document = SceneDocument(self.now.text)
+        self.base = self.now
+
+    def _resume(self) -> None:
+        """Go on where an earlier session stopped."""
+        try:
+            kept = json.loads(read_bytes(self.state_file, "state file", LARGEST_STATE))
+            if kept["schema"] != SCHEMA or not TOKEN.fullmatch(kept["token"]):
+                raise ValueError(kept["schema"])
+            texts, place = [str(text) for text in kept["texts"]], int(kept["place"])
+            own = units(kept["units"])
+            texts[place], kept["kept"][kept["reference"]]
+        except (ValueError, KeyError, TypeError, IndexError) as error:
+            allowed = f"is no state of the workbench ({error}): take it away to begin from the scene file"
+            raise InputError("state file", str(self.state_file), allowed) from None
+        self.token, self.disk, self.texts, self.place = kept["token"], kept["disk"], texts, place
+        self.kept, self.reference, self.unit_names, self.units = kept["kept"], kept["reference"], kept["units"], own
+
+    def keep(self) -> None:
+        """Write the state file: readable by its owner alone, for it holds the token."""
+        first = max(0, self.place - MOST_STATES)
+        kept = {
+            **{"schema": SCHEMA, "token": self.token, "disk": self.disk, "kept": self.kept},
+            **{"texts": self.texts[first : first + 2 * MOST_STATES], "place": self.place - first},
+            **{"reference": self.reference, "units": self.unit_names},
+        }
+        write_bytes(self.state_file, json.dumps(kept).encode(), private=True)
+
+    def end(self, *, gone: bool) -> None:
+        """Take the state file away where all is saved, or nothing was changed, and no page is left (`gone`)."""
+        if gone and (self.saved or len(self.texts) == 1):
+            self.state_file.unlink(missing_ok=True)
+        else:
+            self.keep()
+
+    @property
+    def saved(self) -> bool:
+        """Whether the file on the disk holds the present state."""
+        return self._on_disk() == _digest(self.now.text.encode())
+
+    def _on_disk(self) -> str | None:
+        return _digest(read_bytes(self.path, "scene file", LARGEST_FILE)) if self.path.exists() else None
+
+    def _read(self, text: str) -> SceneState:
+        if len(text.encode()) > LARGEST_FILE:
+            raise InputError("scene file", len(text), f"must not exceed {LARGEST_FILE} bytes")
+        return SceneState(text, loads(text, str(self.path)), tomllib.loads(text))
+
+    # ---- what a page asks for ----------------------------------------------------------------
+
+    def greeting(self) -> dict[str, Any]:
+        """Describe what does not change with the state, to a page that has come."""
+        return {"offers": offers(), "file": self.path.name, "exports": str(self.exports.folder), "kept": [*self.kept]}
+
+    def answer(self, *, settled: bool = False) -> dict[str, Any]:
+        """Describe the present state."""
+        return {
+            "data": scene_data(self.now.scene, self.now.plain, self.units, settled=settled),
+            "settled": settled,
+            "plain": self.now.plain,
+            "text": self.now.text,
+            "units": self.unit_names,
+            "undo": self.place > 0,
+            "redo": self.place + 1 < len(self.texts),
+            "reference": self.reference,
+            "kept": [*self.kept],
+            "keys": {key: entry.unit for key, entry in entries(self.now.scene).items()},
+            **({"saved": self.saved} if settled else {}),
+        }
+
+    def compared(self) -> dict[str, Any]:
+        """Describe the state that the present one is held against."""
+        kept = self._read(self.kept[self.reference])
+        return {"compared": self.reference, "data": scene_data(kept.scene, kept.plain, self.units)}
+
+    def do(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """Do what a page asks for and describe the state after it; what is refused changes nothing."""
+        action = ACTIONS.get(str(asked.get("do")))
+        before = (self.texts, self.place, self.now)
+        try:
+            if action is None:
+                raise InputError("do", asked.get("do"), "must be one of " + ", ".join(ACTIONS))
+            note = action(self, asked) or {}
+            return self.answer() | note
+        except Exception as error:  # of a page whose request makes no sense too: the server goes on
+            self.texts, self.place, self.now = before
+            self.document = SceneDocument(self.now.text)
+            words = str(error) if isinstance(error, FourBarError | OSError) else f"this cannot be done: {error}"
+            if isinstance(error, InputError):
+                words = f"{error.key}: {error.allowed}"
+            return {"refused": words, "text": self.now.text, "plain": self.now.plain}
+
+    def change(self, alter: Callable[[SceneDocument], None], gesture: str = "") -> None:
+        """Alter the document; what belongs to one gesture begins from the same state and is one step to undo."""
+        goes_on = bool(gesture) and gesture == self.gesture
+        if not goes_on:
+            self.base = self.now
+        alter(self.document)
+        self._step(self._read(self.document.text()), goes_on)
+        self.gesture = gesture
+
+    def _step(self, now: SceneState, goes_on: bool) -> None:
+        if goes_on:
+            self.texts = [*self.texts[: self.place], now.text]
+        elif now.text != self.now.text:
+            self.texts = [*self.texts[: self.place + 1], now.text]
+            self.place += 1
+        self.now = now
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _set(session: Session, asked: dict[str, Any]) -> None:
+    session.change(lambda of: of.set(asked["path"], str(asked["value"])), str(asked.get("gesture", "")))
+
+
+def _add(session: Session, asked: dict[str, Any]) -> None:
+    part, name = offers()["parts"][int(asked["part"])], str(asked.get("name", ""))
+    path = [name if step == "" else step for step in part["at"]]
+    value = part["value"]
+    if path[0] == "tolerances":
+        known = entries(session.now.scene)
+        if name in known:  # a thousandth of the number, until the designer says more
+            size = abs(float(at_place(session.now.scene, known[name].place) or 1.0)) / 1000.0
+            value = f"{size:.1g} {known[name].unit}"
+    session.change(lambda of: of.put(path, value))
+    session.document = SceneDocument(session.now.text)
+
+
+def _remove(session: Session, asked: dict[str, Any]) -> None:
+    session.change(lambda of: of.remove(asked["path"]))
+    session.document = SceneDocument(session.now.text)
+
+
+def _drag(session: Session, asked: dict[str, Any]) -> None:
+    numbers = {name: float(asked[name]) for name in ("grain", "theta_2", "stretch") if name in asked}
+    given = Dragged(asked["what"], complex(*map(float, asked["to"])), **numbers)
+    gesture = str(asked.get("gesture", ""))
+    from_state = session.base if gesture and gesture == session.gesture else session.now
+    session.change(lambda of: drag(of, from_state.scene, from_state.plain, given), gesture)
+
+
+def _text(session: Session, asked: dict[str, Any]) -> None:
+    now = session._read(str(asked["text"]))
+    session._step(now, False)
+    session.document, session.gesture = SceneDocument(now.text), ""
+
+
+def _move(session: Session, by: int) -> None:
+    place = session.place + by
+    if not 0 <= place < len(session.texts):
+        raise InputError("history", place, "there is nothing more to undo or redo")
+    session.now, session.place, session.gesture = session._read(session.texts[place]), place, ""
+    session.document = SceneDocument(session.now.text)
+
+
+def _keep(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    name = f"state {len(session.kept)}"
+    session.kept[name] = session.now.text
+    return _refer(session, {"to": name})
+
+
+def _refer(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    if asked["to"] not in session.kept:
+        raise InputError("reference", asked["to"], "must be one of " + ", ".join(session.kept))
+    session.reference = asked["to"]
+    return {"refer": True}
+
+
+def _units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    found: Conversion = units(str(asked["units"]))
+    session.unit_names, session.units = str(asked["units"]), found
+    return {"refer": True}
+
+
+def _save(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    """Write the file; where it is another one than was read, only on demand."""
+    if session._on_disk() != session.disk and not asked.get("over"):
+        return {"ask": f"{session.path.name} was changed on the disk meanwhile. Overwrite it?"}
+    data = session.now.text.encode()
+    write_bytes(session.path, data)
+    session.disk = _digest(data)
+    return {"note": f"saved {session.path.name}", "saved": True}
+
+
+def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    return {"note": "wrote " + str(session.exports.write(session.now.scene, str(asked["format"]), session.units))}
+
+
+def _bodies(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    return {"bodies": session.exports.free_bodies(session.now.scene, float(asked["theta_2"]), session.units)}
+
+
+ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] = {
+    "set": _set,
+    "add": _add,
+    "remove": _remove,
+    "drag": _drag,
+    "text": _text,
+    "undo": lambda session, asked: _move(session, -1),
+    "redo": lambda session, asked: _move(session, 1),
+    "keep": _keep,
+    "refer": _refer,
+    "units": _units,
+    "save": _save,
+    "export": _export,
+    "bodies": _bodies,
+    "hello": lambda session, asked: session.greeting() | {"refer": True},
+}
+"""What a page can ask for."""

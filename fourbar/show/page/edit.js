@@ -1,0 +1,171 @@
+// ---- the line to the formulas: requests one at a time, of a gesture only the latest -----------------
+const waiting = [], latencies = [];
+let line = null, inFlight = null, asked = 0, greeted = false, goal = null;
+const me = Math.random().toString(36).slice(2);
+
+function ask(request, path = null, theta = null) {
+  const last = waiting[waiting.length - 1];
+  if (request.gesture && last?.request.gesture === request.gesture) waiting.pop();
+  waiting.push({ request, path, theta, since: performance.now() });
+  pump();
+}
+function pump() {
+  if (inFlight || !waiting.length || line?.readyState !== WebSocket.OPEN || !greeted) return;
+  inFlight = waiting.shift();
+  inFlight.request.id = `${me}:${++asked}`;
+  line.send(JSON.stringify(inFlight.request));
+}
+
+function connect() {
+  line = new WebSocket(lineAddress);
+  line.binaryType = "arraybuffer";
+  line.addEventListener("open", () => {
+    greeted = true;
+    if (inFlight) { waiting.unshift(inFlight); inFlight = null; }
+    waiting.unshift({ request: { do: "hello" }, path: null, theta: null, since: performance.now() });
+    pump();
+  });
+  line.addEventListener("message", event => take(unpacked(event.data)));
+  line.addEventListener("close", () => {
+    greeted = false;
+    say(`The server has stopped. What stands here is kept; start it again with: fourbar edit ${fileName} --port ${location.port}`, true);
+    setTimeout(connect, 1000);
+  });
+}
+let fileName = "SCENE";
+
+// JSON and its columns of doubles, as fourbar.edit.answer packs them; NaN is null as in a saved page.
+function unpacked(buffer) {
+  const long = new DataView(buffer).getUint32(0, true), about = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, long)));
+  let offset = 4 + long;
+  const number = x => Number.isFinite(x) ? x : null;
+  for (const [sign, name, count, vector] of about.columns ?? []) {
+    const doubles = new Float64Array(buffer, offset, count * vector);
+    about.data.branches[sign][name] = vector === 1 ? Array.from(doubles, number) : Array.from({ length: count }, (_, i) => [number(doubles[2 * i]), number(doubles[2 * i + 1])]);
+    offset += 8 * count * vector;
+  }
+  return about;
+}
+
+function say(words, warn = false) {
+  byId("bench").textContent = words;
+  byId("bench").className = warn ? "warning" : "hint";
+}
+
+function take(about) {
+  const own = inFlight && about.for === inFlight.request.id ? inFlight : null;
+  if (own) inFlight = null;
+  if (about.check) showCheck(about.check);
+  if (about.compared) { keptData = about; compareAnew(); }
+  if (about.offers) { offers = about.offers; fileName = about.file; shape = ""; }
+  if (about.refused !== undefined) refuse(own?.path ?? null, about.refused);
+  else if (own) { refuse(own.path, ""); refuse(null, ""); }
+  if (about.ask) { byId("ask").firstElementChild.textContent = about.ask; byId("ask").hidden = false; }
+  if (about.data && !about.compared && !(about.settled && (inFlight || waiting.length))) show(about, own);
+  if (about.tolerances && data.summary) { data.tolerances = about.tolerances; furnishTolerances(); drawBands(); showSpreads(row); }
+  if (about.note) say(about.note);
+  if (about.bodies) { byId("bodies-picture").src = about.bodies; byId("bodies-picture").hidden = false; }
+  if (own && about.data) {
+    const spent = performance.now() - own.since;
+    requestAnimationFrame(() => latencies.push([spent, performance.now() - own.since]));
+  }
+  pump();
+}
+
+let keptData = null;
+// The curves behind are those of the same formulas, in the units of now.
+function compareAnew() {
+  const shown = data, at = row;
+  adopt(keptData.data); furnish();
+  reference = captured(keptData.compared);
+  adopt(shown); furnish();
+  row = phase = at;
+}
+
+function show(about, own) {
+  const theta = own?.theta ?? grid[row], same = about.data.theta_2.length === grid.length && about.data.theta_2[0] === grid[0] && about.data.theta_2[grid.length - 1] === grid[grid.length - 1];
+  const keep = row;
+  adopt(about.data);
+  row = same && own?.theta == null ? keep : throughTime ? Math.min(keep, grid.length - 1) : nearest(theta);
+  if (!playing) phase = row;
+  furnish();
+  refresh();
+  if (playing) { run = { bounds: stretch(row), wraps: turnsFully() }; if (run.bounds[0] === run.bounds[1]) play(false); }
+  plain = about.plain;
+  if (offers) showFields();
+  if (document.activeElement !== byId("file-text")) byId("file-text").value = about.text;
+  if (document.activeElement !== byId("units")) byId("units").value = about.units;
+  byId("undo").disabled = !about.undo; byId("redo").disabled = !about.redo;
+  byId("reference").replaceChildren(...about.kept.map(name => new Option(name, name, false, name === about.reference)));
+  document.querySelector("h1").textContent = document.title = about.plain.title || "Four-bar linkage";
+  document.querySelector(".source").textContent = about.plain.source ?? "";
+  if (about.data.summary) byId("summary").textContent = about.data.summary.join("\n");
+  byId("keys")?.replaceChildren(...Object.keys(about.keys).map(key => new Option(key)));
+  if (about.saved !== undefined) say(about.saved ? `${fileName} is saved` : `${fileName}: not saved yet; kept in ${fileName}.edit`);
+  else if (own && own.request.do !== "hello") say(`${fileName}: changed`);
+  showPositions();
+}
+
+// ---- the table of positions --------------------------------------------------------------------------
+const COLUMNS = ["torque", "torque_error", "drive_force", "drive_force_error", "power", ...FORCES, "transmission"];
+const LABELS = { torque_error: ["error bar", "N m"], torque: ["torque", "N m"], power: ["power", "W"], drive_force: ["drive force", "N"], drive_force_error: ["error bar", "N"], transmission: ["transmission angle", "rad"] };
+function showPositions() {
+  const body = byId("positions").tBodies[0], t = table(), names = COLUMNS.filter(name => name in t);
+  if (!byId("table-of").open) return;
+  const factor = si => si === "rad" ? DEG : inUnit(si, 1), unitName = si => si === "rad" ? "deg" : nameOf(si);
+  const heads = ["\u03b8\u2082, deg", ...throughTime ? ["time, s"] : [], ...names.map(name => LABELS[name] ? `${LABELS[name][0]}, ${unitName(LABELS[name][1])}` : `|${typeset(name)}|, ${nameOf("N")}`)];
+  byId("positions").tHead.replaceChildren(element("tr", {}, ...heads.map(head => element("th", { scope: "col", textContent: head }))));
+  const every = Number(byId("every").value), rows = grid.map((_, i) => i).filter(i => i % every === 0 || i === grid.length - 1);
+  while (body.rows.length > rows.length) body.deleteRow(-1);
+  rows.forEach((i, n) => {
+    const at = body.rows[n] ?? rowOf(body);
+    at.dataset.row = i;
+    const texts = names.map(name => { const v = t[name][i]; return Array.isArray(v) ? text(v[0] === null ? null : inUnit("N", Math.hypot(...v))) : text(v === null ? null : v * factor(LABELS[name][1]), name.endsWith("_error") ? 2 : 5); });
+    at.cells[0].firstChild.textContent = (grid[i] * DEG).toFixed(2);
+    if (throughTime) texts.unshift(data.time[i].toFixed(clock));
+    while (at.cells.length > texts.length + 1) at.deleteCell(-1);
+    texts.forEach((shown, k) => { (at.cells[k + 1] ?? at.insertCell()).textContent = shown; });
+  });
+  markPosition();
+}
+function rowOf(body) {
+  const made = body.insertRow(), button = element("button", { type: "button" });
+  made.insertCell().append(button);
+  made.addEventListener("click", () => go(Number(made.dataset.row)));
+  return made;
+}
+function markPosition() {
+  for (const one of byId("positions").tBodies[0].rows) one.classList.toggle("here", Number(one.dataset.row) === row);
+}
+
+// ---- the harness ---------------------------------------------------------------------------------------
+function showCheck(check) {
+  byId("stop").hidden = !check.running;
+  byId("check").disabled = check.running;
+  byId("verdict").hidden = false;
+  const state = check.running ? `checking, ${check.seconds.toFixed(0)} s` : check.stopped ? "stopped" : check.status === 0 ? "all hold" : "not all hold, or the check did not run";
+  byId("verdict").textContent = [state, ...check.lines].join("\n");
+  byId("report").hidden = !check.report;
+  byId("report").href = location.href.replace(/[^/]*$/, "report");
+}
+
+// ---- buttons and keys ------------------------------------------------------------------------------------
+const press = (id, what) => byId(id).addEventListener("click", () => ask(what()));
+for (const name of ["undo", "redo", "save", "keep", "check", "stop"]) press(name, () => ({ do: name }));
+press("overwrite", () => { byId("ask").hidden = true; return { do: "save", over: true }; });
+press("apply", () => ({ do: "text", text: byId("file-text").value }));
+press("export", () => ({ do: "export", format: byId("format").value }));
+press("bodies", () => ({ do: "bodies", theta_2: grid[row] }));
+byId("reference").addEventListener("change", event => ask({ do: "refer", to: event.target.value }));
+byId("units").addEventListener("change", event => ask({ do: "units", units: event.target.value }));
+byId("every").addEventListener("change", showPositions);
+byId("table-of").addEventListener("toggle", showPositions);
+document.addEventListener("keydown", event => {
+  const key = event.key.toLowerCase();
+  if (!(event.ctrlKey || event.metaKey) || !["z", "y", "s"].includes(key)) return;
+  event.preventDefault();
+  ask({ do: key === "s" ? "save" : key === "y" || event.shiftKey ? "redo" : "undo" });
+});
+const drawn = draw;
+draw = position => { drawn(position); drawHandles(); markPosition(); };
+connect();

@@ -1,0 +1,75 @@
+"""Other systems: no `fork`, an ASCII locale, names with blanks and accents, line ends of Windows.
+
+Workers are started by `spawn` everywhere; here nothing else can be had. What opens a text without saying its
+encoding makes Python warn.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fourbar
+from fourbar.cli import status
+from fourbar.errors import HOLDS
+from fourbar.files import save
+from fourbar_validation.cli import status as harness
+from tests.support.another_machine import ROOT
+from tests.support.scenes import crank_rocker
+
+HOSTILE = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""}
+OURS = [str(ROOT / "fourbar"), str(ROOT / "validation")]
+BEGIN = "import os, sys; del os.fork; from {module} import status; sys.exit(status(sys.argv[1:]))"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder whose name takes more than ASCII, with a scene whose title does."""
+    found = tmp_path / "Análisis de θ"
+    found.mkdir()
+    save(crank_rocker(title="Mécanique, θ₂"), found / "scène.toml")
+    return found
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("fourbar.cli", "analyze scène.toml --csv -o table.csv"),
+        ("fourbar.cli", "analyze scène.toml --json"),
+        ("fourbar.cli", "mjcf scène.toml -o model.xml"),
+        ("fourbar.cli", "animate scène.toml -o page.html"),
+        ("fourbar.cli", "plot scène.toml -o plot.svg"),
+        ("fourbar_validation.cli", "run scène.toml --workers 2 --engines free-body --out results"),
+        ("fourbar_validation.cli", "check-mjcf scène.toml {models}/crank_rocker.xml"),
+    ],
+)
+def test_commands_need_neither_fork_nor_utf_8(module: str, line: str, folder: Path) -> None:
+    if "mjcf" in line:
+        pytest.importorskip("mujoco")
+    path = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "validation")])}
+    arguments = line.format(models=ROOT / "models").split()
+    done = subprocess.run(
+        [sys.executable, "-X", "warn_default_encoding", "-c", BEGIN.format(module=module), *arguments],
+        cwd=folder,
+        env=os.environ | HOSTILE | path,
+        capture_output=True,
+        check=False,
+    )
+    said = done.stderr.decode(errors="replace")
+    assert done.returncode == (1 if "check-mjcf" in line else HOLDS), said  # the other model is another one
+    assert not [each for each in said.splitlines() if "EncodingWarning" in each and each.startswith(tuple(OURS))]
+
+
+def test_line_ends_of_windows_are_read(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, table = folder / "scène.toml", folder / "table.csv"
+    assert status(["analyze", str(scene), "--csv", "-o", str(table)]) == HOLDS
+    before = fourbar.load(scene)
+    for file in (scene, table):
+        assert b"\r" not in file.read_bytes()
+        file.write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
+    assert fourbar.load(scene) == before
+    capsys.readouterr()
+    assert harness(["check", str(scene), str(table)]) == HOLDS
+    assert "numbers agree" in capsys.readouterr().out

@@ -1,0 +1,68 @@
+"""What is public is kept in public.txt; `python -m tests.whole.test_public` writes it anew."""
+
+import inspect
+import runpy
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+import fourbar
+import fourbar.cli
+import fourbar_validation.cli
+from fourbar import errors
+from fourbar.quantities import QUANTITIES
+from fourbar_validation import Answer
+from fourbar_validation.compare.rows import COLUMNS
+
+KEPT = Path(__file__).with_name("public.txt")
+API = Path(__file__).parents[2] / "docs" / "api.py"
+GROUPS = {"fourbar": fourbar.cli.group, "fourbar-validation": fourbar_validation.cli.group}
+
+
+def of_commands() -> Iterator[str]:
+    for program, group in GROUPS.items():
+        context = click.Context(group)
+        for name in group.list_commands(context):
+            command = group.get_command(context, name)
+            assert command is not None
+            for given in sorted(command.params, key=lambda each: each.opts[0]):
+                chosen = f" {'|'.join(given.type.choices)}" if isinstance(given.type, click.Choice) else ""
+                yield f"{program} {name}: {' '.join(sorted([*given.opts, *given.secondary_opts]))}{chosen}"
+
+
+def of_python() -> Iterator[str]:
+    page = runpy.run_path(str(API))
+    named = {name: getattr(fourbar, name) for name in fourbar.__all__ if name != "__version__"}
+    functions = [name for name, thing in named.items() if not inspect.isclass(thing)]
+    returned = page["results"](functions, list(named))
+    for name, thing in {**named, **returned, "fourbar_validation.Answer": Answer}.items():
+        error = inspect.isclass(thing) and issubclass(thing, Exception)
+        yield f"{name}({thing.__base__.__name__})" if error else f"{name}{page['signature'](thing)}"
+        for method in page["METHODS"].get(name, ()):
+            yield f"{name}.{method}{page['signature'](getattr(thing, method))}"
+
+
+def public() -> str:
+    """One line a name: of Python, of commands and their options, exit statuses, quantities, columns of results."""
+    lines = [*of_python(), *of_commands()]
+    lines += [f"exit status {name}: {getattr(errors, name)}" for name in ("HOLDS", "FAILED", "BAD_INPUT", "BROKEN")]
+    lines += [f"quantity {each.name}: {each.unit}, {each.stage}, {each.kind}" for each in QUANTITIES]
+    return "\n".join([*lines, f"columns of results: {', '.join(COLUMNS)}"]) + "\n"
+
+
+def test_nothing_public_changes_unnoticed() -> None:
+    kept, found = KEPT.read_text(encoding="utf-8").splitlines(), public().splitlines()
+    gone, new = ("\n".join(line for line in one if line not in other) for one, other in ((kept, found), (found, kept)))
+    assert kept == found, f"gone:\n{gone}\nnew:\n{new}\npython -m tests.whole.test_public keeps it"
+
+
+def test_all_is_what_dir_shows() -> None:
+    assert dir(fourbar) == fourbar.__all__
+    names: dict[str, object] = {}
+    exec("from fourbar import *", names)
+    assert set(fourbar.__all__) <= set(names)
+
+
+if __name__ == "__main__":
+    KEPT.write_text(public(), encoding="utf-8", newline="\n")
