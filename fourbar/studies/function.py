@@ -65,6 +65,8 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     expect("scene", scene, Scene)
     for name, names in (("keys", keys), ("quantities", quantities)):
         expect(name, names, tuple, list)
+        for each in names:
+            expect(name, each, str)
         if len(set(names)) < len(names) or not names:
             raise InputError(name, names, "must be one or more, each once")
     known, theta, motion = entries(scene), angle_key(scene), scene.motion

@@ -106,6 +106,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         "equilibrium": (fourbar.equilibrium, (scene,)),
         "ratio": (fourbar.ratio, (scene, 1)),
         "extremes": (fourbar.extremes, (scene, ("torque",))),
+        "function": (fourbar.function, (scene, ["lengths.input"], ["torque"])),
         "tolerances": (
             lambda *x: fourbar.tolerances(fourbar.Scene(link, scene.motion, tolerances=x[0]), samples=x[1], seed=x[2]),
             ((fourbar.Tolerance("lengths.input", 1e-4),), 2, 0),

@@ -43,7 +43,9 @@ class Columns:
         self._schema = pa.schema([(field.name, kinds[field.type]) for field in fields(Row)])  # type: ignore[index]
         self._text, self._columns = (self.out / f".results.{kind}.part" for kind in ("csv", "parquet"))
         with self._files:
+            self._files.enter_context(naming(self.out / "results.csv"))  # what fails on closing is named too
             self._csv = self._files.enter_context(self._text.open("w", encoding="utf-8", newline=""))
+            self._files.enter_context(naming(self.out / "results.parquet"))
             self._parquet = self._files.enter_context(pq.ParquetWriter(self._columns, self._schema))
             self._csv.write(to_csv([]))
             self._files = self._files.pop_all()
@@ -72,7 +74,7 @@ class Columns:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Put both in place, the text only where it is not too long."""
-        with naming(self.out), self._files:
+        with self._files:
             if kind is None and self._waiting:
                 self._write_group()
         if kind is not None:
