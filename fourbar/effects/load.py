@@ -66,11 +66,12 @@ class Table:
         """
         first, xp = self.theta_2[0], namespace(theta_2)
         place = first + xp.remainder(angle(polar(1.0, theta_2)) - first, TURN)
-        points, factors = (xp.asarray(row, dtype=place.dtype) for row in (self.theta_2, self.factor))
+        points, factors = np.array(self.theta_2), np.array(self.factor)
         if xp is np:
             place = self._covered(place)
             k = np.searchsorted(points, place, "right") - 1
         else:  # what no library lacks, under no transformation of its own
+            points, factors = (xp.asarray(row, dtype=place.dtype) for row in (self.theta_2, self.factor))
             k = xp.sum(xp.astype(place[..., None] >= points, xp.int32), axis=-1) - 1
         k = xp.clip(k, 0, len(self.theta_2) - 2)
         away, lost = two_sum(theta_2, -points[k])

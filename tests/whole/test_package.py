@@ -29,7 +29,9 @@ ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 MODELS = "fourbar_validation.models"
-MODULE_OF = {"python-flint": "flint", "pin": "pinocchio", "imageio-ffmpeg": "imageio_ffmpeg"}
+MODULE_OF = {"python-flint": "flint", "pin": "pinocchio", "imageio-ffmpeg": "imageio_ffmpeg"} | {
+    "array-api-compat": "array_api_compat"
+}
 """Libraries that are imported under another name than they are installed by."""
 
 
