@@ -71,9 +71,10 @@ def test_more_positions_than_fit_are_evaluated_in_pieces(monkeypatch: pytest.Mon
 
 def test_what_is_missing_is_named_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
-    monkeypatch.setitem(sys.modules, "numba", None)
+    for library in ("numba", "jax", "torch"):
+        monkeypatch.setitem(sys.modules, library, None)
     peers = contenders.loops()
-    assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"compiled", "C"}
+    assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"compiled", "C", "JAX", "PyTorch"}
     rows = {"growth from 1000 positions on": 1.0}
     monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, peers.not_run))
     for variable in bench.ONE_THREAD:
