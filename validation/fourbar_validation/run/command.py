@@ -85,7 +85,11 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
     metavar="SECONDS",
     help="End what takes longer on one scene; left out: a minute, and more for many positions.",
 )
-@click.option("--no-pictures", is_flag=True, help="Draw nothing, and measure no observed order of a simulation.")
+@click.option(
+    "--no-pictures",
+    is_flag=True,
+    help="Draw nothing, measure no observed order, and judge studies, derivatives, bounds, SDF and USD of few scenes.",
+)
 @click.option("--mjcf", "--name", multiple=True, hidden=True, expose_value=False, is_eager=True, callback=refuse_moved)
 @output_options
 def command(
