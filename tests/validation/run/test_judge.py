@@ -16,6 +16,7 @@ from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, R
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, FULL_ACCURACY, K
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import WITNESSES, Witness, predicting_from
+from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
@@ -291,3 +292,22 @@ def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypa
     assert [of for of, _ in put if of.linkage is scene.linkage] == [scene]
     judge("scene", scene, [Witness("counting", Counting, EQUIVALENCE)])
     assert Counting.started == 1
+
+
+def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The angle, its rates and the lever are what the formulas computed from the stroke: it finds its own."""
+    given: list[Command] = []
+    answering = FreeBody.answer
+
+    def seen(engine: FreeBody, scene: Scene, at: Command) -> Answer:
+        given.append(at)
+        return answering(engine, scene, at)
+
+    monkeypatch.setattr(FreeBody, "answer", seen)
+    rows = judge("", SPECIMENS["stroke"], [witness for witness in WITNESSES if witness.name == "free-body"]).rows
+    assert not [row for row in rows if row.failed]
+    assert sum(row.engine == "free-body" and row.compared for row in rows) > 20
+    assert given
+    for at in given:
+        assert at.stroke is not None and np.isfinite(at.stroke).all() and at.lever is None
+        assert all(np.isnan(values).all() for values in (at.angle, at.speed, at.acceleration))

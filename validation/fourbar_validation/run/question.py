@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -96,7 +96,9 @@ class Question:
                 engine, begin = self.engine(witness), time.perf_counter()
                 commanded = self.at.commanded if self.at.stroke is None else "stroke"
                 if commanded in getattr(engine, "commands", ("theta_2",)):
-                    answer = engine.answer(self.scene, self.at)
+                    given = without_angles(self.at)
+                    answer = engine.answer(self.scene, given)
+                    answer = replace(answer, at=self.at) if answer.at is given else answer
                 else:
                     refusal = f"it takes a command of theta_2, and here {commanded} is commanded"
                     answer = Answer(witness.name, "exact", refusal=refusal)
@@ -173,6 +175,14 @@ class Question:
             self.left_out.append(f"{engine}: {reason}")
         except Exception as error:
             yield breakdown(self.name, engine, error, part)
+
+
+def without_angles(at: Command) -> Command:
+    """Take out of a command by a stroke the bar's motion, which the formulas computed from it: NaN."""
+    if at.stroke is None:
+        return at
+    unknown = np.full_like(at.angle, np.nan)
+    return at._replace(angle=unknown, speed=None if at.speed is None else unknown, acceleration=unknown, lever=None)
 
 
 def select_positions(at: Command, where: NDArray[np.intp]) -> Command:
