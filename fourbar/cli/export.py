@@ -38,7 +38,7 @@ without_loads_option = click.option(
     show_default=True,
     metavar="NAME",
     help="overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, transmission, freebody, "
-    "sensitivity.",
+    "sensitivity, stroke.",
 )
 @click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")

@@ -15,8 +15,8 @@ from fourbar.formulas.arithmetic import namespace, polar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 
-ANGLE_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4")
-"""Of the commanded angle."""
+COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
+"""Of what is commanded."""
 SAME_FOR_ALL = (
     *("title", "source", "drive", "bar", "branch", "through", "free", "law", "frame", "table", "picture"),
     *("from", "to", "steps", "limit", "offset"),
@@ -77,7 +77,7 @@ def _of_ends(key: str, place: Place) -> dict[str, SceneNumber]:
 
 
 def entries(scene: Scene) -> dict[str, SceneNumber]:
-    """List the numbers of a scene that a study varies, lengths first, by key; the commanded angle is not among them."""
+    """List the numbers of a scene that a study varies, lengths first, by key; what is commanded is not among them."""
     found = {"lengths.ground": SceneNumber(("linkage", "ground"), "m", POSITIVE)}
     bars = [BAR_NAMES[number] for number in MOVING_BARS]
     found |= {f"lengths.{name}": SceneNumber(("linkage", name, "length"), "m", POSITIVE) for name in bars}
@@ -87,10 +87,10 @@ def entries(scene: Scene) -> dict[str, SceneNumber]:
         found[f"bars.{name}.mass"] = SceneNumber((*own, "mass"), "kg", AT_LEAST_ZERO)
         found[f"bars.{name}.inertia"] = SceneNumber((*own, "inertia"), "kg m^2", AT_LEAST_ZERO)
         found |= _pair(f"bars.{name}.centre", (*own, "centre"), "m")
-    if scene.motion.law is None and scene.motion.stroke is None:
-        _, omega, alpha = scene.motion.names
-        found[f"motion.{omega}"] = SceneNumber(("motion", omega), "rad/s")
-        found[f"motion.{alpha}"] = SceneNumber(("motion", alpha), "rad/s^2")
+    if scene.motion.law is None:
+        unit = command_unit(scene)
+        for name, rate in zip(scene.motion.names[1:], ("s", "s^2"), strict=True):
+            found[f"motion.{name}"] = SceneNumber(("motion", name), f"{unit}/{rate}")
     if scene.drive is not None:
         found |= _of_ends("drive", ("drive",))
     for index, load in enumerate(scene.loads):
@@ -105,9 +105,14 @@ def entries(scene: Scene) -> dict[str, SceneNumber]:
     return found
 
 
-def angle_key(scene: Scene) -> str:
-    """Return the key of the commanded angle."""
+def command_key(scene: Scene) -> str:
+    """Return the key of what is commanded."""
     return f"motion.{scene.motion.names[0]}"
+
+
+def command_unit(scene: Scene) -> str:
+    """Return its unit."""
+    return "rad" if scene.motion.stroke is None else "m"
 
 
 def refusal(key: str, value: object, known: list[str]) -> InputError:

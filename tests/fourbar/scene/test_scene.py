@@ -15,7 +15,6 @@ from fourbar.formulas.mobility import limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
 from fourbar.mjcf import mjcf
 from fourbar.scene import Command
-from fourbar.show.animate import page
 from fourbar.solution import Solution
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.engines.balls import reference
@@ -239,7 +238,7 @@ def test_a_file_of_it_reads_back_bit_for_bit(angle: object) -> None:
 
 def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
     scene = replace(LOADED, motion=Motion(theta_4=Sweep(3.8, 4.2, 7), omega_4=1.0), loads=())
-    for refuse in (mjcf, lambda each: page(each, {}), fourbar.extremes, lambda each: each.plot()):
+    for refuse in (mjcf, fourbar.extremes):
         with pytest.raises(LimitError, match=r"^motion.theta_4: .* takes a command of theta_2 alone$"):
             refuse(scene)
     with pytest.raises(InputError, match=r"theta_4'?: is commanded, and theta_2 is not"):

@@ -27,7 +27,7 @@ from fourbar.formulas.arithmetic import namespace
 from fourbar.quantities import STAGE_OF
 from fourbar.scene.motion import Free
 from fourbar.studies.function import NEVER, function
-from fourbar.studies.keys import angle_key, at_place, entries, left_out
+from fourbar.studies.keys import at_place, command_key, entries, left_out
 from fourbar_validation.lab.stress.forward_error.families import FAMILIES
 
 EPS = 2.0**-52
@@ -94,7 +94,7 @@ ANGLES = np.linspace(0.0, 6.0, 13)
 def numbers_of(scene: Scene) -> dict[str, float]:
     """Every number that a scene states, its angle too."""
     found = {key: at_place(scene, entry.place) for key, entry in entries(scene).items() if not left_out(scene, entry)}
-    return {**found, angle_key(scene): float(np.ravel(scene.motion.angle)[0])}
+    return {**found, command_key(scene): float(np.ravel(scene.motion.angle)[0])}
 
 
 def of_solution(solution: Any, name: str) -> Any:
@@ -124,7 +124,7 @@ def test_every_quantity_is_that_of_solve(library: Library, drive_bar: int) -> No
 def test_other_bars_command(library: Library, motion: Motion) -> None:
     scene = replace(LOADED, motion=motion, loads=())
     solution = fourbar.solve(scene)
-    f = function(scene, ["lengths.output", angle_key(scene)], ["torque", "F12", "condition"])
+    f = function(scene, ["lengths.output", command_key(scene)], ["torque", "F12", "condition"])
     found = f(library.array(0.22), library.array(motion.angle))
     for name, value in found.items():
         assert np.asarray(value) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)

@@ -165,15 +165,14 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
     if answer.at is None or not {"theta_3", "theta_4"} <= answer.quantities.keys():
         return None
     known = answer.quantities
-    commanded = answer.at.bar == 2 and answer.at.stroke is None
-    theta_2 = answer.at.angle if commanded else known["theta_2"]
+    theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else known["theta_2"]
     theta = {2: theta_2, 3: known["theta_3"], 4: known["theta_4"]}
     code = np.full(len(theta_2), OK, dtype=np.uint8)
     reference = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2)
     for name in UNITS:
         if name in known:
             setattr(reference, name, known[name])
-    reference.commanded = answer.at.commanded
+    reference.at = answer.at
     if answer.at.speed is not None:
         rates = (("omega", answer.at.speed), ("alpha", answer.at.acceleration))
         for name, x in rates if answer.at.stroke is None else ():  # of a stroke the engine finds them

@@ -119,9 +119,13 @@ def lever(linkage: FourBar, bar: int = 2) -> float:
 
 
 def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
-    """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive."""
-    s, unit, bar = formulas.condition, UNITS[quantity], int(formulas.commanded[-1])
-    if quantity in (OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")):
+    """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive.
+
+    What the commanded angle alone decides has 1; of a stroke s holds the lever, and the bar's angle has s.
+    """
+    s, unit, bar = formulas.condition, UNITS[quantity], formulas.at.bar
+    own = OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")
+    if quantity in own and formulas.commanded != "stroke":
         return np.ones_like(s)
     condition = lever(linkage, bar) * s ** POWER[unit]
     if unit in ("N", "N m", "W"):

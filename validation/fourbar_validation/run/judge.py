@@ -107,9 +107,8 @@ def judge(
         question.left_out.append(f"what else is shipped: {what}")
         shipped = False
     rows: list[Row] = []
-    if other := (question.at.bar != 2 or question.at.stroke is not None):
-        commanded = question.at.commanded if question.at.stroke is None else "stroke"
-        question.left_out.append(f"checks that move theta_2: {commanded} is commanded")
+    if other := question.at.commanded != "theta_2":
+        question.left_out.append(f"checks that move theta_2: {question.at.commanded} is commanded")
     for check in CHECKS:
         if other and not check.any_bar:
             continue

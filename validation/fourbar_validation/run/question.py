@@ -94,13 +94,12 @@ class Question:
         if witness.name not in self.answered:
             with kept(self.output, witness.name):
                 engine, begin = self.engine(witness), time.perf_counter()
-                commanded = self.at.commanded if self.at.stroke is None else "stroke"
-                if commanded in getattr(engine, "commands", ("theta_2",)):
+                if self.at.commanded in getattr(engine, "commands", ("theta_2",)):
                     given = without_angles(self.at)
                     answer = engine.answer(self.scene, given)
                     answer = replace(answer, at=self.at) if answer.at is given else answer
                 else:
-                    refusal = f"it takes a command of theta_2, and here {commanded} is commanded"
+                    refusal = f"it takes a command of theta_2, and here {self.at.commanded} is commanded"
                     answer = Answer(witness.name, "exact", refusal=refusal)
                 self.answered[witness.name] = answer, time.perf_counter() - begin
         return self.answered[witness.name][0]
@@ -187,11 +186,4 @@ def without_angles(at: Command) -> Command:
 
 def select_positions(at: Command, where: NDArray[np.intp]) -> Command:
     """Take some positions of a command."""
-
-    def of(value: float | Array | None) -> float | Array | None:
-        return value if value is None or np.ndim(value) == 0 else value[where]  # type: ignore[index]
-
-    time = None if at.time is None else at.time[where]
-    speed, acceleration = of(at.speed), of(at.acceleration)
-    moved = Command(at.angle[where], at.branch[where], speed, acceleration, None, time, at.bar)  # type: ignore[arg-type]
-    return moved._replace(stroke=of(at.stroke), lever=of(at.lever))  # type: ignore[arg-type]
+    return at.part(where)._replace(remainder=None)

@@ -173,7 +173,7 @@ def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
 
     one = replace(study, **{field.name: own(getattr(study, field.name)) for field in fields(study) if field.init})
     one.points, one.velocity, one.acceleration = (own(of) for of in (study.points, study.velocity, study.acceleration))
-    one.drive, one.commanded = study.drive, study.commanded
+    one.drive, one.at = study.drive, study.at.part(index)
     return one
 
 
