@@ -194,7 +194,7 @@ def _members(scene: Scene, samples: int, seed: int) -> Study:
         change = norm.ppf(inside) if tolerance.sigma else 2.0 * column - 1.0
         numbers[tolerance.key] = at_place(scene, entry.place) + tolerance.width * change
     if scene.motion.law is None:
-        numbers[command_key(scene)] = command(scene).angle
+        numbers[command_key(scene)] = command(scene).places
     return vary(scene, numbers)
 
 

@@ -23,6 +23,8 @@ ROUND_OFF = 1e-11
 """Relative: eps over the conditions of these sweeps, 1e-4 at least."""
 ENDS = {2: SpringEnd(2, 0.12, 0.4), 4: SpringEnd(4, 0.15, -0.6)}
 GROUND = SpringEnd(1, 0.3, 2.2)
+SAMPLED = 0.02
+"""Relative, of the standard deviation of 256 quasi-random samples, whose tails end at half a sample."""
 DIFFERENCES = 1e-5
 """Relative, of differences over two millionths of a length of a tenth: (1e-5)^2 times third derivatives of 1e4."""
 
@@ -159,3 +161,13 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) 
             slope = (one - other)[0] / (2.0 * h)
             size = np.abs(getattr(found.solution, name)).max() / h
             np.testing.assert_allclose(found.of(name, key)[0], slope, rtol=DIFFERENCES, atol=1e-11 * size)
+
+
+def test_tolerances_at_a_stroke_spread_as_first_order_says() -> None:
+    drawn = fourbar.Tolerance("drive.to.at.0", 1e-5, sigma=True)
+    own = replace(scene(2, Sweep(0.25, 0.35, 5), stroke_speed=0.2), tolerances=(drawn,))
+    found, slopes = fourbar.tolerances(own, 256), fourbar.sensitivity(own)
+    for name in ("theta_2", "theta_4", "drive_force"):
+        wanted = 1e-5 * np.abs(slopes.of(name, drawn.key))
+        np.testing.assert_allclose(found.spreads[name].deviation, wanted, rtol=SAMPLED)
+    assert not found.without.any()
