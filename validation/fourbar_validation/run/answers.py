@@ -119,7 +119,7 @@ def compare_inertia(question: Question) -> Iterator[Row]:
     An exact engine answers it in the same assembly; another one is started once more.
     """
     scene = question.scene
-    if question.at.omega_2 is None or not (scene.loads or scene.effects):
+    if question.at.speed is None or not (scene.loads or scene.effects):
         return
     bare = Question(question.name, replace(scene, loads=(), effects=()), question.at, output=question.output)
     for name, (answer, seconds) in question.answered.items():

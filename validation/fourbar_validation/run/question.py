@@ -95,9 +95,7 @@ class Question:
             with kept(self.output, witness.name):
                 engine, begin = self.engine(witness), time.perf_counter()
                 if self.at.commanded in getattr(engine, "commands", ("theta_2",)):
-                    given = without_angles(self.at)
-                    answer = engine.answer(self.scene, given)
-                    answer = replace(answer, at=self.at) if answer.at is given else answer
+                    answer = ask_at(engine, self.scene, self.at)
                 else:
                     refusal = f"it takes a command of theta_2, and here {self.at.commanded} is commanded"
                     answer = Answer(witness.name, "exact", refusal=refusal)
@@ -174,6 +172,13 @@ class Question:
             self.left_out.append(f"{engine}: {reason}")
         except Exception as error:
             yield breakdown(self.name, engine, error, part)
+
+
+def ask_at(engine: Engine, scene: Scene, at: Command) -> Answer:
+    """Give an engine what is commanded, and nothing that the formulas computed from it."""
+    given = without_angles(at)
+    answer = engine.answer(scene, given)
+    return replace(answer, at=at) if answer.at is given else answer
 
 
 def without_angles(at: Command) -> Command:
