@@ -191,8 +191,8 @@ REFUSED = {
 def test_a_key_has_the_unit_that_a_scene_file_has() -> None:
     drive = LinearDrive(SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.1))
     linkage = FourBar(0.3, *(Bar(size, 0.2, 0.001, (0.04, 0.2)) for size in (0.1, 0.25, 0.22)), 0.4)
-    scene = Scene(linkage, Motion(ANGLES, 2.0, alpha_2=0.5), loads=LOADS, effects=(*DRIVEN, PinFriction.at(A=(0.1, 0.01))),
-                  points=(Point("P", 3, (0.1, 0.2)),), drive=drive)  # fmt: skip
+    acting, points = (*DRIVEN, PinFriction.at(A=(0.1, 0.01))), (Point("P", 3, (0.1, 0.2)),)
+    scene = Scene(linkage, Motion(ANGLES, 2.0, alpha_2=0.5), loads=LOADS, effects=acting, points=points, drive=drive)
     written = tomllib.loads(dump(scene))
     for key, number in entries(scene).items():
         entry: Any = written
