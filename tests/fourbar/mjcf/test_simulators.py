@@ -197,6 +197,7 @@ YIELDING = 1e-2
 """Of MJX, whose closure makes up for the missing term by yielding; measured 8.5e-4 in a turn."""
 
 
+@pytest.mark.nightly
 def test_warp_reads_as_the_comment_says() -> None:
     scene = crank_rocker(drive_bar=4)
     text = mjcf_for(scene, "warp")
@@ -204,6 +205,7 @@ def test_warp_reads_as_the_comment_says() -> None:
     assert "forward twice" in text
 
 
+@pytest.mark.nightly
 def test_mjx_reads_as_the_comment_says() -> None:
     scene = crank_rocker(drive_bar=4)
     assert max(errors(scene, *read_mjx(mjcf_for(scene, "mjx"), STEPS))) < YIELDING
@@ -236,6 +238,7 @@ FORCE = 0.01
 """Of Drake's reaction at A after 200 steps of 1 ms, of first order; measured 1.1e-3."""
 
 
+@pytest.mark.nightly
 def test_drake_loads_the_sdf_and_moves_as_released() -> None:
     pytest.importorskip("pydrake")
     plants, parsing = (importlib.import_module(f"pydrake.multibody.{name}") for name in ("plant", "parsing"))
@@ -336,6 +339,7 @@ KAMINO = 0.01
 """Of Kamino's force at B in its third step of 1 ms: single precision, and a first-order step; measured 1.5e-3."""
 
 
+@pytest.mark.nightly
 def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
     newton = pytest.importorskip("newton")
     pytest.importorskip("newton_usd_schemas")
