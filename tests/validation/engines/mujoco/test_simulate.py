@@ -3,11 +3,13 @@
 import math
 import re
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar.effects import SpringEnd
 from fourbar.mjcf import RECIPE
 from fourbar.mjcf.settings import WindowMotion
 from fourbar.quantities import UNKNOWNS
@@ -203,6 +205,36 @@ def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links: 
     mass = float(advised[1])
     scene = hood(links or mass, None if output is None else mass)
     assert {row.verdict for row in judge("hood", scene, SIMULATION).rows} == {AGREES}
+
+
+@pytest.mark.parametrize(("one", "other"), list(combinations((1, 2, 3, 4), 2)))
+def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
+    one: int, other: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive = fourbar.LinearDrive(SpringEnd(one, 0.17, -1.1), SpringEnd(other, 0.09, 0.7))
+    scene = crank_rocker(motion=fourbar.Motion(TURN, 10.0, 5.0), drive=drive, effects=(fourbar.Gravity(),))
+    (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
+    rows = {
+        row.quantity: row for row in judge("", scene, [simulated], order=False).rows if row.engine == simulated.name
+    }
+    assert {row.verdict for row in rows.values()} == {AGREES}
+    assert {
+        "drive_force",
+        "drive_force_inertia",
+        "stroke",
+        "stroke_speed",
+        "F12",
+        "F43",
+        "F14",
+        "as shipped",
+    } <= rows.keys()
+    assert max(rows[name].error for name in ("drive_force", "F12", "F32", "F43", "F14")) < 1e-6
+    right = ClosedLoop.work
+    monkeypatch.setattr(ClosedLoop, "work", lambda self, bar, size, *rest: right(self, bar, 1.01 * size, *rest))
+    rows = {
+        row.quantity: row for row in judge("", scene, [simulated], order=False).rows if row.engine == simulated.name
+    }
+    assert rows["drive_force"].verdict == FAILS
 
 
 def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused() -> None:

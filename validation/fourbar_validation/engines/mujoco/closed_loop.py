@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
+from fourbar.mjcf.model import CYLINDER
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loaded import Assembled
 from fourbar_validation.engines.tree import closed
@@ -31,11 +32,12 @@ class ClosedLoop(Assembled):
     def __init__(self, mjcf: str) -> None:
         self.model = mujoco.MjModel.from_xml_string(mjcf)
         self.data = mujoco.MjData(self.model)
-        self.site = {name: self.model.site(name).id for name in ("A", "O4", "B3", "B4")}
+        self.site = {self.model.site(number).name: number for number in range(self.model.nsite)}
         self.body = {name: self.model.body(name).id for name in ("input", "coupler", "output")}
         loads = [i for i in range(self.model.nu) if self.model.actuator(i).name.startswith("load_")]
         self.loads = [(i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads]
-        self.drive = next((i for i in range(self.model.nu) if self.model.actuator(i).name == "drive"), None)
+        named = {self.model.actuator(i).name: i for i in range(self.model.nu)}
+        self.drive, self.cylinder = named.get("drive"), named.get(CYLINDER)
         self._jac = np.zeros((3, self.model.nv))
 
     def gap(self) -> tuple[float, float]:
@@ -104,6 +106,22 @@ class ClosedLoop(Assembled):
         motor = 0.0 if self.drive is None else self.data.actuator_force[self.drive]
         return float(flywheel + motor)
 
+    def drive_column(self, drive_bar: int | None) -> Array:
+        """Return the derivative of the driven bar's rotation by the joint angles, or of the cylinder's stroke, (3,)."""
+        if drive_bar is not None:
+            return np.isin((O2, A, O4), TURNED_BY[drive_bar]).astype(float)
+        start, end = (f"{CYLINDER}_{which}" for which in ("start", "end"))
+        line = (self.data.site_xpos[self.site[end]] - self.data.site_xpos[self.site[start]])[:2]
+        return np.asarray(line / np.hypot(*line) @ (self.jacobian_at(end) - self.jacobian_at(start)))
+
+    def work(self, drive_bar: int | None, size: float, correction: float = 0.0) -> None:
+        """Let a couple act on the driven bar, N m, or the cylinder's actuator push, N; and a couple on the crank."""
+        self.data.qfrc_applied[:] = (correction, 0.0, 0.0)
+        if drive_bar is None:
+            self.data.ctrl[self.cylinder] = size
+        else:
+            self.data.qfrc_applied[TURNED_BY[drive_bar]] += size
+
     def keeps_centre(self, name: str) -> bool:
         """Tell whether the compiler left a bar's mass centre where the file has it, and not at the bar's origin."""
         return int(self.model.body_sameframe[self.body[name]]) != int(mujoco.mjtSameFrame.mjSAMEFRAME_BODY)
@@ -114,11 +132,12 @@ class ClosedLoop(Assembled):
 
 
 def couple_elsewhere(
-    loop: ClosedLoop, light: ClosedLoop, drive_bar: int, alpha_2: float, crank_torque: float
+    loop: ClosedLoop, light: ClosedLoop, drive_bar: int | None, alpha_2: float, crank_torque: float
 ) -> float | None:
-    """Solve for the couple on bar 3 or 4 that accelerates the crank as before; None where it does not move the crank.
+    """Solve for what accelerates the crank as before; None where it does not move the crank.
 
-    The accelerations are linear in the couple; two trials give it, and `light` is left at a third, to be read.
+    That is a couple on bar 3 or 4, or the force of the actuator between the cylinder's two sites. The accelerations are
+    linear in it; two trials give it, and `light` is left at a third, to be read.
 
     Parameters
     ----------
@@ -133,14 +152,12 @@ def couple_elsewhere(
     happened = loop.data.qacc[O2]
     # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
     correction = light.model.dof_armature[O2] * (happened - alpha_2)
-    acts_on = TURNED_BY[drive_bar]
-    speed = d.qvel[acts_on].sum()
+    speed = float(loop.drive_column(drive_bar) @ d.qvel)
     guess = crank_torque * d.qvel[O2] / speed if speed else crank_torque
     trials = (0.5 * guess, 1.5 * guess) if guess else (-1.0, 1.0)
 
     def crank_acceleration(couple: float) -> float:
-        d.qfrc_applied[:] = (correction, 0.0, 0.0)
-        d.qfrc_applied[acts_on] += couple
+        light.work(drive_bar, couple, correction)
         mujoco.mj_forward(light.model, d)
         return float(d.qacc[O2])
 

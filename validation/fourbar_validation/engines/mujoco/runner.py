@@ -52,12 +52,12 @@ class Reading(NamedTuple):
     """The driving torque and the pin forces at one state."""
 
     torque: float | None
-    """N m; None where no couple on the driven bar moves the input."""
+    """N m, or a cylinder's force, N; None where it does not move the input."""
     forces: dict[str, Array]
 
 
 class SimulatedRun:
-    """One segment of positions at a prescribed motion; `light` is the model that a drive on bar 3 or 4 is read from."""
+    """One segment of positions at a prescribed motion; `light` is the model that a drive elsewhere is read from."""
 
     def __init__(
         self,

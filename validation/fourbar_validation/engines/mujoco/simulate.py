@@ -12,11 +12,11 @@ from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import RECIPE, Settings, mjcf
 from fourbar.mjcf.document import mass_ratio
 from fourbar.mjcf.effects import unwound
-from fourbar.quantities import UNKNOWNS
+from fourbar.mjcf.model import CYLINDER
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines.description import speeds, unknown_effect
+from fourbar_validation.engines.description import driving, speeds, unknowns
 from fourbar_validation.engines.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from fourbar_validation.engines.loaded import Values
 from fourbar_validation.engines.loop import MADE, Assembler, as_made, blank
@@ -42,6 +42,8 @@ FINE = np.radians(2.0)
 """Between positions further apart than this the loop is tried for closure."""
 COLLINEAR = 1e-9
 """Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
+OF_TENDON = ("stroke", "stroke_speed")
+"""What MuJoCo has of a cylinder."""
 RESIDUALS = ("closure_gap_m", "speed_error", "time_went_back", "bad_states", "solver_iterations", "steps")
 
 
@@ -71,8 +73,6 @@ def _refusal(scene: Scene, command: Command) -> str | None:
     """Say why this scene is not simulated, or None."""
     if scene.motion.free is not None:
         return "a free motion has no commanded sweep"
-    if unknown := unknown_effect(scene, [effect.key for effect in scene.effects]):
-        return unknown
     if command.omega_2 is None or not np.any(command.omega_2):
         return "omega_2 is 0 or not stated: nothing to simulate through time"
     law = scene.motion.law if command.time is not None else None
@@ -122,11 +122,13 @@ class _Simulation:
         n = len(command.theta_2)
         self.order = order_in_time(command, self.scene.motion.omega_2 or 0.0, self.law)
         commanded = (command.theta_2, *speeds(command))
-        self.out = blank(n, UNKNOWNS) | {name: x.copy() for name, x in zip(MADE, commanded, strict=True)}
+        self.out = blank(n, [*unknowns(scene), *(OF_TENDON if scene.drive else ())]) | {
+            name: x.copy() for name, x in zip(MADE, commanded, strict=True)
+        }
         self.branch = command.branch.copy()
         self.evidence = dict.fromkeys(RESIDUALS, 0.0) | {"mass_ratio": mass_ratio(scene.linkage)}
         self.steps_per_revolution = 0.0
-        self.predicted = {name: np.zeros(n) for name in UNKNOWNS}
+        self.predicted = {name: np.zeros(n) for name in unknowns(scene)}
 
     def answer(self) -> Answer:
         """Answer over all positions."""
@@ -214,8 +216,12 @@ class _Simulation:
         self.branch[index] = loop.branch()
         torque, pins = run.read()
         if torque is None:
-            raise LimitError(f"the couple on bar {self.scene.drive_bar} does not move the input: a pole of the torque")
-        values: Values = {"torque": torque, **pins}
+            drive = "the cylinder" if self.scene.drive else f"the couple on bar {self.scene.drive_bar}"
+            raise LimitError(f"{drive} does not move the input: a pole of its size")
+        values: Values = {driving(self.scene): torque, **pins}
+        if self.scene.drive is not None:
+            tendon = loop.model.tendon(CYLINDER).id
+            values |= dict(zip(OF_TENDON, (d.ten_length[tendon], d.ten_velocity[tendon]), strict=True))
         for name, x, ahead in (("theta", d.qpos, turns), ("omega", d.qvel, 0.0), ("alpha", d.qacc, 0.0)):
             values |= {f"{name}_2": x[O2] - ahead, f"{name}_3": x[O2] + x[A] - ahead, f"{name}_4": x[O4]}
         for name, value in values.items():

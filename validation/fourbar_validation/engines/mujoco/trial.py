@@ -83,6 +83,8 @@ class TrialSetup:
             raise LimitError("nothing to run through in time: a sweep of theta_2 at omega_2 is needed")
         if scene.motion.law is not None:
             raise LimitError("settings are tried at a constant alpha_2, not along a motion law")
+        if scene.drive is not None:
+            raise LimitError("settings are tried for a couple on a bar, not for a linear drive (drive.from, drive.to)")
         self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
         motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
         self.scene, self.command = replace(scene, motion=motion), command
