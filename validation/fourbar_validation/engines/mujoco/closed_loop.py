@@ -16,6 +16,8 @@ O2, A, O4 = 0, 1, 2
 """Degrees of freedom, in the order of the bodies."""
 TURNED_BY = {2: [O2], 3: [O2, A], 4: [O4]}
 """Joints whose angles a bar's rotation is the sum of."""
+ENDS = (f"{CYLINDER}_start", f"{CYLINDER}_end")
+"""Sites of the cylinder."""
 WARNINGS = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
@@ -37,7 +39,7 @@ class ClosedLoop(Assembled):
         loads = [i for i in range(self.model.nu) if self.model.actuator(i).name.startswith("load_")]
         self.loads = [(i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads]
         named = {self.model.actuator(i).name: i for i in range(self.model.nu)}
-        self.drive, self.cylinder = named.get("drive"), named.get(CYLINDER)
+        self.drive, self.ram = named.get("drive"), named.get(CYLINDER)
         self._jac = np.zeros((3, self.model.nv))
 
     def gap(self) -> tuple[float, float]:
@@ -65,15 +67,20 @@ class ClosedLoop(Assembled):
         x, names = self.data.site_xpos, {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
         return {name: x[self.site[site]][:2].copy() for name, site in names.items()}
 
-    def branch(self) -> int:
-        """Return the branch of the state that was last forwarded: det = -b c sin(theta_4 - theta_3)."""
-        return int(-np.sign(np.linalg.det(self.jacobian()[:, [A, O4]])))
+    def branch(self, bar: int = 2) -> int:
+        """Return the branch of the state that was last forwarded, of a command of a bar.
 
-    def set_state(self, q: Sequence[float], omega_2: float) -> None:
-        """Start from own joint angles at omega_2, with the velocities that keep the gap closed."""
+        The null vector of the gap's derivative turns the bar as -b c sin(theta_4 - theta_3) is of bar 2, and as the
+        opposite products are of bars 3 and 4.
+        """
+        turn = self.drive_column(bar) @ np.cross(*self.jacobian()[:, :3])
+        return int(np.sign(turn if bar != 2 else -turn))
+
+    def set_state(self, q: Sequence[float], speed: float, bar: int | None = 2) -> None:
+        """Start from own joint angles at the speed of a bar or of the stroke, with the gap kept closed."""
         mujoco.mj_resetData(self.model, self.data)
         self.place(q)
-        self.data.qvel[:3] = closed(self.jacobian()[:, :3], omega_2)
+        self.data.qvel[:3] = closed(self.jacobian()[:, :3], speed, self.drive_column(bar))
 
     def forward(self) -> None:
         """Everything at the present state: after a Runge-Kutta step some fields are still of the step before."""
@@ -100,6 +107,10 @@ class ClosedLoop(Assembled):
                 on[name] -= force
         return on
 
+    def given(self) -> float:
+        """Return the acceleration that the flywheel's motor is given, rad/s^2."""
+        return 0.0 if self.drive is None else float(self.data.actuator_force[self.drive] / self.model.dof_armature[O2])
+
     def crank_torque(self) -> float:
         """T2: what the flywheel gives the crank, and the motor next to it, N m."""
         flywheel = -self.model.dof_armature[O2] * self.data.qacc[O2]
@@ -110,15 +121,52 @@ class ClosedLoop(Assembled):
         """Return the derivative of the driven bar's rotation by the joint angles, or of the cylinder's stroke, (3,)."""
         if drive_bar is not None:
             return np.isin((O2, A, O4), TURNED_BY[drive_bar]).astype(float)
-        start, end = (f"{CYLINDER}_{which}" for which in ("start", "end"))
-        line = (self.data.site_xpos[self.site[end]] - self.data.site_xpos[self.site[start]])[:2]
-        return np.asarray(line / np.hypot(*line) @ (self.jacobian_at(end) - self.jacobian_at(start)))
+        start, end = ENDS
+        return np.asarray(self.line() / self.stroke() @ (self.jacobian_at(end) - self.jacobian_at(start)))
+
+    def angle(self, bar: int) -> float:
+        """Sum of the joint angles that a bar's direction is, rad."""
+        return float(self.data.qpos[TURNED_BY[bar]].sum())
+
+    def line(self) -> Array:
+        """Vector from the cylinder's one site to the other, (2,), m."""
+        start, end = (self.data.site_xpos[self.site[end]] for end in ENDS)
+        return np.asarray((end - start)[:2])
+
+    def stroke(self) -> float:
+        """Distance of the cylinder's sites, m."""
+        return float(np.hypot(*self.line()))
+
+    def drive_drift(self, drive_bar: int | None) -> float:
+        """Return the second derivative of what `drive_column` is of at the present speeds, nothing accelerating."""
+        if drive_bar is not None:
+            return 0.0
+        (start, end), line, stroke, v = ENDS, self.line(), self.stroke(), self.data.qvel
+        x, y = (self.jacobian_at(end) - self.jacobian_at(start)) @ v
+        across = (line[0] * y - line[1] * x) / stroke
+        return float(line / stroke @ (self.rate_at(end) - self.rate_at(start)) @ v + across * across / stroke)
+
+    def rate_at(self, site: str) -> Array:
+        """Return the rate of `jacobian_at` at the present speeds, (2, nv)."""
+        dot, number = np.zeros((3, self.model.nv)), self.site[site]
+        body = self.model.site_bodyid[number]
+        mujoco.mj_jacDot(self.model, self.data, dot, None, self.data.site_xpos[number], body)
+        return dot[:2]
+
+    def measured(self, bar: int) -> tuple[complex, complex]:
+        """Measure from the ground pin of a bar, at angle 0, to the cylinder's end on it and that on the ground, m."""
+        self.place((0.0, 0.0, 0.0))
+        ground = self.model.body("ground").id
+        ends = sorted((self.site[end] for end in ENDS), key=lambda site: self.model.site_bodyid[site] == ground)
+        pivot = self.data.site_xpos[self.site["O4"]] if bar == 4 else np.zeros(3)
+        x, y = (complex(*(self.data.site_xpos[site] - pivot)[:2]) for site in ends)
+        return x, y
 
     def work(self, drive_bar: int | None, size: float, correction: float = 0.0) -> None:
         """Let a couple act on the driven bar, N m, or the cylinder's actuator push, N; and a couple on the crank."""
         self.data.qfrc_applied[:] = (correction, 0.0, 0.0)
         if drive_bar is None:
-            self.data.ctrl[self.cylinder] = size
+            self.data.ctrl[self.ram] = size
         else:
             self.data.qfrc_applied[TURNED_BY[drive_bar]] += size
 

@@ -103,7 +103,6 @@ class ResidualMonitor:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
         if self.bars.drive is not None:
             model.actuator_biastype[self.bars.drive] = mujoco.mjtBias.mjBIAS_NONE
-        self._dot = np.zeros((3, 3))
         self.worst = dict.fromkeys(LIMITS, 0.0)
         self._most = dict.fromkeys(LIMITS, 0.0)
 
@@ -148,7 +147,7 @@ class ResidualMonitor:
         mujoco.mj_inverse(bars.model, d)
         mujoco.mj_fwdActuation(bars.model, d)
         jacobian, gap = bars.jacobian(), np.array(bars.gap())
-        rate_3, rate_4 = self._rate("B3"), self._rate("B4")
+        rate_3, rate_4 = bars.rate_at("B3"), bars.rate_at("B4")
         needed, drive = d.qfrc_inverse - d.qfrc_actuator, bars.drive_column(self.drive_bar)
         answer: dict[str, Array] = {}
         for name, x in (("theta", q), ("omega", v), ("alpha", a)):
@@ -167,9 +166,9 @@ class ResidualMonitor:
         """F12, F32, F14: what carries the bars on the open tree, and the loop force put back."""
         bars, d = self.bars, self.bars.data
         if self.drive_bar is None:  # its line crosses the pins, a couple does not
-            d.ctrl[bars.cylinder] = drive
+            d.ctrl[bars.ram] = drive
             mujoco.mj_fwdActuation(bars.model, d)
-            d.ctrl[bars.cylinder] = 0.0
+            d.ctrl[bars.ram] = 0.0
         mujoco.mj_rnePostConstraint(bars.model, d)
         on = bars.carried()
         return {"F14": on["output"] + loop_force, "F32": -(on["coupler"] - loop_force), "F12": on["input"] - loop_force}
@@ -184,8 +183,3 @@ class ResidualMonitor:
         at = self._motion(q, v, a)
         a[others] -= np.linalg.solve(self.bars.jacobian()[:, others], at.jerk)
         return self._motion(q, v, a)
-
-    def _rate(self, site: str) -> Array:
-        model, d, number = self.bars.model, self.bars.data, self.bars.site[site]
-        mujoco.mj_jacDot(model, d, self._dot, None, d.site_xpos[number], model.site_bodyid[number])
-        return np.array(self._dot[:2])

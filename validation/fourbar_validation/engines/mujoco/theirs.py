@@ -301,7 +301,7 @@ def through_time(loop: UserLoop, at: Command) -> Answer:
         raise LimitError("pin O2 is not a hinge in this file: nothing can keep its crank at a speed")
     assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
     position = Assembler(loop)
-    order = order_in_time(at, at.omega_2, None)
+    order = order_in_time(at.theta_2, None, at.omega_2)
     segment = max(split_segments(assembled(position, at, order), order), key=len, default=[])
     if len(segment) < 2:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")

@@ -203,6 +203,12 @@ SPECIMENS: dict[str, Scene] = {
         loads=LOADS,
         drive=LinearDrive(SpringEnd(1, 0.17, -1.1), SpringEnd(3, 0.09, 0.7)),
     ),
+    "simulated stroke": Scene(
+        CRANK,
+        Motion(stroke=Sweep(0.25, 0.35, 8), stroke_speed=0.2, stroke_acceleration=0.1, side="left"),
+        loads=LOADS,
+        drive=LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)),
+    ),
     "simulated, quickening": Scene(CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), 4, effects=(Flywheel(0.003, 4),)),
 }
 """By the name under which an entry of planted.toml tries its fault; those called "shipped" judge what else is."""
