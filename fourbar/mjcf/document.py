@@ -62,8 +62,9 @@ def mjcf(
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
     _require_carried(scene)
+    cylinder = scene.drive
     if scene.motion.free is not None:
-        drive = "none"
+        drive, cylinder = "none", None
     if drive != "flywheel":
         settings = _without_flywheel(scene, settings)
     start = (start or at_start(scene)) if keyframe else None
@@ -76,6 +77,7 @@ def mjcf(
     if settings.pad == "fitted":
         settings = replace(settings, pad=_pad(scene))
     model = Model(scene.linkage, settings, timestep)
+    model.cylinder = cylinder
     for term in (*scene.effects, *scene.loads):
         row(term).add(term, model)
     armature = flywheel(scene, settings)
@@ -95,7 +97,7 @@ def mjcf(
     model.add_load_sites(root)
     model.add_closure(root)
     model.add_tendons(root)
-    model.add_actuators(root, actuator)
+    model.add_actuators(root, actuator, cylinder=cylinder is not None and drive != "none")
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
         ET.SubElement(frame, "key", name="start", qpos=text(*start.qpos), qvel=text(*start.qvel))
@@ -108,21 +110,19 @@ def _require_carried(scene: Scene) -> None:
     require_input(scene, "the drive of an MJCF")
     if scene.motion.law is not None:
         raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
-    if scene.drive is not None and scene.motion.free is None:
-        raise LimitError("a linear drive (drive.from, drive.to) is not exported to MJCF")
     carriable(scene.linkage)
 
 
 def _comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
     """Say how the file starts and where its numbers stand, a line each."""
     notes, numbers, bar = NOTES["mjcf"], NOTES["numbers"][reader], scene.drive_bar
-    kinds: list[str] = [drive]
+    kinds: list[str] = [drive if scene.drive is None else f"cylinder_{drive}"]
     if scene.motion.free is not None:
         kinds = ["released"]
     elif drive == "flywheel":
         kinds = ["accelerated" if scene.motion.alpha_2 else "driven"]
         kinds += [] if _span(scene.linkage) >= FULL_TURN and not change_points(scene.linkage) else ["limits"]
-        kinds += ["elsewhere"] if bar != 2 else []
+        kinds += ["cylinder_flywheel"] if scene.drive is not None else ["elsewhere"] if bar != 2 else []
     lines: list[str] = [notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar) for kind in ("opens", *kinds)]
     if reader == "genesis" and (names := _without_joints(scene)):
         lines.append(notes["genesis_without"].format(names=", ".join(names)))
