@@ -32,7 +32,7 @@ ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
 """Points whose accelerations are answered, each as a point of a bar."""
 TELLS = 2.0**-53
 """A component of a direction below this is what the angle's own rounding leaves of zero."""
-SHARED = "the description, theta_2, omega_2, alpha_2 and the branch"
+SHARED = "the description, what is commanded and the branch"
 """What an exact engine takes from the formulas' side, in a report."""
 
 

@@ -36,7 +36,7 @@ from fourbar_validation.engines.mujoco.motions import Lawful, MotionSegment, Ste
 from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, split_segments
 
 SHARED = (
-    "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; omega_2, alpha_2 or the "
+    "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; what is commanded or the "
     "motion law, and the branch"
 )
 OWN = "assembly, velocities at the start, the motion through time, accelerations, drive torque, pin forces"
