@@ -92,4 +92,6 @@ def slopes(scene: Scene) -> list[dict[str, Any]]:
             np.sum(array.grad.numpy() * gradients.change(more[name], less[name])) for name, array in inputs.items()
         )
     here = (now.theta[0], now.omega_2, now.alpha_2, now.torque)
-    return [gradients.answered(scene, "warp.Tape at a set state, forward twice", here, by)]
+    return [
+        gradients.answered(scene, "warp.Tape at a set state; it warns that its modules have no backward pass", here, by)
+    ]
