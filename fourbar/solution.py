@@ -69,6 +69,8 @@ class Solution(Quantities):
 
     commanded: str = field(default="theta_2", init=False)
     """Name of the angle that was commanded."""
+    lever: Array | None = field(default=None, init=False)
+    """Of a commanded stroke: the cylinder's, as a part of the longest that it could be, (n,)."""
 
     def __len__(self) -> int:
         return len(self.theta_2)

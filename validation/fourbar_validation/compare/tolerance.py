@@ -122,7 +122,8 @@ def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
     """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive."""
     s, unit, bar = formulas.condition, UNITS[quantity], int(formulas.commanded[-1])
     if quantity in (OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")):
-        return np.ones_like(s)
+        # a stroke commands the bar as far as its cylinder has a lever
+        return np.ones_like(s) if formulas.lever is None else np.asarray(formulas.lever ** POWER[unit], dtype=float)
     condition = lever(linkage, bar) * s ** POWER[unit]
     if unit in ("N", "N m", "W"):
         assert formulas.drive_condition is not None

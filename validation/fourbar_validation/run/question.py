@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.compare.answer import Answer, Engine
+from fourbar_validation.compare.answer import Answer, Engine, not_taken
 from fourbar_validation.compare.compare import Scales
 from fourbar_validation.compare.reversals import Reversal, reversals, reversing
 from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, UNDECIDED, Row, breakdown, plain
@@ -94,14 +94,12 @@ class Question:
         if witness.name not in self.answered:
             with kept(self.output, witness.name):
                 engine, begin = self.engine(witness), time.perf_counter()
-                commanded = self.at.commanded if self.at.stroke is None else "stroke"
-                if commanded in getattr(engine, "commands", ("theta_2",)):
+                if refusal := not_taken(engine, self.at):
+                    answer = Answer(witness.name, "exact", refusal=refusal)
+                else:
                     given = without_angles(self.at)
                     answer = engine.answer(self.scene, given)
                     answer = replace(answer, at=self.at) if answer.at is given else answer
-                else:
-                    refusal = f"it takes a command of theta_2, and here {commanded} is commanded"
-                    answer = Answer(witness.name, "exact", refusal=refusal)
                 self.answered[witness.name] = answer, time.perf_counter() - begin
         return self.answered[witness.name][0]
 
