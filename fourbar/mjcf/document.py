@@ -7,6 +7,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from fourbar.effects.numbers import ROWS
 from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.formulas.mobility import change_points, default_range
 from fourbar.linkage import MOVING_BARS, FourBar
@@ -122,10 +123,23 @@ def _comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
         kinds = ["accelerated" if scene.motion.alpha_2 else "driven"]
         kinds += [] if _span(scene.linkage) >= FULL_TURN and not change_points(scene.linkage) else ["limits"]
         kinds += ["cylinder_flywheel"] if scene.drive is not None else ["elsewhere"] if bar != 2 else []
-    lines: list[str] = [notes[kind].format(bar=bar) for kind in ("opens", *kinds)]
+    lines: list[str] = [notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar) for kind in ("opens", *kinds)]
+    if reader == "genesis" and (names := _without_joints(scene)):
+        lines.append(notes["genesis_without"].format(names=", ".join(names)))
     lines += numbers["instant"] + (numbers["driven"] if drive == "flywheel" else []) + numbers["pins"]
     lines += [notes["loads"]] if reader == "mujoco" and scene.loads else []
     return [*lines, *numbers["after"]]
+
+
+def _without_joints(scene: Scene) -> list[str]:
+    """Name what is no number of a joint but its rest angle."""
+    names = ["loads"] if scene.loads else []
+    for effect in scene.effects:
+        pins = {pin for pin, *_ in getattr(effect, ROWS[effect.key])} if effect.key in ROWS else set()
+        names += ["springs"] if effect.key == "springs" else []
+        names += [f"{effect.key} at B"] if "B" in pins else []
+        names += ["rest angles of torsion (it rests as assembled)"] if effect.key == "torsion" and pins - {"B"} else []
+    return names
 
 
 def flywheel(scene: Scene, settings: Settings = RECIPE) -> float:

@@ -116,11 +116,11 @@ def _evaluated(
     xp, path, (speed, acceleration) = given.xp, case.path, motion
     lengths, half = path.lengths, path.half_angle(q)
     square = 2.0 * lengths.b * lengths.c
-    size, part = 4.0 * lengths.a * lengths.d, UNDECIDED * given.eps
+    size, turned, part = 4.0 * lengths.a * lengths.d, abs(half.sk * (q - path.theta_1)), UNDECIDED * given.eps
     least = NO_DIGIT_LEFT * given.eps * square
     ok = (half.outer > 0.0) & (half.inner > 0.0) & (half.outer * half.inner > least * least)
-    for factor, constant in ((half.outer, lengths.E1), (half.inner, lengths.E2)):
-        ok = ok & ~undecided(factor, constant, size, part)
+    for factor, constant, square in ((half.outer, lengths.E1, half.kk), (half.inner, lengths.E2, half.ss)):
+        ok = ok & ~undecided(factor, constant, size * (square + turned), part)
     half = half._replace(outer=xp.where(ok, half.outer, square), inner=xp.where(ok, half.inner, square))
     stages = set(wanted.values())
     at = path.position(q, half, branch)

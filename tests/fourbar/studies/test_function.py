@@ -36,7 +36,7 @@ ROUNDED = 200.0 * EPS
 DIFFERENCES = 1e-7
 """What central differences of a step of 1e-6 leave of a derivative."""
 STEP = 1e-6
-LIBRARIES = ("jax", "torch")
+LIBRARIES = ("jax", pytest.param("torch", marks=pytest.mark.nightly))  # of gigabytes
 pytestmark = pytest.mark.filterwarnings("ignore:There is a performance drop")  # PyTorch maps no product's derivative
 
 
