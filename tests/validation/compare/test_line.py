@@ -53,6 +53,22 @@ def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(witness: Wi
         assert known >= {"drive_force", "stroke", "stroke_speed", "drive_force_inertia", "F12", "F32", "F43", "F14"}
 
 
+@pytest.mark.parametrize("witness", [*FREE_BODY, *EXACT], ids=lambda witness: witness.name)
+@pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
+def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(witness: Witness, gap: float) -> None:
+    if missing := witness.missing():
+        pytest.skip(missing)
+    linkage = crank_rocker().linkage
+    (theta_4,) = fourbar.solve(crank_rocker(motion=fourbar.Motion(1.0)), "position").theta_4
+    on_bar = linkage.ground + 0.2 * np.exp(1j * (theta_4 + 0.4 - linkage.ground_angle))
+    drive = LinearDrive(SpringEnd(1, abs(on_bar + gap), np.angle(on_bar + gap)), SpringEnd(4, 0.2, 0.4))
+    scene = crank_rocker(motion=fourbar.Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0), drive=drive)
+    assert fourbar.solve(scene, "position").stroke == pytest.approx(gap, rel=0.5)
+    rows = {row.quantity: row for row in judge("", scene, [witness]).rows if row.engine == witness.name}
+    for quantity in ("stroke", "drive_line", "stroke_speed", "drive_force", "F14"):
+        assert rows[quantity].verdict == AGREES and rows[quantity].allowed < 1e-12 / gap, quantity
+
+
 def test_positions_alone_have_a_stroke_that_is_judged() -> None:
     scene = driven(3, 4)
     rows = judge("", replace(scene, motion=replace(scene.motion, omega_2=None)), FREE_BODY).rows

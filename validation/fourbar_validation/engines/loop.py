@@ -52,7 +52,7 @@ class Assembler:
         """Assemble on the branch and place the tree there; None where the loop does not close."""
         tree, bar = self.tree, self.bar
         theta = theta if bar == 2 else within_half_a_turn(theta)
-        tree.place((theta if bar == 2 else 0.0, theta if bar == 3 else 0.0, theta if bar == 4 else 0.0))
+        tree.place([theta if each == bar else 0.0 for each in (2, 3, 4)])
         at = tree.positions()
         along = {2: at.get("A2", at["A"]), 3: at["B"] - at["A"], 4: at["B4"] - at["O4"]}
         diagonal = at["O4"] + along[4] if bar == 4 else at["O4"] - along[bar]
@@ -69,9 +69,8 @@ class Assembler:
         triangle = _triangle_angle(e, near, far), _triangle_angle(e, far, near)
         for alpha, beta in (triangle, *START_ANGLES):
             one, other = phi + branch * alpha, phi + math.pi - branch * beta
-            theta_2, theta_3, theta_4 = {2: (theta, one, other), 3: (one, theta, other)}.get(
-                bar, (other + math.pi, one, theta)
-            )
+            around = {2: (theta, one, other), 3: (one, theta, other), 4: (other + math.pi, one, theta)}
+            theta_2, theta_3, theta_4 = around[bar]
             q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
             result = newton(tree, q, branch, closed, bar)
             if result is not None:

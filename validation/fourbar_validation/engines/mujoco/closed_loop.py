@@ -153,7 +153,7 @@ class ClosedLoop(Assembled):
         mujoco.mj_jacDot(self.model, self.data, dot, None, self.data.site_xpos[number], body)
         return dot[:2]
 
-    def measured(self, bar: int) -> tuple[complex, complex]:
+    def cylinder(self, bar: int) -> tuple[complex, complex]:
         """Measure from the ground pin of a bar, at angle 0, to the cylinder's end on it and that on the ground, m."""
         self.place((0.0, 0.0, 0.0))
         ground = self.model.body("ground").id

@@ -45,7 +45,7 @@ class Lead:
         self.bar = None if command.stroke is not None else command.bar
         """None: the stroke."""
         if command.stroke is not None:
-            command = turned_by(command, motion, *loop.measured(command.bar))
+            command = turned_by(command, motion, *loop.cylinder(command.bar))
         self.command, self.values = command, command.angle if command.stroke is None else command.stroke
         self.speed, self.acceleration = float(np.max(motion.speed or 0.0)), float(np.max(motion.acceleration))
         found = assembled(Assembler(loop, command.bar), command, range(len(self.values)))
