@@ -108,7 +108,7 @@ def animate(
     type=click.Choice(["flywheel", "motor", "none"]),
     default="flywheel",
     show_default=True,
-    help="flywheel keeps omega_2; for a controller of your own: motor, whose ctrl is the drive's couple, or none.",
+    help="flywheel keeps omega_2; for a controller of your own: motor, whose ctrl is the couple or force, or none.",
 )
 @out_option
 def mjcf(

@@ -11,6 +11,7 @@ from fourbar.effects import Gravity, PinFriction
 from fourbar.effects.actions import Actions
 from fourbar.effects.cones import solve_sliding
 from fourbar.effects.effect import SolvedFriction
+from fourbar.effects.numbers import OF_SCENE
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.stages import kinematics, of_command
@@ -25,7 +26,7 @@ from fourbar.scene.point import OF_POINTS
 from fourbar.scene.stroke import triangle
 from fourbar.solution import Array, Solution, parts, values_of
 from fourbar.solve import solve
-from fourbar.studies.keys import SceneNumber, at_place, command_key, command_unit, entries, placed
+from fourbar.studies.keys import SceneNumber, at_place, command_key, entries, placed
 from fourbar.studies.sloped import Sloped, slopes, values
 from fourbar.writing import between, data_frame, html_table, listed
 
@@ -153,7 +154,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     at, solution, known = command(scene), solve(scene), entries(scene)
     moving = at.speed is not None
     known = {key: entry for key, entry in known.items() if moving or _of_position(key)}
-    keys = {theta: SceneNumber((), command_unit(scene))} | known
+    keys = {theta: SceneNumber((), OF_SCENE[scene.motion.names[0]])} | known
     most = np.nan if at.stroke is None else float(at.stroke.max())
     numbers = [most if key == theta else at_place(scene, entry.place) for key, entry in keys.items()]
     forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects.numbers import unit_of
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.blocks import each, evaluation, is_compiled, keep, positions_at_once
 from fourbar.evaluation.case import BLOCK, Case
 from fourbar.evaluation.stages import FORCE
 from fourbar.formulas.mobility import on_smooth_path
 from fourbar.formulas.position import lengths_read_from, loop
+from fourbar.linkage import in_unit
 from fourbar.quantities import ANGLES, INVALID, NOT_ASSEMBLED
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
@@ -149,10 +151,11 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
 
     Parameters
     ----------
-    values : arrays of one length m, or single numbers, SI and rad, by keys as in the scene file: lists by index
-        ("loads.0.moment"), pairs likewise ("bars.coupler.centre.0"). "motion.theta_2" (theta_3, theta_4, stroke, where
-        that is commanded) is (n,), for all members, or (m, n); a scene that states none needs it. What the scene leaves
-        out (the inertia of a uniform bar, its centre at mid-bar) follows the length of each member.
+    values : arrays of one length m, or single numbers, SI and rad or texts like "48 cm", by keys as in the
+        scene file: lists by index ("loads.0.moment"), pairs likewise ("bars.coupler.centre.0"). "motion.theta_2" (or
+        theta_3, theta_4, stroke, where that is commanded) is (n,), for all members, or (m, n); a scene that states none
+        needs it. What the scene leaves out (the inertia of a uniform bar, its centre at mid-bar) follows the length of
+        each member.
 
     Raises
     ------
@@ -225,7 +228,7 @@ def _numbers(key: str, value: Any, known: list[str]) -> Array:
     if key not in known:
         raise refusal(key, _shown(value), known)
     try:
-        array = np.asarray(value)
+        array = np.asarray(in_unit(key, value, unit_of(key) or "1"))
     except ValueError:  # rows of different lengths
         raise InputError(key, "a ragged list", "must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or array.size == 0:

@@ -17,7 +17,7 @@ from fourbar.errors import BAD_INPUT, BROKEN, FAILED, HOLDS, INTERRUPTED, Depend
 from fourbar.writing import write_text
 from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
 from fourbar_validation.lab.stress.bench import Measured
-from fourbar_validation.lab.stress.forward_error.stability import Tally
+from fourbar_validation.lab.stress.forward_error.tally import Tally
 from fourbar_validation.published.figures import PublishedFigure
 from tests.support.alone import alone
 from tests.support.here import judge_here
@@ -245,7 +245,7 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch: pytest.Monke
 def test_samples_that_compare_nothing_are_status_1(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def open_loop(scene: fourbar.Scene, tally: Tally, sample: str) -> None:
+    def open_loop(scene: fourbar.Scene, tally: Tally, *_: str) -> None:
         tally.samples += 1
         tally.not_assembled += 1
 

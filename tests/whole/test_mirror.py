@@ -61,7 +61,7 @@ JUDGED_BY = {
     "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
     "validation/compare: nearby; validation/engines: exact; validation/engines/mujoco: shipped; "
     "validation/report: hard_page",
-    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives monitor motions runner",
+    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives led monitor motions runner",
     "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls changes equilibria files variants",
     "validation/run/test_released.py": "validation/engines: pinocchio_forward; validation/engines/mujoco: released",
     "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
@@ -76,7 +76,8 @@ JUDGED_BY = {
     "templating",
     # studies: each through its command
     "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c limits timed",
-    "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families",
+    "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families "
+    "libraries slopes tally",
     "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
     "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: code_mutants harness",
     "validation/lab/stress/mutation/test_planted.py": "validation/lab/stress/mutation: planting specimens",
@@ -87,8 +88,8 @@ JUDGED_BY = {
     "validation/lab/effects/test_cost.py": "validation/lab/effects: table work; validation/engines/mujoco: stepping",
     # simulators that need not be there: their scripts run where they are installed
     "validation/lab/subjects/test_subjects.py": "validation/lab/subjects: drake_sap examine exudyn_simulated "
-    "genesis_rigid motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco pinocchio_simulated pybullet "
-    "standing work",
+    "genesis_rigid gradients motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco "
+    "pinocchio_simulated pybullet standing work",
     "validation/lab/subjects/test_versions.py": "validation/lab/subjects: releases versions_page",
 }
 """Modules without a test of their name, folder by folder, and the test that says when one of them is wrong."""

@@ -46,16 +46,16 @@ def test_the_worst_error_is_the_one_that_is_no_number() -> None:
     assert worst(np.array([1.0, 2.0, 0.0])) == 1
 
 
-def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever_too() -> None:
-    """|sin(theta_4 - theta_3)| times the lever from O2 to the line over the longer of both arms."""
+def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever() -> None:
+    """From O2 to the line over the longer of both arms; what follows by |sin(theta_4 - theta_3)| too."""
     r, arm = 0.25, 0.09
     drive = LinearDrive(SpringEnd(1, r, 2.5), SpringEnd(2, arm, 0.3))
     motion = fourbar.Motion(stroke=np.array([0.2, 0.3, 0.339]), side="left", stroke_speed=0.1)
     s = fourbar.solve(crank_rocker(motion=motion, drive=drive))
-    beta = np.arccos((arm * arm + r * r - s.stroke**2) / (2.0 * arm * r))
-    own = np.abs(np.sin(s.theta_4 - s.theta_3)) * arm * r * np.sin(beta) / s.stroke / r
+    share = arm * np.sin(np.arccos((arm * arm + r * r - s.stroke**2) / (2.0 * arm * r))) / s.stroke
     linkage = crank_rocker().linkage
-    for name, power in (("theta_2", 1), ("omega_2", 2), ("theta_4", 1)):
-        assert condition_of(name, linkage, s) == pytest.approx(lever(linkage) * own**power)
+    assert s.condition == pytest.approx(np.abs(np.sin(s.theta_4 - s.theta_3)) * share)
+    for name, wanted in (("theta_2", share), ("omega_2", share**2), ("theta_4", lever(linkage) * s.condition)):
+        assert condition_of(name, linkage, s) == pytest.approx(wanted)
     at_angles = crank_rocker(motion=fourbar.Motion(theta_2=s.theta_2, omega_2=1.0), drive=drive)
     assert (condition_of("theta_2", linkage, fourbar.solve(at_angles)) == 1.0).all()

@@ -59,7 +59,7 @@ OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, COUPLE.error, LINE.error, "f
 COMPARED = tuple(name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *OF_LINE))
 """Every quantity that an exact engine is held to: all that is printed of a position."""
 OF_THE_LINE = {"stroke": "sin_mu", "drive_line": "sin_mu", "stroke_speed": "v_B", LINE.value: COUPLE.value}
-"""Where the drive is linear, who is held to the other quantity is held to this one too."""
+"""Where the drive is linear, who is held to the other quantity, or answers this one, is held to it."""
 OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
@@ -110,7 +110,8 @@ class Comparison:
             return [Row.unmeasured(self.name, answer.engine, answer.setting, "assembled", FAILS, what)]
         held = tuple(self.expected)
         if self.scene.drive is not None:
-            held = (*held, *(name for name, other in OF_THE_LINE.items() if other in held))
+            answered = answer.quantities
+            held = (*held, *(name for name, other in OF_THE_LINE.items() if other in held or name in answered))
         self.own = reference_of(self.scene, answer)
         if self.reference is None:
             self.reference, self.scales = self.own, {}

@@ -160,9 +160,15 @@ SIZED_BY = ("omega_3", "alpha_3", "a_G2", "a_G3", "a_G4")
 """What the size of a force is made of; a reference without them has none."""
 
 
+def angles_of(answer: Answer) -> bool:
+    """Whether an answer has the angles of all moving bars that are not given."""
+    theta_2 = () if answer.at is None or answer.at.commanded == "theta_2" else ("theta_2",)
+    return answer.at is not None and {"theta_3", "theta_4", *theta_2} <= answer.quantities.keys()
+
+
 def reference_of(scene: Scene, answer: Answer) -> Solution | None:
     """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
-    if answer.at is None or not {"theta_3", "theta_4"} <= answer.quantities.keys():
+    if answer.at is None or not angles_of(answer):
         return None
     known = answer.quantities
     theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else known["theta_2"]
@@ -186,7 +192,8 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
     one, other = (theta[bar] for bar in theta if bar != answer.at.bar)
     reference.condition = np.abs(np.sin(other - one))
     if answer.at.stroke is not None and scene.drive is not None:
-        reference.condition = reference.condition * line_of(scene.linkage, scene.drive, theta).lever
+        lever = line_of(scene.linkage, scene.drive, theta).lever
+        reference.at, reference.condition = answer.at._replace(lever=lever), reference.condition * lever
     if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
         one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits than its sine

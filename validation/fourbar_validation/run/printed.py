@@ -115,6 +115,7 @@ def check_blocks(question: Question) -> Iterator[Row]:
         with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
             size = scale_of(quantity, scene, solution, ours)[long[ends]]
         condition = condition_of(quantity, scene.linkage, solution)[long[ends]]
+        condition = np.where(np.isnan(condition), 1.0, condition)  # what the command decides where nothing closes
         # evaluated by the same code, but not in the same company of a processor's registers
         apart = relative_error(quantity, one, other, size) * condition
         error[known] = np.maximum(error[known], apart[known])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.compare.answer import Answer, Engine
+from fourbar_validation.compare.answer import Answer, Engine, not_taken
 from fourbar_validation.compare.compare import Scales
 from fourbar_validation.compare.reversals import Reversal, reversals, reversing
 from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, UNDECIDED, Row, breakdown, plain
@@ -94,11 +94,10 @@ class Question:
         if witness.name not in self.answered:
             with kept(self.output, witness.name):
                 engine, begin = self.engine(witness), time.perf_counter()
-                if self.at.commanded in getattr(engine, "commands", ("theta_2",)):
-                    answer = ask_at(engine, self.scene, self.at)
-                else:
-                    refusal = f"it takes a command of theta_2, and here {self.at.commanded} is commanded"
+                if refusal := not_taken(engine, self.at):
                     answer = Answer(witness.name, "exact", refusal=refusal)
+                else:
+                    answer = ask_at(engine, self.scene, self.at)
                 self.answered[witness.name] = answer, time.perf_counter() - begin
         return self.answered[witness.name][0]
 

@@ -33,6 +33,9 @@ EXACT = 1e-10
 THROUGH = 1e-5
 """Of a turn in 157 steps with the generated file; measured 4e-7."""
 
+DIFFERENCES = 1e-5
+"""Of MuJoCo's torques (1e-12) over 2e-6; measured 5e-7."""
+
 IN_EXUDYN = 1e-3
 """Of a turn in 314 steps of its trapezoidal rule; measured 1.2e-4."""
 
@@ -108,6 +111,37 @@ def test_each_solver_of_pinocchio_carries_the_loop() -> None:
             assert simulated.states(scene, setting) is None
 
 
+def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() -> None:
+    """By differences of what MuJoCo itself answers along the changes that a differentiable simulator is given."""
+    mujoco_c = pytest.importorskip("fourbar_validation.lab.subjects.mujoco_c", exc_type=ImportError)
+    from fourbar_validation.lab.subjects import gradients
+
+    scene = fourbar.load(PROBLEM)
+    _, theta_2 = gradients.quarter(scene)
+
+    def answered(at: gradients.ClosedState) -> motion.Instant:
+        at.data.qpos[:], at.data.qvel[:] = at.qpos, at.qvel
+        found: motion.Instant = mujoco_c._evaluated(at.model, at.data)
+        return found
+
+    now, by = answered(gradients.assembled(scene, theta_2, "mujoco")), {}
+    for key in gradients.keys(scene):
+        more, less = (answered(at).torque for at in gradients.to_either_side(scene, theta_2, key, "mujoco"))
+        by[key] = gradients.change(more, less)
+    state = (theta_2, now.omega_2, now.alpha_2, now.torque)
+    given = gradients.answered(scene, "differences", state, by)
+    zero = {**given, "how": "tape", "by": dict.fromkeys(by, 0.0)}
+    answer = json.loads(json.dumps({"version": "4", "slopes": [given, zero, {"how": "refused"}]}))
+    found = examine.slopes(scene, "MuJoCo", answer)
+    assert set(found[0].errors) == {"torque", "lengths.coupler", "bars.coupler.mass", "motion.theta_2"}
+    assert all(error is not None and error < DIFFERENCES for error in found[0].errors.values())
+    table = standing.differentiated(examine.Examination(slopes=found))
+    assert table is not None and table["rows"][1][3:] == ["zero"] * 3 and table["rows"][2][1:] == ["refused"] + [""] * 4
+    wrong = {**given, "by": {key: 1.1 * value for key, value in by.items()}}
+    (line,) = examine.slopes(scene, "MuJoCo", {"version": "4", "slopes": [wrong]})
+    assert all(line.errors[key] == pytest.approx(0.1, abs=DIFFERENCES) for key in by)
+
+
 def test_a_wrong_a_missing_and_a_nan_reading_show() -> None:
     mujoco_c = pytest.importorskip("fourbar_validation.lab.subjects.mujoco_c", exc_type=ImportError)
     scene = fourbar.load(PROBLEM)
@@ -121,6 +155,7 @@ def test_a_wrong_a_missing_and_a_nan_reading_show() -> None:
     assert found["F32"] < EXACT
 
 
+@pytest.mark.nightly
 def test_exudyn_refuses_what_it_has_no_element_for() -> None:
     exudyn = pytest.importorskip("fourbar_validation.lab.subjects.exudyn_simulated", exc_type=ImportError)
     scene, (_, setting) = fourbar.load(PROBLEM), exudyn.SETTINGS
@@ -261,6 +296,7 @@ COARSE_OF = {"newton_kamino": 0.2}
 """Single precision and of first order; measured 9.7e-2 in 157 steps."""
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("sealed")
 @pytest.mark.parametrize("module", examine.SIMULATORS)
 def test_each_simulator_that_is_installed_carries_the_loop(module: str) -> None:

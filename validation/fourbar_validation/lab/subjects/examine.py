@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +59,18 @@ class Line:
 
 
 @dataclass(slots=True)
+class Differentiated:
+    """What a simulator that can be differentiated says of the driving torque at a state."""
+
+    simulator: str
+    version: str
+    how: str
+    """Or why not."""
+    errors: dict[str, float | None] = field(default_factory=dict)
+    """Of the torque, and of its derivative by each number, by our own; None: it says 0."""
+
+
+@dataclass(slots=True)
 class Examination:
     """All that the page shows."""
 
@@ -69,6 +81,7 @@ class Examination:
     made_for: dict[str, str] = field(default_factory=dict)
     """Of simulators that are made for something else than what is asked here."""
     left_out: dict[str, str] = field(default_factory=dict)
+    slopes: list[Differentiated] = field(default_factory=list)
 
 
 def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Examination:
@@ -88,12 +101,14 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Ex
         try:
             answer = json.loads(done.out)
             judged, changed = lines(scene, name, answer), str(answer["changed"])
+            differentiated = slopes(scene, name, answer)
             ran_on = f"{answer['device']}, Python {answer['python']}"
             not_run = {f"{name}, {what}": str(why) for what, why in answer.get("not_run", {}).items()}
         except (AttributeError, IndexError, KeyError, TypeError, ValueError, FourBarError) as error:
             found.left_out[name] = f"no answer that can be read: {in_words(error)}"
             continue
         found.lines += judged
+        found.slopes += differentiated
         found.changed[name], found.devices[name] = changed, ran_on
         found.made_for[name] = str(answer.get("made_for", ""))
         found.left_out |= not_run
@@ -122,6 +137,24 @@ def lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
             ratio = before.errors["torque"] / found["torque"] if found["torque"] else math.inf
             if 0.0 < ratio < math.inf:  # one that diverged has none
                 line.order = math.log(ratio) / math.log(steps / before.steps)
+        made.append(line)
+    return made
+
+
+def slopes(scene: Scene, name: str, answer: dict[str, Any]) -> list[Differentiated]:
+    """Compare one simulator's derivatives of the driving torque with the formulas' at its own state."""
+    made = []
+    for each in answer.get("slopes", ()):
+        line = Differentiated(name, answer["version"], str(each["how"]))
+        if "by" in each:
+            stated = {key: each[key] for key in scene.motion.names}
+            ours = fourbar.sensitivity(replace(scene, motion=replace(scene.motion, **stated)))
+            pairs = {"torque": (each["torque"], ours.value("torque"))}
+            pairs |= {key: (theirs, ours.of("torque", key)) for key, theirs in each["by"].items()}
+            line.errors = {
+                key: None if theirs == 0.0 else float(abs(theirs - own[0]) / abs(own[0]))
+                for key, (theirs, own) in pairs.items()
+            }
         made.append(line)
     return made
 

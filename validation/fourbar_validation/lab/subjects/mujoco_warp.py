@@ -9,6 +9,7 @@ import warp
 
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.stepping import opened
+from fourbar_validation.lab.subjects import gradients
 from fourbar_validation.lab.subjects.motion import Instant, Readings, run_through
 from fourbar_validation.lab.subjects.mujoco_c import reading, states_of, text
 
@@ -21,6 +22,8 @@ CHANGED = "a light flywheel and no pads (--for warp): single precision; midphase
 SETTINGS = {"forward twice": (2, 1), "forward once": (1, 1)}
 """How often a state is evaluated, and how many worlds are simulated; the last is read."""
 BATCHES = (64, 4096)
+NUMBERS = ("body_mass", "body_inertia", "body_ipos", "site_pos", "dof_armature")
+"""Of a model that change with a bar's length or mass, or with theta_2."""
 if warp.get_preferred_device().is_cuda:
     SETTINGS |= {f"forward twice, {worlds} worlds": (2, worlds) for worlds in BATCHES}
 else:
@@ -63,3 +66,32 @@ def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> Instant:
     q, v, a, drive = (x.numpy()[-1].astype(float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
     closing = state.efc.force.numpy()[-1, :2].astype(float)
     return reading(model, q, v, a, drive[model.actuator("drive").id], closing)
+
+
+def slopes(scene: Scene) -> list[dict[str, Any]]:
+    """Differentiate the driving torque at a set state backwards, by the tape, then along each change."""
+    _, theta_2 = gradients.quarter(scene)
+    model, data, q, v = gradients.assembled(scene, theta_2, "warp")
+    theirs, state = mjw.put_model(model), mjw.put_data(model, data)
+    state.qpos.assign(np.array([q], dtype=np.float32))
+    state.qvel.assign(np.array([v], dtype=np.float32))
+    inputs = {name: getattr(theirs, name) for name in NUMBERS} | {"qpos": state.qpos, "qvel": state.qvel}
+    for array in (*inputs.values(), state.qacc, state.actuator_force):
+        array.requires_grad = True
+    with warp.Tape() as tape:
+        now = _evaluated(model, theirs, state, 2)
+    drive = warp.full_like(state.actuator_force, 1.0)
+    tape.backward(grads={state.actuator_force: drive, state.qacc: warp.full_like(state.qacc, -model.dof_armature[0])})
+    by = {}
+    for key in gradients.keys(scene):
+        more, less = (
+            {name: getattr(side.model, name) for name in NUMBERS} | {"qpos": side.qpos, "qvel": side.qvel}
+            for side in gradients.to_either_side(scene, theta_2, key, "warp")
+        )
+        by[key] = sum(
+            np.sum(array.grad.numpy() * gradients.change(more[name], less[name])) for name, array in inputs.items()
+        )
+    here = (now.theta[0], now.omega_2, now.alpha_2, now.torque)
+    return [
+        gradients.answered(scene, "warp.Tape at a set state; it warns that its modules have no backward pass", here, by)
+    ]

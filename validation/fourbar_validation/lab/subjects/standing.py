@@ -34,6 +34,14 @@ EXPLAINED = (
     "compilation. This is no ranking: double and single precision, compiled and interpreted loops stand side by side."
 )
 
+DIFFERENTIATED = (
+    "The driving torque at a state, and its derivatives by numbers of the scene, at most a quarter turn after a set "
+    "state: the difference from the formulas, divided by their value. Assembling the loop and compiling a model are no "
+    "part of what a simulator differentiates, so how its state and the numbers of its model change with each number of "
+    "the scene is taken from two assembled scenes, and its derivative is that along this change. zero: what the "
+    "simulator answers, without an error. A line without numbers is what it refuses."
+)
+
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path), default=PROBLEM)
@@ -82,6 +90,7 @@ def command(
             ("The table", groups(found, apart=False)),
             ("Apart: settings not meant for the simulator", groups(found, apart=True)),
         ],
+        "differentiated": differentiated(found),
         "lists": [(heading, texts) for heading, texts in _lists(found).items() if texts],
         "findings": examined(interpreters, time_limit),
         "svg": inline(chart),
@@ -97,6 +106,18 @@ def command(
     click.echo(
         f"wrote {out}/standing.html, .md, .csv, .svg: {len(found.lines)} lines of {len(found.changed)} simulators"
     )
+
+
+def differentiated(found: Examination) -> dict[str, Any] | None:
+    """Lay out the derivatives of the simulators that can be differentiated; None where there are none."""
+    columns = list(dict.fromkeys(key for line in found.slopes for key in line.errors))
+    rows = []
+    for line in found.slopes:
+        values = [line.errors.get(key, "") for key in columns]
+        cells = [x if isinstance(x, str) else "zero" if x is None else size(x) for x in values]
+        rows.append([f"{line.simulator} {line.version}", line.how, *cells])
+    by = [key if key == "torque" else f"by {key}" for key in columns]
+    return {"text": DIFFERENTIATED, "head": ["simulator", "how", *by], "rows": rows} if rows else None
 
 
 def _lists(found: Examination) -> dict[str, list[str]]:

@@ -27,6 +27,8 @@ def main(module: str, file: str, answers: TextIO) -> None:
             found.append(at_states)
         found += [simulator.through(scene, steps, setting) for steps in simulator.STEPS]
     answer = {"version": simulator.VERSION, "changed": simulator.CHANGED, "readings": [each.plain() for each in found]}
+    if hasattr(simulator, "slopes"):
+        answer["slopes"] = simulator.slopes(scene)
     answer |= {"device": getattr(simulator, "DEVICE", "CPU"), "python": platform.python_version()}
     answer |= {name.lower(): getattr(simulator, name) for name in FURTHER if hasattr(simulator, name)}
     answers.write(json.dumps(answer))

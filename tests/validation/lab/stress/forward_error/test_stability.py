@@ -1,6 +1,7 @@
 """Forward errors and error bars on a small seeded set; the full one is `python -m validation stability`."""
 
 import math
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ import pytest
 import fourbar
 from fourbar.show.tables import heading
 from fourbar_validation.lab.stress.forward_error.families import FAMILIES
-from fourbar_validation.lab.stress.forward_error.stability import CHANCE, TOO_SMALL, USELESS, Tally, by_chance, run
+from fourbar_validation.lab.stress.forward_error.stability import run
+from fourbar_validation.lab.stress.forward_error.tally import CHANCE, TOO_SMALL, USELESS, Tally, by_chance
+from tests.fourbar.studies.test_function import LIBRARIES
 
 SAMPLES = 40
 """Per family: about 1 s each; the ten thousand of each are `python -m validation stability`."""
@@ -70,6 +73,35 @@ def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too
     assert not {name: entry for name, entry in tally.worst.items() if not entry[0] <= 1.0}
     assert {"theta_2", "omega_2", "alpha_2"} <= tally.worst.keys()
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
+
+
+def installed(library: str) -> None:
+    for needed in () if library == "numpy" else (library, "array_api_compat"):
+        if find_spec(needed) is None:
+            pytest.skip(f"{needed} is not installed")
+
+
+@pytest.mark.parametrize("library", LIBRARIES)
+@pytest.mark.parametrize("family", ["change_point", "tables", "torsion"])
+def test_every_output_is_within_it_in_other_libraries_too(library: str, family: str) -> None:
+    installed(library)
+    tally = run(family, range(FED_BACK // 4), library=library)
+    assert tally.holds() and not tally.untold and "torque" in tally.worst
+
+
+@pytest.mark.filterwarnings("ignore:There is a performance drop")  # PyTorch maps no product's derivative
+@pytest.mark.parametrize("library", ["numpy", *LIBRARIES])
+def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them(library: str) -> None:
+    installed(library)
+    tally = run("random", range(6 if library == "numpy" else 1), library=library, derivatives=True)
+    assert tally.holds() and not tally.untold and {"torque", "F12_x", "theta_4", "a_B_y"} <= tally.worst.keys()
+
+
+@pytest.mark.nightly
+def test_kites_that_stand_still_beside_no_exact_directions() -> None:
+    """B rests on O2: its speed across is the product of two roundings, where lengths are no constants."""
+    installed("torch")
+    assert run("change_point", range(751, 752), library="torch").holds()
 
 
 def test_error_bars_are_neither_too_small_nor_useless(tallies: dict[str, Tally]) -> None:

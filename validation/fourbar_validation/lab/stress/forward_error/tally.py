@@ -1,0 +1,102 @@
+"""What samples showed: the largest errors over what is allowed, and whether error bars hold.
+
+The error allowed is 8 eps (|y| + sum |x_i dy/dx_i|) with y the value (1 rad for angles) and x_i the stored inputs:
+what a change of the inputs in their last digits does to y, and nothing more.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from fourbar.quantities import VECTORS
+from fourbar_validation.compare.tolerance import used
+
+EPS = 2.0**-52
+FACTOR = 8.0
+"""Of eps, as the contract states it."""
+TOO_SMALL, TOO_LARGE = 10.0, 100.0
+"""An error bar may be this much smaller (never) and this much larger (in one of USELESS samples) than the error."""
+USELESS = 0.01
+CHANCE = 1e-6
+"""That so many samples or more are counted where the share is USELESS: rarer is no chance. Of 60 samples one is."""
+HALF_A_DIGIT = 2.0**-53
+"""Of a result: an error below that is chance, for no double need be nearer to the truth. A bar is held to be too
+large against no less."""
+UNTOLD = 0.125
+"""Of |sin mu|: what may be wrong with it where doubles do not tell whether the loop closes."""
+
+
+@dataclass(slots=True)
+class Tally:
+    """What a number of samples of one family showed."""
+
+    samples: int = 0
+    not_assembled: int = 0
+    no_torque: int = 0
+    """Samples in which the exact system of forces is singular: nothing to compare."""
+    untold: int = 0
+    """Samples without a value in a library without many digits, where doubles do not tell that the loop closes."""
+    worst: dict[str, tuple[float, str]] = field(default_factory=dict)
+    """Output: largest error/allowed, and the sample it belongs to."""
+    too_small: dict[str, float] = field(default_factory=dict)
+    """Error bar: largest error/bar."""
+    too_large: dict[str, int] = field(default_factory=dict)
+    """Error bar: samples in which it is more than TOO_LARGE times the error."""
+    warned: list[str] = field(default_factory=list)
+
+    def add(self, other: "Tally") -> None:
+        """Take in the samples of another tally."""
+        self.samples += other.samples
+        self.not_assembled += other.not_assembled
+        self.no_torque += other.no_torque
+        self.untold += other.untold
+        self.warned += other.warned
+        for name, entry in other.worst.items():
+            self.worst[name] = max(self.worst.get(name, (0.0, "")), entry)
+        for name, ratio in other.too_small.items():
+            self.too_small[name] = max(self.too_small.get(name, 0.0), ratio)
+        for name, count in other.too_large.items():
+            self.too_large[name] = self.too_large.get(name, 0) + count
+
+    def note(self, output: str, ratio: float, sample: str) -> None:
+        """Keep the largest error over what is allowed."""
+        self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
+
+    def holds(self) -> bool:
+        """Whether anything was compared, and error and error bars are as promised."""
+        bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
+        useful = all(by_chance(count, self.samples) for count in self.too_large.values())
+        errors = bool(self.worst) and all(ratio <= 1.0 for ratio, _ in self.worst.values())
+        return errors and bars and useful and not self.warned
+
+
+def by_chance(count: int, samples: int) -> bool:
+    """Whether a share of USELESS explains that so many samples or more are counted (binomial)."""
+    from scipy.stats import binom
+
+    return bool(binom.sf(count - 1, samples, USELESS) >= CHANCE)
+
+
+def components(name: str) -> list[tuple[str, Any]]:
+    """List the names that an output has in the reference, and their index in its array."""
+    return [(f"{name}_x", 0), (f"{name}_y", 1)] if name in VECTORS else [(name, 0)]
+
+
+def ratio(name: str, ours: float, value: Any, sensitivity: float) -> tuple[float, float]:
+    """Compute an error over what is allowed, and the error: 0 where the balls cannot tell it from the truth."""
+    error = value - float(ours) if math.isfinite(ours) else math.inf
+    size = abs(float(value.mid()))
+    if name.startswith("theta"):
+        error, size = math.remainder(float(error), 2.0 * math.pi) if math.isfinite(ours) else error, 1.0
+    wrong = abs(float(error)) if value.rad() < abs(error) else 0.0
+    return float(used(wrong, allowed(size, sensitivity))), wrong
+
+
+def untold(sine: Any, sensitivity: float) -> bool:
+    """Whether so few digits of sin mu are told that a library without many digits may say that there is no value."""
+    return allowed(size := abs(float(sine.mid())), sensitivity) > UNTOLD * size
+
+
+def allowed(size: float, sensitivity: float) -> float:
+    """8 eps (|y| + sum |x_i dy/dx_i|)."""
+    return FACTOR * EPS * (size + sensitivity)
