@@ -12,13 +12,10 @@ which is of the same form, with (theta_2', theta_3', theta_4') = (sin(theta_4 - 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fourbar.effects.actions import Actions, as_it_is
 from fourbar.effects.spring import COINCIDE, SpringEnd, require_ends
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import Number, anywhere, dot
+from fourbar.formulas.arithmetic import Number, anywhere, dot, namespace
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.linkage import ENDS, MOVING_BARS, PINS, FourBar
@@ -65,12 +62,12 @@ class LinearDrive:
         """Compute the stroke, m, and the unit vector from `start` to `end`, no number where they coincide."""
         start, end = (rounded(point.place(state)) for _, point in self.ends)
         across = end - start
-        stroke = rounded(np.abs(across))
+        stroke = rounded(namespace(across).abs(across))
         return stroke, across / stroke
 
     def speed(self, state: State) -> Number:
         """ds/dt, m/s."""
-        one, other = (state.velocity(point.bar, point.in_bar) for _, point in self.ends)
+        one, other = (state.velocity(point.bar, point.of(state)) for _, point in self.ends)
         return dot(self.line(state)[1], other - one)
 
     def act(self, actions: Actions, force: Number) -> None:
@@ -97,12 +94,12 @@ class LinearDrive:
         _, a, b, c, _, _ = state.lengths
         turning = {"h2": sines[2], "h3": (-a / b) * sines[3], "h4": (-a / c) * sines[4]}
         turned = state._replace(k=state.k._replace(**turning))
-        one, other = (turned.point_coefficient(point.bar, point.in_bar) for _, point in self.ends)
+        one, other = (turned.point_coefficient(point.bar, point.of(state)) for _, point in self.ends)
         reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
         most = sum(reach[p.bar][0] + reach[p.bar][1] * abs(p.distance) for _, p in self.ends)
         return dot(self.line(state)[1], other - one), most
 
-    def status(self, state: State, sines: dict[int, Number]) -> NDArray[np.uint8] | None:
+    def status(self, state: State, sines: dict[int, Number]) -> Number:
         """NO_DIRECTION where the ends coincide, NO_LEVER where P lies within its rounding; None: nowhere.
 
         Places are rounded by the lengths over which they are reached, the line's direction by that over the stroke.
@@ -112,7 +109,8 @@ class LinearDrive:
         none, meet = abs(lever) * stroke <= NO_DIGIT_LEFT * most * away, stroke <= COINCIDE * away
         if not anywhere(none | meet):
             return None
-        return np.where(meet, NO_DIRECTION, np.where(none, NO_LEVER, OK)).astype(np.uint8)
+        xp = namespace(meet)
+        return xp.where(meet, NO_DIRECTION, xp.where(none, NO_LEVER, OK))
 
 
 def _bars(linkage: FourBar, point: SpringEnd) -> set[int]:

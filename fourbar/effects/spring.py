@@ -32,10 +32,13 @@ class SpringEnd(NamedTuple):
         """In the bar's frame, along + i across its line, m; an array, whose products all round alike."""
         return np.asarray(polar(self.distance, self.angle))
 
+    def of(self, state: State) -> Any:
+        """In the bar's frame, in the numbers of a state's library."""
+        return self.in_bar if namespace(state.at.u2) is np else polar(self.distance, self.angle)
+
     def arm(self, state: State) -> Any:
         """From the bar's first pin, complex, m, world axes."""
-        plain = namespace(state.at.u2) is np
-        return (self.in_bar if plain else polar(self.distance, self.angle)) * state.direction(self.bar)
+        return self.of(state) * state.direction(self.bar)
 
     def place(self, state: State) -> Any:
         """Where it is, complex, m."""

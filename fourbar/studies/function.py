@@ -11,7 +11,7 @@ from fourbar.evaluation.case import Case, undecided
 from fourbar.evaluation.stages import kinematics, of_command
 from fourbar.formulas.arithmetic import namespace
 from fourbar.formulas.mobility import change_points
-from fourbar.quantities import OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, STAGE_OF, is_scalar
+from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, STAGE_OF, is_scalar
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
@@ -20,7 +20,7 @@ from fourbar.studies.keys import angle_key, at_place, entries, refusal, with_num
 NO_DIGIT_LEFT, UNDECIDED = 8.0, 16.0
 """Times the spacing of the numbers at 1: of |sin mu|, and of what decides whether the loop closes, as `solve` has them
 for doubles."""
-NEVER = {*OF_DRY_FRICTION, *OF_PIN_LOADS, *OF_LINE, *(name for name, stage in STAGE_OF.items() if stage == "error")}
+NEVER = {*OF_DRY_FRICTION, *OF_PIN_LOADS, *(name for name, stage in STAGE_OF.items() if stage == "error")}
 """Quantities of searches and of many digits."""
 
 
@@ -52,8 +52,8 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     Raises
     ------
     InputError : an unknown key or quantity; what cannot be traced: friction that depends on the pin forces, a free
-        motion, a position stated from a limit, a path that is followed through change points, a table that covers
-        less than a turn, a drive along a line. The function: values that are no real floating-point numbers of one
+        motion, a position stated from a limit, a path that is followed through change points, a table that
+        covers less than a turn, a stroke. The function: values that are no real floating-point numbers of one
         library, or whose shapes do not broadcast.
     DependencyError : array-api-compat is missing, without which other libraries than NumPy are not known.
 
@@ -128,11 +128,13 @@ def _evaluated(
     found = kinematics(case, state, wanted.keys()) | of_command(case, at, state, q)
     if "force" in stages:
         done = case.dynamics(state, acceleration)
-        found |= {**done.pins._asdict(), "torque": done.drive, "power": done.drive * case.drive_speed(state)}
+        found |= {**done.pins._asdict(), case.names.value: done.drive, "power": done.drive * case.drive_speed(state)}
         found["drive_condition"] = case.drive_condition(state)
         for term in case.terms:
             if (status := term.status(state, None)) is not None:
                 ok = ok & (status == OK)
+        if case.drive is not None and (status := case.drive.status(state, case.sines(state.at))) is not None:
+            ok = ok & (status == OK)
     return found, ok
 
 
@@ -192,7 +194,8 @@ def _library(key: str, value: Any) -> Any:
 
 def _wanted(scene: Scene, quantities: Iterable[str], keys: Sequence[str]) -> dict[str, str]:
     """Return the stages of the quantities asked for."""
-    stages = {name: stage for name, stage in STAGE_OF.items() if name not in NEVER}
+    others = OF_LINE if scene.drive is None else (COUPLE.value,)
+    stages = {name: stage for name, stage in STAGE_OF.items() if name not in {*NEVER, *others}}
     stages |= {start + point.name: stage for point in scene.points for start, stage in OF_POINTS.items()}
     for name in quantities:
         if name not in stages:
@@ -211,8 +214,8 @@ def _refuse_untraceable(scene: Scene, keys: Sequence[str]) -> None:
     motion = scene.motion
     if motion.free is not None:
         raise InputError("motion.free", motion.free, "is integrated step by step, which cannot be traced")
-    if scene.drive is not None:
-        raise InputError("drive", "a line between two points", "cannot be traced; a couple on a bar can")
+    if motion.stroke is not None:
+        raise InputError("motion.stroke", motion.stroke, "is turned into an angle first: state that of a bar")
     for effect in scene.effects:
         if effect.loaded_pins:
             allowed = "depends on the pin forces, which are searched for and cannot be traced"

@@ -152,6 +152,7 @@ MIDWAY = 200
 """Steps after which the closures have settled from the exact start."""
 
 
+@pytest.mark.nightly
 def test_genesis_reads_as_the_comment_says_and_leaves_out_what_it_names(tmp_path: Path) -> None:
     motion = fourbar.Motion(fourbar.Sweep(0.4, 0.4 + 2.0 * np.pi, 60), 10.0)
     joints = (fourbar.Gravity(), fourbar.Viscous.at(A=0.05), fourbar.Friction.at(O4=0.1))
@@ -182,6 +183,7 @@ def test_genesis_reads_as_the_comment_says_and_leaves_out_what_it_names(tmp_path
         assert read[1][0] == pytest.approx(10.0, rel=1e-6), "the keyframe's speed, of an accelerated scene too"
 
 
+@pytest.mark.nightly
 def test_newton_reads_the_mjcf_as_the_comment_says(tmp_path: Path) -> None:
     for motion in (fourbar.Motion(1.0, 10.0), fourbar.Motion(1.0, 10.0, 30.0)):
         scene = crank_rocker(motion=motion, drive_bar=4)

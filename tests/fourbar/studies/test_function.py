@@ -24,7 +24,7 @@ from fourbar.effects import (
     Viscous,
 )
 from fourbar.formulas.arithmetic import namespace
-from fourbar.quantities import STAGE_OF
+from fourbar.quantities import OF_LINE, STAGE_OF
 from fourbar.scene.motion import Free
 from fourbar.studies.function import NEVER, function
 from fourbar.studies.keys import angle_key, at_place, entries, left_out
@@ -87,7 +87,8 @@ LOADED = Scene(
     ),
     points=(Point("P", 3, (0.1, 0.4)),),
 )
-EVERY = [*(name for name in STAGE_OF if name not in NEVER), "P", "v_P", "a_P"]
+CYLINDER = replace(LOADED, drive_bar=None, drive=LinearDrive(SpringEnd(1, 0.1, 1.0), SpringEnd(4, 0.1, -1.0)))
+EVERY = [*(name for name in STAGE_OF if name not in {*NEVER, *OF_LINE}), "P", "v_P", "a_P"]
 ANGLES = np.linspace(0.0, 6.0, 13)
 
 
@@ -118,6 +119,25 @@ def test_every_quantity_is_that_of_solve(library: Library, drive_bar: int) -> No
         ours, theirs = np.asarray(found[name]), of_solution(solution, name)[0]
         gap = wrapped(ours - theirs) if name.startswith("theta") else ours - theirs
         assert np.abs(gap).max() <= ROUNDED * max(1.0, np.abs(theirs).max()), name
+
+
+@pytest.mark.parametrize("ends", [(1, 3), (1, 4), (2, 4)])
+def test_a_drive_along_a_line(library: Library, ends: tuple[int, int]) -> None:
+    """Its force, with the derivative by where it is pinned, which `sensitivity` has by another route."""
+    line = LinearDrive(*(SpringEnd(bar, 0.1, side) for bar, side in zip(ends, (1.0, -1.0), strict=True)))
+    scene = replace(CYLINDER, drive=line)
+    names = [*OF_LINE[:4], "power", "drive_condition", "F12", "F43"]
+    keys = ["drive.from.at.0", "lengths.coupler"]
+    solution, slopes = fourbar.solve(scene), fourbar.sensitivity(scene)
+    f, values = function(scene, keys, names), library.array([0.1, 0.25])
+    found = library.jit(lambda x: f(*x))(values)
+    assert {"drive_force", "stroke", "stroke_speed"} <= found.keys()
+    by = (library.jacrev if library.xp.__name__ == "torch" else library.jacfwd)(lambda x: f(*x))(values)
+    for name in names:
+        theirs = getattr(solution, name)[0]
+        assert np.abs(np.asarray(found[name]) - theirs).max() <= ROUNDED * np.abs(theirs).max(), name
+        exact = np.stack([slopes.of(name, key)[0] for key in keys], axis=-1)
+        assert np.abs(np.asarray(by[name]) - exact).max() <= ROUNDED * np.abs(exact).max(), name
 
 
 @pytest.mark.parametrize("motion", [Motion(theta_3=0.6, omega_3=2.0), Motion(theta_4=2.2, omega_4=-1.0, alpha_4=2.0)])
@@ -224,7 +244,7 @@ REFUSED = {
     "motion.theta_2": replace(LOADED, motion=Motion(FromLimit(1, 0.1), 1.0)),
     "motion.through": replace(LOADED, linkage=uniform(0.3, 0.1, 0.3, 0.1), motion=Motion(1.0, 1.0, through="follow")),
     "loads.0.table": replace(LOADED, loads=(Load(3, moment=1.0, table=Table((0.0, 1.0), (1.0, 2.0))),)),
-    "drive": replace(LOADED, drive_bar=None, drive=LinearDrive(SpringEnd(1, 0.1, 1.0), SpringEnd(3, 0.1, -1.0))),
+    "motion.stroke": replace(CYLINDER, motion=Motion(stroke=0.2, stroke_speed=0.1, side="left")),
     "motion.omega_2": replace(LOADED, motion=Motion(0.5)),
 }
 

@@ -13,14 +13,14 @@ import numpy as np
 from fourbar.effects import Friction, Gravity, Load, Table, Viscous
 from fourbar.errors import DependencyError, installing
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import STAGE_OF
+from fourbar.quantities import OF_LINE, STAGE_OF
 from fourbar.scene import Scene
 from fourbar.studies.function import NEVER, function
 from fourbar.studies.keys import angle_key, at_place, entries, left_out, placed, with_numbers
 from fourbar_validation.engines.description import PINS
 
 LIBRARIES = ("jax", "torch")
-QUANTITIES = tuple(name for name in STAGE_OF if name not in NEVER)
+QUANTITIES = tuple(name for name in STAGE_OF if name not in {*NEVER, *OF_LINE})
 
 
 def loaded(library: str) -> tuple[Any, Any]:
