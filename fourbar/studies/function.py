@@ -119,8 +119,8 @@ def _evaluated(
     size, turned, part = 4.0 * lengths.a * lengths.d, abs(half.sk * (q - path.theta_1)), UNDECIDED * given.eps
     least = NO_DIGIT_LEFT * given.eps * square
     ok = (half.outer > 0.0) & (half.inner > 0.0) & (half.outer * half.inner > least * least)
-    for factor, constant, square in ((half.outer, lengths.E1, half.kk), (half.inner, lengths.E2, half.ss)):
-        ok = ok & ~undecided(factor, constant, size * (square + turned), part)
+    for factor, constant, trig in ((half.outer, lengths.E1, half.kk), (half.inner, lengths.E2, half.ss)):
+        ok = ok & ~undecided(factor, constant, size * (trig + turned), part)
     half = half._replace(outer=xp.where(ok, half.outer, square), inner=xp.where(ok, half.inner, square))
     stages = set(wanted.values())
     at = path.position(q, half, branch)

@@ -169,6 +169,20 @@ def test_derivatives_are_those_of_sensitivity(library: Library, family: str) -> 
         assert np.abs((ours - exact) * weights).max() <= ROUNDED * size, name
 
 
+@pytest.mark.parametrize("motion", [Motion(np.pi, 8.0), Motion(np.pi - 1e-6, 8.0), Motion(theta_4=np.pi, omega_4=2.0)])
+def test_derivatives_keep_their_digits_beside_half_a_turn(library: Library, motion: Motion) -> None:
+    """There the tangent of half the angle is large: at 1e-6 rad nine digits of the slopes once were left."""
+    lengths = (0.22, 0.25, 0.1) if motion.bar == 4 else (0.1, 0.25, 0.22)
+    scene = replace(LOADED, linkage=uniform(0.3, *lengths), motion=motion, loads=(), effects=(Gravity(),))
+    key, wanted = angle_key(scene), fourbar.sensitivity(scene)
+    f = function(scene, [key], ["torque", "A", "alpha_3"])
+    for transform in {library.jacrev, library.jacrev if library.xp.__name__ == "torch" else library.jacfwd}:
+        found = transform(f)(library.array(motion.angle))
+        for name, slope in found.items():
+            exact = wanted.of(name, key)[0]
+            assert np.abs(np.asarray(slope) - exact).max() <= ROUNDED * np.abs(exact).max(), name
+
+
 def test_peak_pin_force_of_a_thousand_positions(library: Library) -> None:
     angles = np.linspace(0.0, 6.28, 1000)
     f = function(LOADED, ["lengths.input", "motion.theta_2"], ["F32"])
