@@ -23,6 +23,7 @@ OF_SCENE = {
     **{f"theta_{bar}": "rad" for bar in (2, 3, 4)},
     **{f"omega_{bar}": "rad/s" for bar in (2, 3, 4)},
     **{f"alpha_{bar}": "rad/s^2" for bar in (2, 3, 4)},
+    **{"stroke": "m", "stroke_speed": "m/s", "stroke_acceleration": "m/s^2"},
     **{
         "ground_angle": "rad",
         "mass": "kg",

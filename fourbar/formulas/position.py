@@ -21,6 +21,7 @@ from fourbar.formulas.arithmetic import (
     anywhere,
     exact_difference,
     namespace,
+    polar,
     select,
     sign,
     square_root,
@@ -89,8 +90,8 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
 
 
 def direction(theta: Number) -> Number:
-    """e^{i theta} from one tangent."""
-    return direction_of_tangent(tangent(0.5 * theta))
+    """e^{i theta} from one tangent; by cosine and sine where it may be differentiated, as for `half_angle`."""
+    return direction_of_tangent(tangent(0.5 * theta)) if namespace(theta) is np else polar(1.0, theta)
 
 
 def direction_of_tangent(t: Number) -> Number:
@@ -106,6 +107,12 @@ def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAng
     ----------
     opposite : h of psi - pi, from the same tangent: there the ground is read from O4 to O2.
     """
+    if (
+        xp := namespace(psi)
+    ) is not np:  # near 180 deg the tangent is large, and the library's derivative is a difference
+        s, k = xp.sin(0.5 * psi), xp.cos(0.5 * psi)
+        s = select((lengths.E1 if opposite else lengths.E2) == 0.0, s + hair(s), s)
+        return with_factors(lengths, k * k, s * s, -s * k) if opposite else with_factors(lengths, s * s, k * k, s * k)
     if not opposite:
         return half_angle_of_tangent(lengths, tangent(0.5 * psi))
     t = tangent(0.5 * psi)

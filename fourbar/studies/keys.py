@@ -15,8 +15,8 @@ from fourbar.formulas.arithmetic import namespace, polar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 
-ANGLE_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4")
-"""Of the commanded angle."""
+COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
+"""Of what is commanded."""
 SAME_FOR_ALL = (
     *("title", "source", "drive", "bar", "branch", "through", "free", "law", "frame", "table", "picture"),
     *("from", "to", "steps", "limit", "offset"),
@@ -83,7 +83,7 @@ def _of_ends(key: str, place: Place) -> dict[str, SceneNumber]:
 
 
 def entries(scene: Scene) -> dict[str, SceneNumber]:
-    """List the numbers of a scene that a study varies, lengths first, by key; the commanded angle is not among them."""
+    """List the numbers of a scene that a study varies, lengths first, by key; what is commanded is not among them."""
     found = _entry("lengths.ground", ("linkage", "ground"), POSITIVE)
     bars = [BAR_NAMES[number] for number in MOVING_BARS]
     for name in bars:
@@ -93,7 +93,7 @@ def entries(scene: Scene) -> dict[str, SceneNumber]:
         for number in ("mass", "inertia"):
             found |= _entry(f"bars.{name}.{number}", ("linkage", name, number), AT_LEAST_ZERO)
         found |= _pair(f"bars.{name}.centre", ("linkage", name, "centre"))
-    if scene.motion.law is None and scene.motion.stroke is None:
+    if scene.motion.law is None:
         for name in scene.motion.names[1:]:
             found |= _entry(f"motion.{name}", ("motion", name))
     if scene.drive is not None:
@@ -110,8 +110,8 @@ def entries(scene: Scene) -> dict[str, SceneNumber]:
     return found
 
 
-def angle_key(scene: Scene) -> str:
-    """Return the key of the commanded angle."""
+def command_key(scene: Scene) -> str:
+    """Return the key of what is commanded."""
     return f"motion.{scene.motion.names[0]}"
 
 

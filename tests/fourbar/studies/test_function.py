@@ -27,7 +27,7 @@ from fourbar.formulas.arithmetic import namespace
 from fourbar.quantities import OF_LINE, STAGE_OF
 from fourbar.scene.motion import Free
 from fourbar.studies.function import NEVER, function
-from fourbar.studies.keys import angle_key, at_place, entries, left_out
+from fourbar.studies.keys import at_place, command_key, entries, left_out
 from fourbar_validation.lab.stress.forward_error.families import FAMILIES
 
 EPS = 2.0**-52
@@ -95,7 +95,7 @@ ANGLES = np.linspace(0.0, 6.0, 13)
 def numbers_of(scene: Scene) -> dict[str, float]:
     """Every number that a scene states, its angle too."""
     found = {key: at_place(scene, entry.place) for key, entry in entries(scene).items() if not left_out(scene, entry)}
-    return {**found, angle_key(scene): float(np.ravel(scene.motion.angle)[0])}
+    return {**found, command_key(scene): float(np.ravel(scene.motion.angle)[0])}
 
 
 def of_solution(solution: Any, name: str) -> Any:
@@ -144,7 +144,7 @@ def test_a_drive_along_a_line(library: Library, ends: tuple[int, int]) -> None:
 def test_other_bars_command(library: Library, motion: Motion) -> None:
     scene = replace(LOADED, motion=motion, loads=())
     solution = fourbar.solve(scene)
-    f = function(scene, ["lengths.output", angle_key(scene)], ["torque", "F12", "condition"])
+    f = function(scene, ["lengths.output", command_key(scene)], ["torque", "F12", "condition"])
     found = f(library.array(0.22), library.array(motion.angle))
     for name, value in found.items():
         assert np.asarray(value) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
@@ -167,6 +167,20 @@ def test_derivatives_are_those_of_sensitivity(library: Library, family: str) -> 
         weights = np.abs(list(numbers.values()))
         size = np.abs(exact * weights).max() + np.abs(getattr(wanted.solution, name)).max()
         assert np.abs((ours - exact) * weights).max() <= ROUNDED * size, name
+
+
+@pytest.mark.parametrize("motion", [Motion(np.pi, 8.0), Motion(np.pi - 1e-6, 8.0), Motion(theta_4=np.pi, omega_4=2.0)])
+def test_derivatives_keep_their_digits_beside_half_a_turn(library: Library, motion: Motion) -> None:
+    """There the tangent of half the angle is large: at 1e-6 rad nine digits of the slopes once were left."""
+    lengths = (0.22, 0.25, 0.1) if motion.bar == 4 else (0.1, 0.25, 0.22)
+    scene = replace(LOADED, linkage=uniform(0.3, *lengths), motion=motion, loads=(), effects=(Gravity(),))
+    key, wanted = angle_key(scene), fourbar.sensitivity(scene)
+    f = function(scene, [key], ["torque", "A", "alpha_3"])
+    for transform in {library.jacrev, library.jacrev if library.xp.__name__ == "torch" else library.jacfwd}:
+        found = transform(f)(library.array(motion.angle))
+        for name, slope in found.items():
+            exact = wanted.of(name, key)[0]
+            assert np.abs(np.asarray(slope) - exact).max() <= ROUNDED * np.abs(exact).max(), name
 
 
 def test_peak_pin_force_of_a_thousand_positions(library: Library) -> None:

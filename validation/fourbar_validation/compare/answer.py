@@ -58,8 +58,10 @@ class Engine(Protocol):
 
 def not_taken(engine: Engine, at: Command) -> str:
     """Say why an engine cannot be asked: it does not declare that it takes what is commanded; empty where it does."""
-    takes, commanded = getattr(engine, "commands", ("theta_2",)), at.commanded if at.stroke is None else "stroke"
-    return "" if commanded in takes else f"it takes a command of {', '.join(takes)}, and here {commanded} is commanded"
+    takes = getattr(engine, "commands", ("theta_2",))
+    if at.commanded in takes:
+        return ""
+    return f"it takes a command of {', '.join(takes)}, and here {at.commanded} is commanded"
 
 
 @dataclass(slots=True, eq=False)

@@ -130,7 +130,7 @@ class Comparison:
         """Check that the own angles of an engine close the loop."""
         answer, linkage = self.answer, self.scene.linkage
         assert answer.at is not None and answer.assembled is not None
-        theta_2 = answer.at.angle if answer.at.bar == 2 else answer.quantities["theta_2"]
+        theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else answer.quantities["theta_2"]
         theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
         error = np.where(answer.assembled, closing_gap(linkage, theta_2, theta_3, theta_4), 0.0)
         index, condition = worst(error), 1.0 / half_turns(linkage.ground_angle, theta_2)
@@ -142,10 +142,9 @@ class Comparison:
 
     def assembled(self) -> Row:
         """Compare where both close the loop."""
-        theirs, ours = self.answer.assembled, self.formulas
-        assert theirs is not None
-        bar = int(ours.commanded[-1])
-        differ = (theirs != ours.assembled) & ~touching(self.scene.linkage, getattr(ours, ours.commanded), bar)
+        theirs, ours, at = self.answer.assembled, self.formulas, self.answer.at
+        assert theirs is not None and at is not None
+        differ = (theirs != ours.assembled) & ~touching(self.scene.linkage, at.angle, at.bar)
         count = np.count_nonzero(differ)
         return self.row(
             "assembled",

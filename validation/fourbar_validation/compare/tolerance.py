@@ -125,10 +125,10 @@ def lever(linkage: FourBar, bar: int = 2) -> float:
 
 def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
     """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive."""
-    s, unit, bar = formulas.condition, UNITS[quantity], int(formulas.commanded[-1])
+    s, unit, bar, commanded = formulas.condition, UNITS[quantity], formulas.at.bar, formulas.at.lever
     if quantity in (OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")):
         # a stroke commands the bar as far as its cylinder has a lever
-        return np.ones_like(s) if formulas.lever is None else np.asarray(formulas.lever ** POWER[unit], dtype=float)
+        return np.ones_like(s) if commanded is None else np.asarray(commanded ** POWER[unit], dtype=float)
     condition = lever(linkage, bar) * s ** POWER[unit]
     if formulas.stroke is not None and (quantity in OF_DIRECTION or unit in ("N", "N m", "W")):
         condition = condition * np.minimum(formulas.stroke / max(linkage.lengths), 1.0)

@@ -18,7 +18,7 @@ from fourbar_validation.compare.statements import limits, transmission
 from fourbar_validation.compare.statements.finding import look, worst
 from fourbar_validation.engines.description import driving
 from fourbar_validation.engines.witnesses import Witness, answering_nearby, predicting_from
-from fourbar_validation.run.question import Question
+from fourbar_validation.run.question import Question, without_angles
 
 
 def compare_answers(question: Question) -> Iterator[Row]:
@@ -63,7 +63,7 @@ def _observed_order(question: Question, witness: Witness) -> dict[str, float]:
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
     assert witness.order is not None
-    coarse, fine, order = witness.order(question.scene, question.at, error)
+    coarse, fine, order = witness.order(question.scene, without_angles(question.at), error)
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 
@@ -121,7 +121,7 @@ def compare_inertia(question: Question) -> Iterator[Row]:
     An exact engine answers it in the same assembly; another one is started once more.
     """
     scene = question.scene
-    if question.at.omega_2 is None or not (scene.loads or scene.effects):
+    if question.at.speed is None or not (scene.loads or scene.effects):
         return
     bare = Question(question.name, replace(scene, loads=(), effects=()), question.at, output=question.output)
     for name, (answer, seconds) in question.answered.items():
