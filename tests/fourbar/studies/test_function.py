@@ -174,7 +174,7 @@ def test_derivatives_keep_their_digits_beside_half_a_turn(library: Library, moti
     """There the tangent of half the angle is large: at 1e-6 rad nine digits of the slopes once were left."""
     lengths = (0.22, 0.25, 0.1) if motion.bar == 4 else (0.1, 0.25, 0.22)
     scene = replace(LOADED, linkage=uniform(0.3, *lengths), motion=motion, loads=(), effects=(Gravity(),))
-    key, wanted = angle_key(scene), fourbar.sensitivity(scene)
+    key, wanted = command_key(scene), fourbar.sensitivity(scene)
     f = function(scene, [key], ["torque", "A", "alpha_3"])
     for transform in {library.jacrev, library.jacrev if library.xp.__name__ == "torch" else library.jacfwd}:
         found = transform(f)(library.array(motion.angle))
