@@ -197,6 +197,7 @@ def test_peak_pin_force_of_a_thousand_positions(library: Library) -> None:
     assert slope == pytest.approx((ahead - back) / (2.0 * STEP), rel=DIFFERENCES)
 
 
+@pytest.mark.timeout(300)  # JAX compiles each operation for each of two shapes
 def test_positions_that_do_not_close_leave_the_others_their_derivatives(library: Library) -> None:
     """A sweep through both limits of a rocker, and lengths that close nowhere."""
     scene = replace(LOADED, linkage=uniform(0.2, 0.3, 0.25, 0.15, per_metre=2.0))
