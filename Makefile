@@ -30,7 +30,7 @@ long-machines:
 long-engines:
 	$(BIN)/python -m pytest tests/validation/engines/test_engines.py
 long-simulators:
-	$(BIN)/python -m pytest tests/fourbar/mjcf/test_simulators.py tests/validation/lab/subjects/test_subjects.py
+	$(BIN)/python -m pytest -m nightly
 long-problems:
 	PROBLEMS=all $(BIN)/python -m pytest tests/validation/lab/subjects/test_problems.py
 long-releases:

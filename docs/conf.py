@@ -1,18 +1,42 @@
 """The site of these pages: `sphinx-build -W docs site`, with what `pip install ".[docs]"` installs.
 
-Formulas are drawn by MathJax, which the browser fetches from the network; without it they stand as TeX.
+Formulas become MathML, which browsers draw by themselves: the site has no script for them and needs no network.
 """
+
+import re
+
+from docutils.nodes import SkipNode
+from latex2mathml.converter import convert
 
 import fourbar
 
 project = "fourbar"
 version = release = fourbar.__version__
-extensions = ["myst_parser", "sphinx.ext.mathjax"]
+extensions = ["myst_parser"]
 myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3
 html_theme = "furo"
 html_title = f"fourbar {version}"
 html_static_path = ["style"]
 html_css_files = ["narrow.css"]
+html_math_renderer = "mathml"
 html_show_copyright = False
 exclude_patterns = ["ci"]
+SPACE = '<mspace width="0.17em" />'
+"""On both sides of a function's name, as TeX has it."""
+
+
+def setup(app):
+    """Let formulas be written as MathML, in the line or below it."""
+
+    def written(display):
+        def write(page, node):
+            formula = convert(node.astext().replace("{aligned}", "{align*}"), display=display)
+            page.body.append(
+                re.sub(r"<mi>[a-z]{3}</mi>(?!<mo[^>]*>&#x00028;)", rf"<mrow>{SPACE}\g<0>{SPACE}</mrow>", formula)
+            )
+            raise SkipNode
+
+        return write, None
+
+    app.add_html_math_renderer("mathml", written("inline"), written("block"))

@@ -113,9 +113,9 @@ def _plot(
 
     Parameters
     ----------
-    figure : "overview", "linkage", "coupler", "kinematics", "points", "torque", "forces", "hodograph", "energy",
-        "transmission", "freebody" or "sensitivity".
-    position : theta_2 of the linkage and the free bodies, rad; left out: the scene's own.
+    figure : "overview", "linkage", "coupler", "kinematics", "points", "torque", "stroke", "forces", "hodograph",
+        "energy", "transmission", "freebody" or "sensitivity".
+    position : what is commanded where linkage and free bodies are drawn, rad or m; left out: the scene's own.
     branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
     units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI with the prefix that suits, deg.
     dimensions : write the lengths of the bars at them.

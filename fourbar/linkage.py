@@ -67,6 +67,13 @@ def require_whole(key: str, value: object, among: Container[int], allowed: str) 
     return int(value)
 
 
+def in_unit(key: str, value: object, unit: str) -> object:
+    """Convert each text like "48 cm" of a value, in lists too, as `require` does; numbers and arrays stay."""
+    if isinstance(value, (list, tuple)):
+        return [in_unit(key, each, unit) for each in value]
+    return require(key, value, unit) if unit != "1" and isinstance(value, str) else value
+
+
 def require_numbers(
     key: str, value: object, allowed: str = "must be finite numbers", unit: str = "1"
 ) -> NDArray[np.float64]:
@@ -74,14 +81,8 @@ def require_numbers(
 
     A text with a unit is converted as by `require`, in a list too.
     """
-    if unit != "1" and isinstance(value, (str, list, tuple)):
-        value = (
-            require(key, value, unit)
-            if isinstance(value, str)
-            else [require(key, each, unit) if isinstance(each, str) else each for each in value]
-        )
     try:
-        array = np.asarray(value)
+        array = np.asarray(in_unit(key, value, unit))
     except ValueError:  # rows of different lengths
         array = np.asarray(None)
     if array.dtype.kind not in "iuf" or array.ndim > 1 or not np.isfinite(array).all():

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from fourbar.effects import LinearDrive
+    from fourbar.scene import Command
 
 SCHEMA = "fourbar-analyze/1"
 Conversion = Mapping[str, tuple[str, float]]
@@ -67,8 +68,8 @@ class Solution(Quantities):
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached a limit position or change point, s; None: it did not."""
 
-    commanded: str = field(default="theta_2", init=False)
-    """Name of the angle that was commanded."""
+    at: "Command" = field(default=None, init=False)  # type: ignore[assignment]  # `solve` states it
+    """What was commanded, of a free motion theta_2."""
 
     def __len__(self) -> int:
         return len(self.theta_2)
@@ -86,6 +87,11 @@ class Solution(Quantities):
             *(f"{name}: {between(values)} {unit_of(name.strip('|'))}" for name, values in shown.items()),
         ]
         return "\n".join([*lines, listed("evaluated", self.evaluated())])
+
+    @property
+    def commanded(self) -> str:
+        """Name of what was commanded: an angle, or "stroke"."""
+        return self.at.commanded
 
     @property
     def assembled(self) -> NDArray[np.bool_]:

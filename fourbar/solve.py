@@ -202,7 +202,7 @@ def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[s
         known = {name: array for name, array in known.items() if name != "theta_2"}
         branch = np.where(np.abs(sine) > 0.0, np.sign(sine), branch).astype(np.int8)
     solution = Solution(scene.title, scene.drive_bar, code, branch, theta_2=theta_2, **known)
-    solution.drive, solution.commanded = scene.drive, at.commanded
+    solution.drive, solution.at = scene.drive, at
     solution.points, solution.velocity, solution.acceleration = own[""], own["v_"], own["a_"]
     solution.ground = (scene.linkage.ground, scene.linkage.ground_angle)
     return solution

@@ -1,6 +1,7 @@
-"""A headless Chromium, where the machine has one."""
+"""What tests of several folders need: a headless Chromium, where the machine has one; programs that Ctrl-C stops."""
 
 import shutil
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +21,14 @@ FLAGS = (
     "--disable-sync",
     "--hide-scrollbars",
 )
+
+
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Programs started here heed SIGINT: a job in the background ignores it, and what is ignored would be inherited."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="session")

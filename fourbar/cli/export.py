@@ -7,12 +7,12 @@ import click
 
 from fourbar.cli.given import (
     FILE,
-    angle_of,
     lengths_of,
     number_of,
     opened,
     out_option,
     printed_to,
+    require_unit,
     scene_argument,
     units_option,
     waiting,
@@ -38,9 +38,9 @@ without_loads_option = click.option(
     show_default=True,
     metavar="NAME",
     help="overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, transmission, freebody, "
-    "sensitivity.",
+    "sensitivity, stroke.",
 )
-@click.option("--position", metavar="ANGLE", help='theta_2 of the linkage and free bodies, like "135 deg".')
+@click.option("--position", metavar="PLACE", help='Of the linkage and free bodies: what is commanded, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
 @click.option("--dimensions", is_flag=True, help="Write the lengths of the bars at them.")
 @units_option
@@ -50,8 +50,10 @@ def plot(
     """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
     from fourbar.show.plot import draw
 
-    at = None if position is None else angle_of("--position", position)
+    require_unit("--position", position)
     with opened(scene) as described, waiting(described):
+        unit = "rad" if described.motion.stroke is None else "m"
+        at = None if position is None else number_of("--position", position, unit)
         draw(described, out, figure, position=at, branches=branches, units=units, dimensions=dimensions)
 
 
@@ -106,7 +108,7 @@ def animate(
     type=click.Choice(["flywheel", "motor", "none"]),
     default="flywheel",
     show_default=True,
-    help="flywheel keeps omega_2; for a controller of your own: motor, whose ctrl is the drive's couple, or none.",
+    help="flywheel keeps omega_2; for a controller of your own: motor, whose ctrl is the couple or force, or none.",
 )
 @out_option
 def mjcf(

@@ -106,11 +106,10 @@ def number_of(key: str, text: str, unit: str, *, positive: bool = False) -> floa
             raise InputError(key, text, f"{error}; must be a number in {unit}, or one with a unit") from None
 
 
-def angle_of(key: str, text: str) -> float:
-    """Read an angle with its unit, rad: a bare number may have been meant in either."""
-    if is_bare(text):
+def require_unit(key: str, text: str | None) -> None:
+    """InputError for a bare number: it may have been meant in any unit."""
+    if text is not None and is_bare(text):
         raise InputError(key, text, f'the unit is missing; did you mean "{text} deg"?')
-    return number_of(key, text, "rad")
 
 
 def printed_to(text: str, out: Path | None) -> None:

@@ -15,7 +15,7 @@ from fourbar.edit.document import Path, SceneDocument
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities.units import FRACTION, NUMBER, to_si
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 
 PINS = ("A", "B", "O4")
@@ -86,6 +86,7 @@ class Dragged(NamedTuple):
     """m that a pixel is worth."""
     theta_2: float
     """Of the position shown, rad."""
+    branch: int
     stretch: float = 1.0
     """Of an arrow: its length over the one that it is drawn with."""
 
@@ -95,8 +96,7 @@ def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], given: Dr
 
     Raises InputError where nothing of that name can be dragged, or the linkage does not assemble there.
     """
-    own = command(scene)
-    where = Command(np.array([given.theta_2]), own.branch[:1], None, 0.0)
+    where = Command(np.array([given.theta_2]), np.array([given.branch], dtype=np.int8), None, 0.0)
     at = solve(scene, "position", at=where)
     pins = {"O2": 0j, "A": complex(*at.A[0]), "B": complex(*at.B[0])}
     pins["O4"] = cmath.rect(scene.linkage.ground, scene.linkage.ground_angle)

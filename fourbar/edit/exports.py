@@ -58,9 +58,9 @@ class Exports:
         return path
 
     @staticmethod
-    def free_bodies(scene: Scene, theta_2: float, units: Conversion) -> str:
+    def free_bodies(scene: Scene, position: float, units: Conversion) -> str:
         """Draw the free bodies at a position, as the address of a picture."""
         from fourbar.show.plot.figures import drawn
 
-        text = drawn(scene, "freebody", position=theta_2, units=units)._repr_svg_()
+        text = drawn(scene, "freebody", position=position, units=units)._repr_svg_()
         return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode("ascii")

@@ -136,13 +136,15 @@ class Workbench:
             about = await self.loop.run_in_executor(self.one, lambda: self.session.answer(settled=True))
             if not self.waiting:
                 self.tell(about)
-                self.later("sample", STILL, lambda: asyncio.create_task(self._sample(about["data"]["theta_2"])))
+                self.later("sample", STILL, lambda: asyncio.create_task(self._sample(about["data"])))
 
-    async def _sample(self, theta_2: list[float]) -> None:
+    async def _sample(self, data: dict[str, Any]) -> None:
         """Send what the tolerances do, unless something has changed meanwhile."""
         scene = self.session.now.scene
         if scene.tolerances:
-            found = await self.loop.run_in_executor(self.aside, embedded_tolerances, scene, theta_2)
+            found = await self.loop.run_in_executor(
+                self.aside, embedded_tolerances, scene, data["over"]["values"] or data["theta_2"]
+            )
             if scene is self.session.now.scene:
                 self.tell({"tolerances": found})
 

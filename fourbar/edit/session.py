@@ -196,7 +196,7 @@ def _remove(session: Session, asked: dict[str, Any]) -> None:
 
 def _drag(session: Session, asked: dict[str, Any]) -> None:
     numbers = {name: float(asked[name]) for name in ("grain", "theta_2", "stretch") if name in asked}
-    given = Dragged(asked["what"], complex(*map(float, asked["to"])), **numbers)
+    given = Dragged(asked["what"], complex(*map(float, asked["to"])), branch=int(asked["branch"]), **numbers)
     gesture = str(asked.get("gesture", ""))
     from_state = session.base if gesture and gesture == session.gesture else session.now
     session.change(lambda of: drag(of, from_state.scene, from_state.plain, given), gesture)
@@ -250,7 +250,7 @@ def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
 
 
 def _bodies(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    return {"bodies": session.exports.free_bodies(session.now.scene, float(asked["theta_2"]), session.units)}
+    return {"bodies": session.exports.free_bodies(session.now.scene, float(asked["position"]), session.units)}
 
 
 ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] = {

@@ -1,4 +1,4 @@
-"""The numbers of each effect, with their units and bounds: what scene files read and studies vary."""
+"""The numbers of a scene and of each effect, with their units: what scene files read and studies vary."""
 
 ANY, AT_LEAST_ZERO, POSITIVE = "a finite number", "a finite number >= 0", "a finite number > 0"
 OF_EFFECT: dict[str, dict[str, tuple[str, str]]] = {
@@ -18,3 +18,28 @@ OF_GAS_SPRING = {
 """The words of a gas spring, which becomes one of the springs."""
 ROWS = {"viscous": "coefficients", "friction": "torques", "pin_friction": "pins", "torsion": "springs"}
 """Effects that hold rows (pin, number, ...), each with its field of them."""
+OF_SCENE = {
+    **dict.fromkeys(("ground", "input", "coupler", "output", "centre", "at", "from_pin"), "m"),
+    **{f"theta_{bar}": "rad" for bar in (2, 3, 4)},
+    **{f"omega_{bar}": "rad/s" for bar in (2, 3, 4)},
+    **{f"alpha_{bar}": "rad/s^2" for bar in (2, 3, 4)},
+    **{"stroke": "m", "stroke_speed": "m/s", "stroke_acceleration": "m/s^2"},
+    **{
+        "ground_angle": "rad",
+        "mass": "kg",
+        "inertia": "kg m^2",
+        "force": "N",
+        "moment": "N m",
+        "gravity": OF_EFFECT["gravity"]["magnitude"][0],
+    },
+}
+"""Unit of each other number by the last word of its key, of a pair that of its magnitude."""
+
+
+def unit_of(key: str) -> str | None:
+    """Return the unit of the number that a key of a scene file names; None where no scene has such a number."""
+    *before, name = key.split(".")
+    numbers = OF_EFFECT.get(before[1], {}) if before[:1] == ["effects"] and len(before) > 1 else {}
+    if before and name in ("0", "1"):
+        return "rad" if name == "1" else OF_SCENE.get(before[-1])
+    return (numbers.get(name) or numbers.get("") or (OF_SCENE.get(name),))[0]

@@ -164,14 +164,17 @@ def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
     return reach.beyond_folded <= 0.0 and reach.beyond_stretched <= 0.0
 
 
-def default_range(linkage: FourBar, bar: int = 2) -> tuple[float, float]:
+def default_range(linkage: FourBar, bar: int = 2, holding: float | None = None) -> tuple[float, float]:
     """Choose the range of a commanded bar's angle that is swept where a scene names none, rad.
 
-    0..2 pi where the bar turns fully; otherwise the first of `intervals`, shrunk by MARGIN at each end.
+    0..2 pi where the bar turns fully; otherwise the first of `intervals`, or the one that holds an angle, shrunk by
+    MARGIN at each end.
     """
     if turns_fully(linkage, bar):
         return 0.0, TURN
-    start, stop = intervals(linkage, bar)[0]
+    every = intervals(linkage, bar)
+    held = (own for own in every if holding is not None and (holding - own[0]) % TURN <= own[1] - own[0])
+    start, stop = next(held, every[0])
     margin = min(MARGIN, (stop - start) / NARROW)
     return start + margin, stop - margin
 

@@ -7,6 +7,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from fourbar.effects.numbers import ROWS
 from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.formulas.mobility import change_points, default_range
 from fourbar.linkage import MOVING_BARS, FourBar
@@ -61,8 +62,9 @@ def mjcf(
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
     _require_carried(scene)
+    cylinder = scene.drive
     if scene.motion.free is not None:
-        drive = "none"
+        drive, cylinder = "none", None
     if drive != "flywheel":
         settings = _without_flywheel(scene, settings)
     start = (start or at_start(scene)) if keyframe else None
@@ -75,6 +77,7 @@ def mjcf(
     if settings.pad == "fitted":
         settings = replace(settings, pad=_pad(scene))
     model = Model(scene.linkage, settings, timestep)
+    model.cylinder = cylinder
     for term in (*scene.effects, *scene.loads):
         row(term).add(term, model)
     armature = flywheel(scene, settings)
@@ -94,7 +97,7 @@ def mjcf(
     model.add_load_sites(root)
     model.add_closure(root)
     model.add_tendons(root)
-    model.add_actuators(root, actuator)
+    model.add_actuators(root, actuator, cylinder=cylinder is not None and drive != "none")
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
         ET.SubElement(frame, "key", name="start", qpos=text(*start.qpos), qvel=text(*start.qvel))
@@ -107,25 +110,36 @@ def _require_carried(scene: Scene) -> None:
     require_input(scene, "the drive of an MJCF")
     if scene.motion.law is not None:
         raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
-    if scene.drive is not None and scene.motion.free is None:
-        raise LimitError("a linear drive (drive.from, drive.to) is not exported to MJCF")
     carriable(scene.linkage)
 
 
 def _comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
     """Say how the file starts and where its numbers stand, a line each."""
     notes, numbers, bar = NOTES["mjcf"], NOTES["numbers"][reader], scene.drive_bar
-    kinds: list[str] = [drive]
+    kinds: list[str] = [drive if scene.drive is None else f"cylinder_{drive}"]
     if scene.motion.free is not None:
         kinds = ["released"]
     elif drive == "flywheel":
         kinds = ["accelerated" if scene.motion.alpha_2 else "driven"]
         kinds += [] if _span(scene.linkage) >= FULL_TURN and not change_points(scene.linkage) else ["limits"]
-        kinds += ["elsewhere"] if bar != 2 else []
-    lines: list[str] = [notes[kind].format(bar=bar) for kind in ("opens", *kinds)]
+        kinds += ["cylinder_flywheel"] if scene.drive is not None else ["elsewhere"] if bar != 2 else []
+    lines: list[str] = [notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar) for kind in ("opens", *kinds)]
+    if reader == "genesis" and (names := _without_joints(scene)):
+        lines.append(notes["genesis_without"].format(names=", ".join(names)))
     lines += numbers["instant"] + (numbers["driven"] if drive == "flywheel" else []) + numbers["pins"]
     lines += [notes["loads"]] if reader == "mujoco" and scene.loads else []
     return [*lines, *numbers["after"]]
+
+
+def _without_joints(scene: Scene) -> list[str]:
+    """Name what is no number of a joint but its rest angle."""
+    names = ["loads"] if scene.loads else []
+    for effect in scene.effects:
+        pins = {pin for pin, *_ in getattr(effect, ROWS[effect.key])} if effect.key in ROWS else set()
+        names += ["springs"] if effect.key == "springs" else []
+        names += [f"{effect.key} at B"] if "B" in pins else []
+        names += ["rest angles of torsion (it rests as assembled)"] if effect.key == "torsion" and pins - {"B"} else []
+    return names
 
 
 def flywheel(scene: Scene, settings: Settings = RECIPE) -> float:

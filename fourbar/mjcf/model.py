@@ -13,9 +13,11 @@ from fourbar.mjcf.appearance import add_camera, rounded
 from fourbar.mjcf.settings import Settings
 
 if TYPE_CHECKING:
-    from fourbar.effects import Load
-    from fourbar.effects.spring import Spring
+    from fourbar.effects import LinearDrive, Load
+    from fourbar.effects.spring import Spring, SpringEnd
 
+CYLINDER = "cylinder"
+"""Name of the tendon of a linear drive, and of the actuator on it."""
 FLOOR = 1e-15
 """mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
 COLOURS = {1: "0.45 0.45 0.48 1", 2: "0.12 0.47 0.71 1", 3: "1 0.5 0.05 1", 4: "0.17 0.63 0.17 1"}
@@ -54,8 +56,10 @@ def servo(gain: float, omega: float) -> dict[str, str]:
     return {**UNCONTROLLED, "joint": "O2", "biasprm": text(gain * omega, 0.0, -gain)}
 
 
-def motor(bar: int) -> dict[str, str]:
-    """Make the drive a motor whose control is the couple of ground on a bar, N m."""
+def motor(bar: int | None) -> dict[str, str]:
+    """Make the drive a motor whose control is the couple of ground on a bar, N m; a cylinder has one of its own."""
+    if bar is None:
+        return {}
     return {"joint": FIRST_PIN[bar]} if bar != 3 else {"site": "B3", "gear": "0 0 0 0 0 1"}
 
 
@@ -91,6 +95,8 @@ class Model:
         self.pin: dict[str, dict[str, float | tuple[float, ...]]] = {pin: {} for pin in PINS}
         self.loads: list[Load] = []
         self.springs: list[Spring] = []
+        self.cylinder: LinearDrive | None = None
+        """A tendon of this name, and unless the drive is "none" an actuator on it whose control is its force, N."""
         self.inertia = dict.fromkeys(MOVING_BARS, 0.0)
         """What is added to a bar's own, kg m^2."""
         self.rest: tuple[float, float, float] | None = None
@@ -210,7 +216,7 @@ class Model:
 
     def add_tendons(self, root: ET.Element) -> None:
         """At the cut pin B a tendon theta_4 - theta_3 takes what acts there; a spring is one between two sites."""
-        if not self.pin["B"] and not self.springs:
+        if not self.pin["B"] and not self.springs and self.cylinder is None:
             return
         tendons = ET.SubElement(root, "tendon")
         if self.pin["B"]:
@@ -219,18 +225,26 @@ class Model:
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
         for index, spring in enumerate(self.springs, 1):
-            name = f"spring_{index}"
-            tendon = ET.SubElement(tendons, "spatial", name=name)
+            tendon = self._add_line(root, tendons, f"spring_{index}", spring.start, spring.end)
             if _is_slack_somewhere(spring):
                 tendon.set("stiffness", text(spring.stiffness))
                 tendon.set("springlength", text(-spring.slack / spring.stiffness))
-            for end, point in (("start", spring.start), ("end", spring.end)):
-                ET.SubElement(tendon, "site", site=f"{name}_{end}")
-                x, y = point.in_bar.real, point.in_bar.imag
-                if point.bar == 1:  # the ground's body keeps world axes
-                    cos, sin = math.cos(self.linkage.ground_angle), math.sin(self.linkage.ground_angle)
-                    x, y = cos * x - sin * y, sin * x + cos * y
-                self._add_site(_body(root, point.bar), f"{name}_{end}", x, y)
+        if self.cylinder is not None:
+            self._add_line(root, tendons, CYLINDER, self.cylinder.start, self.cylinder.end)
+
+    def _add_line(
+        self, root: ET.Element, tendons: ET.Element, name: str, start: "SpringEnd", end: "SpringEnd"
+    ) -> ET.Element:
+        """Add a tendon between two points of bars, with a site at each."""
+        tendon = ET.SubElement(tendons, "spatial", name=name)
+        for which, point in (("start", start), ("end", end)):
+            ET.SubElement(tendon, "site", site=f"{name}_{which}")
+            x, y = point.in_bar.real, point.in_bar.imag
+            if point.bar == 1:  # the ground's body keeps world axes
+                cos, sin = math.cos(self.linkage.ground_angle), math.sin(self.linkage.ground_angle)
+                x, y = cos * x - sin * y, sin * x + cos * y
+            self._add_site(_body(root, point.bar), f"{name}_{which}", x, y)
+        return tendon
 
     def add_load_sites(self, root: ET.Element) -> None:
         """Add the point at which each load acts: G for world axes (the arm becomes a couple), else the point itself."""
@@ -242,14 +256,16 @@ class Model:
                 y += load.at[0] * math.sin(load.at[1])
             self._add_site(_body(root, load.bar), f"load_{index}", x, y)
 
-    def add_actuators(self, root: ET.Element, drive: dict[str, str]) -> None:
+    def add_actuators(self, root: ET.Element, drive: dict[str, str], *, cylinder: bool) -> None:
         """Actuators: the drive by its attributes, without any there is none; loads and some springs, uncontrolled."""
         springs = {f"spring_{i}": s for i, s in enumerate(self.springs, 1) if not _is_slack_somewhere(s)}
-        if not drive and not self.loads and not springs:
+        if not drive and not cylinder and not self.loads and not springs:
             return
         actuators = ET.SubElement(root, "actuator")
         if drive:
             ET.SubElement(actuators, "general", drive, name="drive")
+        if cylinder:
+            ET.SubElement(actuators, "general", name=CYLINDER, tendon=CYLINDER)
         for name, spring in springs.items():
             tension = text(-spring.slack, 0.0 - spring.stiffness, 0.0)
             ET.SubElement(actuators, "general", UNCONTROLLED, name=name, tendon=name, biasprm=tension)

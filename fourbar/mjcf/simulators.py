@@ -18,7 +18,7 @@ FAST = replace(RECIPE, time_constant_steps=2.0)
 SIMULATORS = {"mujoco": RECIPE, "warp": SINGLE, "mjx": FAST, "genesis": RECIPE, "newton": SINGLE}
 """Who reads the file, and the settings that carry the loop best there."""
 OWN_MOTORS = ("genesis", "newton")
-"""Who puts couples on joints itself, and does not take them from the controls of a file."""
+"""Who puts couples on joints itself, and takes none from the controls of a file; Genesis takes no actuator at all."""
 
 
 def mjcf_for(scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel") -> str:

@@ -3,4 +3,6 @@
 from fourbar.scene.scene import Command as Command
 from fourbar.scene.scene import Scene as Scene
 from fourbar.scene.scene import command as command
+from fourbar.scene.scene import command_at as command_at
+from fourbar.scene.scene import default_places as default_places
 from fourbar.scene.scene import require_input as require_input

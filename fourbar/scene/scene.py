@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, LimitError, expect
-from fourbar.formulas.mobility import default_range, limit_angles, on_smooth_path
+from fourbar.formulas.mobility import MARGIN, default_range, limit_angles, on_smooth_path
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
-from fourbar.scene.motion import DEFAULT_STEPS, FromLimit, Motion, Sweep
+from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.point import Point
 from fourbar.scene.tolerance import Tolerance
@@ -129,8 +129,19 @@ class Command(NamedTuple):
 
     @property
     def commanded(self) -> str:
-        """Name of the angle."""
-        return COMMANDS[self.bar][0]
+        """Name of what is commanded: the angle, or the stroke."""
+        return COMMANDS[self.bar][0] if self.stroke is None else OF_STROKE[0]
+
+    @property
+    def places(self) -> Array:
+        """What is commanded at each position: angles, strokes, or of a law the times."""
+        own = self.angle if self.stroke is None else self.stroke
+        return own if self.time is None else self.time
+
+    def part(self, where: Any) -> "Command":
+        """Take some of the positions."""
+        rows: Any = (value[where] if isinstance(value, np.ndarray) and value.ndim else value for value in self)
+        return Command(*rows)
 
     @property
     def theta_2(self) -> Array:
@@ -161,40 +172,55 @@ def require_input(scene: Scene, what: str) -> None:
         raise LimitError(f"motion.{scene.motion.names[0]}: {what} takes a command of theta_2 alone")
 
 
-def _of_stroke(scene: Scene) -> Command:
-    """List the positions of a commanded stroke, as those of the bar that the cylinder turns."""
-    from fourbar.scene.stroke import triangle
+def default_places(scene: Scene, holding: float | None = None) -> Array:
+    """List the angles (of the range that holds one), or strokes, that are swept where a scene names none, (n,)."""
+    if scene.motion.stroke is not None:
+        from fourbar.scene.stroke import triangle
 
-    motion, wanted = scene.motion, scene.motion.stroke
-    if isinstance(wanted, Sweep):
-        stroke = np.linspace(wanted.start, wanted.stop, wanted.steps + 1)
+        first, last = triangle(scene.linkage, scene.drive).strokes(np.array([MARGIN, np.pi - MARGIN])).tolist()
     else:
-        stroke = np.array(wanted, dtype=float, ndmin=1)
-    own = triangle(scene.linkage, scene.drive)
-    assert motion.side is not None
-    angle, speed, acceleration, lever = own.turned(stroke, motion.stroke_speed, motion.stroke_acceleration, motion.side)
-    branch = np.full(stroke.shape, motion.branch, dtype=np.int8)
-    if motion.through == "follow":
-        branch = on_smooth_path(scene.linkage, angle, motion.branch, own.bar)
-    return Command(angle, branch, speed, acceleration, bar=own.bar, stroke=stroke, lever=lever)
+        first, last = default_range(scene.linkage, scene.motion.bar, holding)
+    return np.linspace(first, last, DEFAULT_STEPS + 1)
+
+
+def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = None) -> Command:
+    """Command what the scene's motion commands at other places: angles, strokes, or of a law times.
+
+    Parameters
+    ----------
+    branch : at each of them; left out: the scene's, which may follow its smooth path.
+    """
+    motion, bar, time, lever = scene.motion, scene.motion.bar, None, None
+    angle = places
+    speed: float | Array | None = motion.speed
+    acceleration: float | Array = motion.acceleration
+    if motion.stroke is not None:
+        from fourbar.scene.stroke import triangle
+
+        own = triangle(scene.linkage, scene.drive)
+        own.require(places)
+        angle, speed, acceleration, lever = own.turned(places, speed, acceleration, motion.side)
+    elif motion.law is not None:
+        time, (angle, speed, acceleration) = places, motion.law.at(places)
+    if branch is None:
+        branch = np.full(angle.shape, motion.branch, dtype=np.int8)
+        if motion.through == "follow":
+            branch = on_smooth_path(scene.linkage, angle, motion.branch, bar)
+    stroke = None if lever is None else places
+    return Command(angle, branch, speed, acceleration, None, time, bar, stroke, lever)
 
 
 def command(scene: Scene) -> Command:
     """List the positions that the scene's motion names, each with its branch."""
     expect("scene", scene, Scene)
     motion, linkage, bar = scene.motion, scene.linkage, scene.motion.bar
-    stated, remainder, time = motion.angle, None, None
-    speed: float | Array | None = motion.speed
-    acceleration: float | Array = motion.acceleration
-    if motion.stroke is not None:
-        return _of_stroke(scene)
+    stated, remainder = motion.angle, None
     if motion.law is not None:
-        time = motion.law.times()
-        angle, speed, acceleration = motion.law.at(time)
+        places = motion.law.times()
     elif stated is None:
-        angle = np.linspace(*default_range(linkage, bar), DEFAULT_STEPS + 1)
+        places = default_places(scene)
     elif isinstance(stated, Sweep):
-        angle = np.linspace(stated.start, stated.stop, stated.steps + 1)
+        places = np.linspace(stated.start, stated.stop, stated.steps + 1)
     elif isinstance(stated, FromLimit):
         key, limits = f"motion.theta_{bar}.limit", limit_angles(linkage, bar)
         if not limits:
@@ -204,11 +230,8 @@ def command(scene: Scene) -> Command:
         from fourbar.formulas.many_digits import limit_remainder
 
         limit = limits[stated.limit - 1]
-        angle = np.array([limit + stated.offset])
-        remainder = limit_remainder(linkage, limit, float(angle[0]), stated.offset, bar)
+        places = np.array([limit + stated.offset])
+        remainder = limit_remainder(linkage, limit, float(places[0]), stated.offset, bar)
     else:
-        angle = np.array(stated, dtype=float, ndmin=1)
-    branch = np.full(angle.shape, motion.branch, dtype=np.int8)
-    if motion.through == "follow":
-        branch = on_smooth_path(linkage, angle, motion.branch, bar)
-    return Command(angle, branch, speed, acceleration, remainder, time, bar)
+        places = np.array(stated, dtype=float, ndmin=1)
+    return command_at(scene, places)._replace(remainder=remainder)

@@ -4,12 +4,12 @@ With l from the pivot to the end on the bar, r to the end on the ground, beta th
     s^2 = l^2 + r^2 - 2 l r cos beta,   ds/dbeta = l r sin beta/s = the lever from the pivot to the line.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import polar
+from fourbar.formulas.arithmetic import Number, angle, polar, select
 from fourbar.linkage import FourBar
 from fourbar.solution import Array
 
@@ -24,33 +24,44 @@ class Triangle(NamedTuple):
     """Pivot, end on the bar, end on the ground."""
 
     bar: int
-    length: float
+    length: Number
     """l, m."""
-    reach: float
+    reach: Number
     """r, m."""
-    angle: float
+    angle: Number
     """theta of the bar where both ends are in one direction from the pivot, rad."""
 
-    def turned(
-        self, stroke: Array, speed: float | None, acceleration: float, side: str
-    ) -> tuple[Array, Array | None, Array, Array]:
-        """Compute angle, speed and acceleration of the bar, and the lever as a part of the longer of l and r, (n,)."""
-        longer, shorter = max(self.length, self.reach), min(self.length, self.reach)
-        least, most = longer - shorter, longer + shorter
-        if not ((stroke >= least) & (stroke <= most)).all():
-            bad = float(stroke[np.argmax(~((stroke >= least) & (stroke <= most)))])
+    def strokes(self, beta: Array) -> Array:
+        """Compute the stroke at angles between the two ends, (n,)."""
+        across: Array = np.hypot(self.length - self.reach, 2.0 * np.sqrt(self.length * self.reach) * np.sin(0.5 * beta))
+        return across
+
+    def require(self, stroke: Array) -> None:
+        """InputError for a stroke that the cylinder cannot have."""
+        least, most = abs(self.length - self.reach), self.length + self.reach
+        inside = (stroke >= least) & (stroke <= most)
+        if not inside.all():
+            bad = float(stroke[np.argmin(inside)])
             raise InputError("motion.stroke", bad, f"this cylinder can have {least:.6g} to {most:.6g} m")
+
+    def turned(self, stroke: Any, speed: Any, acceleration: Any, side: str | None) -> tuple[Any, Any, Any, Any]:
+        """Compute angle, speed and acceleration of the bar, and the lever as a part of the longer of l and r.
+
+        NaN where the cylinder cannot have the stroke. All may be arrays, and numbers that carry their derivatives.
+        """
+        assert side is not None
+        gap, most = self.length - self.reach, self.length + self.reach
         sign, product = SIDES[side], self.length * self.reach
-        near, far = (stroke - least) * (stroke + least), (most - stroke) * (most + stroke)
-        beta = 2.0 * np.arctan2(np.sqrt(near), np.sqrt(far))
-        lever = np.sqrt(near) * np.sqrt(far) / (2.0 * stroke)
-        theta = self.angle + sign * beta
-        if speed is None:
-            return theta, None, np.zeros_like(theta), lever / longer
         with np.errstate(all="ignore"):
+            near, far = np.sqrt((stroke - gap) * (stroke + gap)), np.sqrt((most - stroke) * (most + stroke))
+            beta = 2.0 * np.arctan2(near, far)
+            lever = near * far / (2.0 * stroke)
+            theta, share = self.angle + sign * beta, lever / (0.5 * (most + abs(gap)))
+            if speed is None:
+                return theta, None, np.zeros(np.shape(theta)), share
             rate = speed / lever
             growth = (speed * speed + stroke * acceleration - product * np.cos(beta) * rate * rate) / (lever * stroke)
-        return theta, sign * rate, sign * growth, lever / longer
+        return theta, sign * rate, sign * growth, share
 
 
 def triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
@@ -60,6 +71,6 @@ def triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
         raise InputError("motion.stroke", drives, "is of a cylinder ([drive]) between the ground and bar 2 or 4")
     own, other = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
     pivot = 0.0 if own.bar == 2 else polar(linkage.ground, linkage.ground_angle)
-    to_ground = complex(polar(other.distance, other.angle + linkage.ground_angle) - pivot)
-    along = 0.0 if own.distance >= 0.0 else np.pi
-    return Triangle(own.bar, abs(own.distance), abs(to_ground), float(np.angle(to_ground)) - own.angle - along)
+    to_ground = polar(other.distance, other.angle + linkage.ground_angle) - pivot
+    along = select(own.distance >= 0.0, 0.0, np.pi)
+    return Triangle(own.bar, abs(own.distance), abs(to_ground), angle(to_ground) - own.angle - along)

@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from fourbar.errors import expect
+from fourbar.effects.numbers import unit_of
+from fourbar.errors import InputError, expect
 from fourbar.linkage import require
 
 THREE_SIGMA = 3.0
@@ -17,7 +18,8 @@ class Tolerance:
     Parameters
     ----------
     key : of the number, as in the scene file, pairs and lists by index.
-    width : in its SI unit, > 0: plus or minus, evenly distributed, or the standard deviation of a normal distribution.
+    width : in its SI unit or a text like "0.1 mm", > 0: plus or minus, evenly distributed, or the standard deviation
+        of a normal distribution.
     sigma : whether it is that.
     """
 
@@ -27,7 +29,10 @@ class Tolerance:
 
     def __post_init__(self) -> None:
         expect("tolerances", self.key, str)
-        require(f"tolerances.{self.key}", self.width, positive=True)
+        unit = unit_of(self.key)
+        if unit is None and isinstance(self.width, str):
+            raise InputError(f"tolerances.{self.key}", self.width, "unknown key")
+        object.__setattr__(self, "width", require(f"tolerances.{self.key}", self.width, unit or "1", positive=True))
         expect(f"tolerances.{self.key}", self.sigma, bool)
 
     @property

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.linkage import MOVING_BARS, PINS
+from fourbar.linkage import PINS
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene
+from fourbar.scene import Scene, command_at
 from fourbar.show.duty import driving
 from fourbar.solution import Array, Solution
 from fourbar.solve import solve
@@ -26,7 +26,7 @@ AT_REST = 1e-12
 """Part of its largest slip below which a pin is at rest at a position."""
 Branch = NDArray[np.int8]
 At = Callable[[Array, Branch, str], Solution]
-"""Solve at places (theta_2, or of a motion law the time) and branches, up to a stage."""
+"""Solve at places (of what is commanded, or of a motion law the time) and branches, up to a stage."""
 
 
 class Between(NamedTuple):
@@ -35,7 +35,7 @@ class Between(NamedTuple):
     solution: Solution
     """At its positions and, among them, at both sides of each reversal and where each of `sizes` is largest."""
     reversals: list[tuple[float, str]]
-    """Commanded angle, rad, and the pin at which dry friction reverses there: the pin forces jump."""
+    """Commanded angle or stroke, rad or m, and the pin at which dry friction reverses there: the pin forces jump."""
     growing: set[str]
     """Those of `sizes` that grow without bound within a step."""
 
@@ -58,15 +58,11 @@ def between(scene: Scene, solution: Solution) -> Between | None:
     solution : of the scene's positions, or of its sweep in rising order, to the stage "force".
     """
     motion = scene.motion
-    listed = isinstance(motion.angle, np.ndarray) or motion.stroke is not None
-    if motion.free is not None or listed or solution.F12 is None or len(solution) < 2:
+    if motion.free is not None or isinstance(motion.angle, np.ndarray) or solution.F12 is None or len(solution) < 2:
         return None
 
     def at(places: Array, branch: Branch, stage: str = "force") -> Solution:
-        if motion.law is not None:
-            angle, speed, acceleration = motion.law.at(places)
-            return solve(scene, stage, at=Command(angle, branch, speed, acceleration, time=places, bar=motion.bar))
-        return solve(scene, stage, at=Command(places, branch, motion.speed, motion.acceleration, bar=motion.bar))
+        return solve(scene, stage, at=command_at(scene, places, branch))
 
     pins, low, high, branch = _reversing(scene, solution)
     for _ in range(ROUNDS if pins else 0):
@@ -83,19 +79,6 @@ def between(scene: Scene, solution: Solution) -> Between | None:
     return Between(_merged(at, merged, found, branch), reversals, growing)
 
 
-def _over(solution: Solution) -> Array:
-    angle: Array = getattr(solution, solution.commanded)
-    return angle if solution.time is None else solution.time
-
-
-def _branch(solution: Solution) -> Branch:
-    """Return the branch of the command: the sign of the sine between the two bars that are not commanded."""
-    if solution.commanded == "theta_2":
-        return solution.branch
-    one, other = (getattr(solution, f"theta_{bar}") for bar in MOVING_BARS if f"theta_{bar}" != solution.commanded)
-    return np.where(np.sin(other - one) < 0.0, -1, 1).astype(np.int8)
-
-
 def _cut(low: Array, high: Array) -> Array:
     return low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, CUTS + 1)
 
@@ -104,9 +87,9 @@ def _merged(at: At, solution: Solution, places: Array, branch: Branch) -> Soluti
     """Solve at the positions of a solution and at others among them, in the order of the solution."""
     if not len(places):
         return solution
-    over = np.concatenate([_over(solution), places])
+    over = np.concatenate([solution.at.places, places])
     order = np.unique(over, return_index=True)[1][:: 1 if over[0] < over[1] else -1]
-    return at(over[order], np.concatenate([_branch(solution), branch])[order], "force")
+    return at(over[order], np.concatenate([solution.at.branch, branch])[order], "force")
 
 
 def _slip(solution: Solution, pin: str) -> Array:
@@ -117,7 +100,7 @@ def _slip(solution: Solution, pin: str) -> Array:
 
 def _reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array, Branch]:
     """List the steps in which a pin with dry friction changes its sense: pin, ends, branch."""
-    over, branch, steps = _over(solution), _branch(solution), list[tuple[str, int, int]]()
+    over, branch, steps = solution.at.places, solution.at.branch, list[tuple[str, int, int]]()
     for pin in sorted({pin for effect in scene.effects for pin in effect.dry_pins}):
         slip = np.nan_to_num(_slip(solution, pin))
         moving = np.flatnonzero(np.abs(slip) > AT_REST * np.abs(slip).max())
@@ -132,7 +115,7 @@ def _reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Arra
 
 def _largest(at: At, solution: Solution) -> tuple[Array, Branch, set[str]]:
     """Find where each size is largest between positions that it has a local maximum at: places, branches, growing."""
-    over, branch, peaks = _over(solution), _branch(solution), list[tuple[str, int, int, int]]()
+    over, branch, peaks = solution.at.places, solution.at.branch, list[tuple[str, int, int, int]]()
     for name, size in sizes(solution).items():
         known = np.concatenate([[-1.0], np.nan_to_num(size, nan=-1.0, posinf=-1.0), [-1.0]])
         before, here, after = known[:-2], known[1:-1], known[2:]

@@ -110,7 +110,7 @@ def drive_words(scene: Scene) -> str:
 
 def once_round(solution: Solution) -> Any:
     """Whether a sweep goes over whole turns: its last position then repeats the first; of a study (m,)."""
-    angle: Array = getattr(solution, solution.commanded)
+    angle = solution.at.angle
     if angle.shape[-1] == 1:
         return np.zeros(angle.shape[:-1], dtype=bool)
     turns = np.abs(angle[..., -1] - angle[..., 0]) / (2.0 * np.pi)
@@ -188,8 +188,8 @@ DUTY_UNITS = {
 def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty | None:
     """Peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
 
-    E = integral of P dt, dt = d theta/omega of the commanded bar in a sweep; E_in of the positive part of P, E_out of
-    the negative.
+    E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the stroke, in a sweep; E_in of the
+    positive part of P, E_out of the negative.
     Positions without a value are left out, and so are the steps from and to them.
 
     Returns None where no position has a torque or force of the drive: a released linkage, or positions alone.
@@ -224,11 +224,12 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
 
 def _energy(solution: Solution, power: Array) -> tuple[float | None, float | None]:
     """Integrate the positive and the negative part of the power, each over time."""
-    omega = getattr(solution, solution.commanded.replace("theta", "omega"))
+    stroke, bar = solution.at.stroke, solution.at.bar
+    omega = getattr(solution, f"omega_{bar}") if stroke is None else solution.stroke_speed
     if solution.time is not None:
         spans = np.diff(solution.time)
     elif omega is not None and np.all(omega != 0.0):
-        angle = getattr(solution, solution.commanded)
+        angle = solution.at.angle if stroke is None else stroke
         spans = np.abs(np.diff(angle) / np.broadcast_to(omega, power.shape)[..., :-1])
     else:
         return None, None

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +13,11 @@ from fourbar.files.pictures import data_uri
 from fourbar.files.scene_text import BARS
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, OK, PIN_FORCES
-from fourbar.scene import Command, Scene, command, require_input
+from fourbar.scene import Command, Scene, command, command_at
 from fourbar.show.acting import Symbol, acting
 from fourbar.show.duty import energies
 from fourbar.show.plot.style import length_unit
-from fourbar.show.plot.view import over_time, sweep_command
+from fourbar.show.plot.view import on_branch, over_time, sweep_command
 from fourbar.show.tolerances import embedded_tolerances
 from fourbar.solution import SI, Array, Conversion, Solution, nulled
 from fourbar.solve import solve
@@ -47,7 +46,7 @@ def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversio
     for columns in data["branches"].values():
         columns |= {name: nulled(each) for name, each in columns.items() if isinstance(each, np.ndarray)}
     given = {str(number): picture for number, picture in _pictures(scene, pictures).items()}
-    found = embedded_tolerances(scene, data["theta_2"]) if scene.tolerances else None
+    found = embedded_tolerances(scene, data["over"]["values"] or data["theta_2"]) if scene.tolerances else None
     return data | {"pictures": given, "tolerances": found, "toml": _scene_file(scene)}
 
 
@@ -61,7 +60,6 @@ def live_data(
     signs : the branches of a sweep; left out: the scene's.
     stage : the last one evaluated; left out: as of `solve`.
     """
-    require_input(scene, "a page")
     linkage, motion = scene.linkage, scene.motion
     shown = _through_time(scene, stage) if over_time(scene) else _sweep(scene, signs or (motion.branch,), stage)
     closes = np.isfinite(shown["branches"][str(motion.branch)]["theta_3"])
@@ -110,36 +108,49 @@ def _scene_file(scene: Scene) -> str | None:
 
 
 def _sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> dict[str, Any]:
-    """Branches over theta_2."""
+    """Both branches over theta_2, or that of another command over what is commanded."""
     motion = scene.motion
-    swept = sweep_command(scene)
-    where = thinned(swept)
-    own, start = command(scene).theta_2, None
-    if len(own) == 1:
-        start = int(np.argmin(np.abs(np.angle(np.exp(1j * (where.theta_2 - own[0]))))))
+    swept, own = sweep_command(scene), command(scene)
+    where, start, name = thinned(swept), None, swept.commanded
+    if len(own.angle) == 1:
+        away = np.angle(np.exp(1j * (where.angle - own.angle[0]))) if own.stroke is None else where.places - own.places
+        start = int(np.argmin(np.abs(away)))
+    theta_2, branches = where.angle, {}
+    for sign in signs if name == "theta_2" else (motion.branch,):
+        branch = None if motion.through == "follow" else np.full(where.angle.shape, sign, dtype=np.int8)
+        solution = solve(each := on_branch(scene, sign), stage, at=command_at(each, where.places, branch))
+        branches[str(sign)], theta_2 = _columns(solution), solution.theta_2
+    if name != "theta_2":
+        branches[str(motion.branch)]["theta_2"] = theta_2
     return {
         "omega_2": motion.omega_2,
         "alpha_2": motion.alpha_2,
-        "theta_2": where.theta_2.tolist(),
+        "theta_2": nulled(theta_2),
         "time": None,
+        "over": _over(name, name, where.places, motion.speed),
         "rate": None,
         "start": start,
-        "branches": {str(sign): _on_branch(scene, sign, where.theta_2, stage) for sign in signs},
+        "branches": branches,
         "pace": None,
-        "positions": len(swept.theta_2),
+        "positions": len(swept.angle),
     }
+
+
+def _over(name: str, commanded: str, values: Array, speed: float | None = None) -> dict[str, Any]:
+    """Say what curves and slider run over, "time" or what is commanded, with its numbers where it is not theta_2."""
+    own = None if name == "theta_2" else values.tolist()
+    return {"name": name, "commanded": commanded, "values": own, "speed": speed}
 
 
 def _through_time(scene: Scene, stage: str | None) -> dict[str, Any]:
     """Collect the one motion that the scene makes: released, or by a law."""
     whole = solve(scene)
     assert whole.time is not None and whole.omega_2 is not None and whole.alpha_2 is not None
-    where = thinned(Command(whole.theta_2, whole.branch, whole.omega_2, whole.alpha_2, time=whole.time))
+    where = thinned(whole.at)
     assert where.time is not None
     solution = solve(scene, stage, at=where)
-    solution.time = where.time
     columns = _columns(solution)
-    columns["theta_2"] = where.theta_2.tolist()
+    columns["theta_2"] = solution.theta_2.tolist()
     if scene.motion.free is not None:
         for name in ("torque", "torque_error", "power", "drive_force", "drive_force_error"):
             columns.pop(name, None)
@@ -149,8 +160,9 @@ def _through_time(scene: Scene, stage: str | None) -> dict[str, Any]:
     return {
         "omega_2": None,
         "alpha_2": 0.0,
-        "theta_2": where.theta_2.tolist(),
+        "theta_2": nulled(solution.theta_2),
         "time": where.time.tolist(),
+        "over": _over("time", whole.commanded, where.time),
         "rate": rate,
         "start": None,
         "branches": {str(scene.motion.branch): columns},
@@ -161,12 +173,8 @@ def _through_time(scene: Scene, stage: str | None) -> dict[str, Any]:
 
 def thinned(where: Command) -> Command:
     """At most `MAX_ROWS` of the positions, evenly, both ends included."""
-    n = len(where.theta_2)
-    if n <= MAX_ROWS:
-        return where
-    keep = np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int)
-    rows = {name: value[keep] for name, value in where._asdict().items() if isinstance(value, np.ndarray)}
-    return where._replace(**rows)
+    n = len(where.angle)
+    return where if n <= MAX_ROWS else where.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
 
 
 def _rate(duration: float) -> float:
@@ -193,11 +201,6 @@ def _pace_in_time(whole: Solution, rate: float, shown: int) -> str:
     return words + "."
 
 
-def _on_branch(scene: Scene, sign: int, theta_2: Array, stage: str | None) -> dict[str, Any]:
-    own = replace(scene, motion=replace(scene.motion, theta_2=theta_2, branch=sign))
-    return _columns(solve(own, stage))
-
-
 def _columns(solution: Solution) -> dict[str, Any]:
     """Quantity by quantity."""
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
@@ -207,7 +210,7 @@ def _columns(solution: Solution) -> dict[str, Any]:
         values = getattr(solution, name)
         if values is not None:
             columns[name] = values
-    columns["transmission"] = np.arcsin(solution.condition)
+    columns["transmission"] = np.arcsin(np.abs(solution.sin_mu))
     return columns
 
 

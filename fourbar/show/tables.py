@@ -120,11 +120,11 @@ def heading(scene: Scene, solution: Solution, units: Conversion = DEGREES) -> li
         )
     of_drive = driving(solution)
     if scene.motion.speed is None and of_drive.values is None and _acting(scene):
-        static = STATIC.replace("omega_2", omega) if scene.motion.stroke is None else STATIC_STROKE
-        lines.append(f"positions only, since {omega} is left out; {static}")
+        lines.append(f"positions only, since {omega} is left out; {static(scene)}")
     found = between(scene, solution)
     if found is not None and found.reversals:
-        where = ", ".join(f"{value(theta_2, 'rad', units)} ({pin})" for theta_2, pin in found.reversals)
+        unit = UNITS[solution.commanded]
+        where = ", ".join(f"{value(place, unit, units)} ({pin})" for place, pin in found.reversals)
         lines.append(f"dry friction reverses, and the pin forces jump, at {solution.commanded} = {where}")
     if scene.motion.free is None and of_drive.values is not None and np.isfinite(of_drive.values).any():
         peak = solution if found is None else found.solution
@@ -175,8 +175,10 @@ def _motor(solution: Solution, units: Conversion, found: Between | None) -> list
     return lines
 
 
-STATIC = 'omega_2 = "0 rad/s" gives the static torque and pin forces'
-STATIC_STROKE = 'stroke_speed = "0 m/s" gives the static force and pin forces'
+def static(scene: Scene) -> str:
+    """Say what asks for forces where a scene states positions alone."""
+    unit, what = ("rad/s", "torque") if scene.motion.stroke is None else ("m/s", "force")
+    return f'{scene.motion.names[1]} = "0 {unit}" gives the static {what} and pin forces'
 
 
 def _acting(scene: Scene) -> bool:
@@ -205,7 +207,7 @@ def _warning(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
     left = max(math.floor(-math.log10(share[worst])), 0)
     where = f"at theta_2 = {value(solution.theta_2[worst], 'rad', units)}"
     others = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
-    commanded = others[int(solution.commanded[-1])]
+    commanded = others[solution.at.bar]
     sines = {commanded: solution.condition[worst]}
     if scene.drive is not None:
         lever, sine = solution.drive_condition[worst], sines[commanded]

@@ -117,19 +117,20 @@ def _most(found: Tolerances, spread: Spread, at: int) -> str:
     return ", ".join(f"{100.0 * shares[i] / total:.0f} % {found.scene.tolerances[i].key}" for i in order)
 
 
-def embedded_tolerances(scene: Scene, theta_2: list[float]) -> dict[str, Any]:
-    """Collect what a page shows of them at its positions: deviations from the nominal, and shares of the variance.
+def embedded_tolerances(scene: Scene, places: list[float]) -> dict[str, Any]:
+    """Collect what a page shows of them at places of its axis: deviations from the nominal, shares of the variance.
 
     A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so.
     """
-    positions = scene if scene.motion.law else replace(scene, motion=replace(scene.motion, theta_2=np.array(theta_2)))
+    given: dict[str, Any] = {scene.motion.names[0]: np.array(places)}
+    positions = scene if scene.motion.law else replace(scene, motion=replace(scene.motion, **given))
     shown = nullcontext() if scene.motion.free is not None else running("the samples of the tolerances are solved")
     try:
         with shown as progress:
             found = tolerances(positions, PAGE_SAMPLES, progress=progress)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
-    at = np.linspace(0, len(found.theta_2) - 1, len(theta_2)).round().astype(int)  # a law is thinned as in `page_data`
+    at = np.linspace(0, len(found.theta_2) - 1, len(places)).round().astype(int)  # a law is thinned as in `page_data`
 
     def short(values: Array, digits: int) -> list[float | None]:
         return [float(f"{x:.{digits}g}") if math.isfinite(x) else None for x in values[at].tolist()]

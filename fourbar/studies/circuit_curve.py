@@ -14,8 +14,9 @@ from fourbar.formulas.closed_curve import on_curve, transmission
 from fourbar.formulas.mobility import TURN, change_points, turns_fully
 from fourbar.formulas.motion import State
 from fourbar.formulas.position import loop
-from fourbar.scene import Scene, command, require_input
+from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Sweep
+from fourbar.solve import solve
 from fourbar.studies.sloped import Sloped
 
 Array = NDArray[np.float64]
@@ -68,6 +69,15 @@ class _Sizes(Actions):
         self.size = self.size + np.abs(couple) * self.fastest
 
 
+def of_input(scene: Scene) -> Command:
+    """Command the input where the scene's motion has it, which may be one of another bar or of a stroke."""
+    at = command(scene)
+    if at.commanded == "theta_2":
+        return at
+    found = solve(scene, "position", at=at)
+    return Command(found.theta_2[found.assembled], found.branch[found.assembled], None, 0.0)
+
+
 class CircuitCurve:
     """The circuit of a scene: its branches as closed rows of psi = theta_2 - theta_1 and mu = theta_4 - theta_3.
 
@@ -76,21 +86,21 @@ class CircuitCurve:
     """
 
     def __init__(self, scene: Scene) -> None:
-        require_input(scene, "the search for equilibria")
         self.scene, self.case = scene, Case.of(scene)
-        self.case = self.case.with_start(command(scene)) if scene.counts_turns else self.case
-        linkage = scene.linkage
+        at, linkage = of_input(scene), scene.linkage
+        self.case = self.case.with_start(at) if scene.counts_turns else self.case
         self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
         self.ratios = self.case.path.lengths
         """The lengths by a unit near them, of which no product leaves the range of doubles."""
-        at = command(scene)
         number = circuit_of(linkage, at.theta_2, at.branch)
         if (number < 0).all():
-            raise NotAssembledError("motion.theta_2: the linkage assembles at none of the positions requested")
+            raise NotAssembledError(
+                f"motion.{scene.motion.names[0]}: the linkage assembles at none of the positions requested"
+            )
         self.circuit = circuits(linkage)[number[number >= 0][0]]
         self.full = turns_fully(linkage)
         self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
-        stated = isinstance(scene.motion.theta_2, Sweep) or scene.motion.law is not None
+        stated = isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None
         self.sweep = (float(at.theta_2.min()), float(at.theta_2.max())) if stated else None
         self.singular = [
             (point - self.theta_1, 0.0 if point == self.theta_1 else math.pi) for point in change_points(linkage)

@@ -11,6 +11,7 @@ from fourbar.effects import Gravity, PinFriction
 from fourbar.effects.actions import Actions
 from fourbar.effects.cones import solve_sliding
 from fourbar.effects.effect import SolvedFriction
+from fourbar.effects.numbers import OF_SCENE
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.stages import kinematics, of_command
@@ -22,9 +23,10 @@ from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, 
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
+from fourbar.scene.stroke import triangle
 from fourbar.solution import Array, Solution, parts, values_of
 from fourbar.solve import solve
-from fourbar.studies.keys import SceneNumber, angle_key, at_place, entries, placed
+from fourbar.studies.keys import SceneNumber, at_place, command_key, entries, placed
 from fourbar.studies.sloped import Sloped, slopes, values
 from fourbar.writing import between, data_frame, html_table, listed
 
@@ -131,7 +133,8 @@ def sensitivity(scene: Scene) -> Sensitivity:
     """Differentiate every quantity at each position of a scene by each of its numbers.
 
     d(quantity)/d(key), the other numbers held; what the scene leaves out (the inertia of a uniform bar, its centre
-    at mid-bar) follows the length. theta_2 is held too, and "motion.theta_2" is the derivative by it.
+    at mid-bar) follows the length. What is commanded is held too, and "motion.theta_2" (or theta_3, theta_4, stroke) is
+    the derivative by it.
 
     Raises
     ------
@@ -145,22 +148,22 @@ def sensitivity(scene: Scene) -> Sensitivity:
     expect("scene", scene, Scene)
     if scene.motion.free is not None:
         raise InputError("motion.free", "a free motion", "has no sensitivities: they are those of a prescribed theta_2")
-    if scene.motion.stroke is not None:
-        raise InputError("motion.stroke", "a stroke", "has no sensitivities: they are those at angles of a bar")
-    theta = angle_key(scene)
+    theta = command_key(scene)
     if isinstance(scene.motion.angle, FromLimit):
         raise InputError(theta, scene.motion.angle, "has no sensitivities: the limit moves with the lengths")
     at, solution, known = command(scene), solve(scene), entries(scene)
     moving = at.speed is not None
-    keys = {theta: SceneNumber((), "rad")} | (known if moving else {k: e for k, e in known.items() if _of_position(k)})
-    numbers = [np.nan if key == theta else at_place(scene, entry.place) for key, entry in keys.items()]
+    known = {key: entry for key, entry in known.items() if moving or _of_position(key)}
+    keys = {theta: SceneNumber((), OF_SCENE[scene.motion.names[0]])} | known
+    most = np.nan if at.stroke is None else float(at.stroke.max())
+    numbers = [most if key == theta else at_place(scene, entry.place) for key, entry in keys.items()]
     forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")
     names = [
         name
         for name in solution.evaluated()
         if STAGE_OF.get(name, "force") in STAGES[:3]
         or (moving and name in forces)
-        or (name == "theta_2" and at.bar != 2)
+        or (name == "theta_2" and at.commanded != name)
     ]
     names += [f"{start}{p.name}" for p in scene.points for start in (OF_POINTS if moving else ("",))]
     p = len(keys)
@@ -188,7 +191,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
 
 def _of_position(key: str) -> bool:
     """Whether positions depend on a number; the rest comes in with the motion."""
-    return key.startswith(("lengths", "points")) or ".centre." in key
+    return key.startswith(("lengths", "points", "drive")) or ".centre." in key
 
 
 class _Directed(Gravity):
@@ -278,13 +281,20 @@ def _derivatives(
         return Sloped(number, np.zeros((len(keys), 1)))
 
     numbers = (at.angle, at.speed, at.acceleration)
+    if at.stroke is not None:
+        numbers = (at.stroke, scene.motion.speed, scene.motion.acceleration)
     q, speed, acceleration = (
         seeded(f"motion.{name}", number) for name, number in zip(scene.motion.names, numbers, strict=True)
     )
+    if at.stroke is not None:
+        turned = triangle(scene.linkage, scene.drive).turned(q, speed, acceleration, scene.motion.side)
+        q, speed, acceleration, lever = turned
     case, branch = Case.of(scene, at.bar), at.branch[index].astype(float)
     position = _position(case.path, q, branch)
     state = case.state(case.path, q, position, branch, speed, acceleration, moving=moving)
     found = kinematics(case, state, names) | of_command(case, position, state, q)
+    if at.stroke is not None:
+        found |= {"theta_2": state.theta_2, "condition": found["condition"] * lever}
     held = np.zeros(len(index), dtype=bool)
     if moving:
         actions = Actions(state, case.bodies)

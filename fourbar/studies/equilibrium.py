@@ -23,11 +23,11 @@ from fourbar.formulas.mobility import MARGIN, TURN, default_range, turns_fully
 from fourbar.formulas.position import Loop
 from fourbar.formulas.torque import inertia
 from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene
 from fourbar.scene.motion import DEFAULT_STEPS
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar.studies.circuit_curve import SAMPLES, Array, CircuitCurve, RestPosition, generalised_force
+from fourbar.studies.circuit_curve import SAMPLES, Array, CircuitCurve, RestPosition, generalised_force, of_input
 from fourbar.studies.derivatives import differentiable
 from fourbar.studies.holding import HALVINGS, CircuitRange, holds, lies_in, moves, ranges
 from fourbar.studies.interval import KNOWN
@@ -84,9 +84,9 @@ def equilibrium(scene: Scene) -> Equilibria:
     """Find the positions in which a linkage stays by itself, whether they are stable, and what holds the others.
 
     On the circuit of the scene's first position that assembles, on both branches where it has both, within the sweep
-    of theta_2 if one is stated (or the angles of its motion law). Speed, acceleration and drive of the scene play no
-    part, viscous damping none either. With python-flint (extra "exact") and gravity, springs and constant loads alone
-    the equilibria are proven to be all.
+    of theta_2 if one is stated (or that of its motion law, or of the command of another bar or a stroke). Speed,
+    acceleration and drive of the scene play no part, viscous damping none either. With python-flint (extra "exact") and
+    gravity, springs and constant loads alone the equilibria are proven to be all.
 
     Raises
     ------
@@ -122,12 +122,12 @@ def equilibrium(scene: Scene) -> Equilibria:
 
 def _at_rest(scene: Scene, circuit: Circuit) -> Solution:
     """Solve the scene's positions at rest; of a single one, or a released linkage, those of the circuit."""
-    at = command(scene)
+    at = of_input(scene)
     if len(at.theta_2) == 1:
         low, high = default_range(scene.linkage) if turns_fully(scene.linkage) else circuit.theta_2
         margin = 0.0 if turns_fully(scene.linkage) else min(MARGIN, 0.25 * (high - low))
         theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
-        at = Command(theta_2, np.full(theta_2.shape, scene.motion.branch, dtype=np.int8), 0.0, 0.0)
+        at = Command(theta_2, np.full(theta_2.shape, at.branch[0], dtype=np.int8), 0.0, 0.0)
     return solve(scene, "force", at=Command(at.theta_2, at.branch, 0.0, 0.0, at.remainder))
 
 

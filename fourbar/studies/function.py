@@ -15,7 +15,7 @@ from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, O
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
-from fourbar.studies.keys import angle_key, at_place, entries, refusal, with_numbers
+from fourbar.studies.keys import at_place, command_key, entries, refusal, with_numbers
 
 NO_DIGIT_LEFT, UNDECIDED = 8.0, 16.0
 """Times the spacing of the numbers at 1: of |sin mu|, and of what decides whether the loop closes, as `solve` has them
@@ -69,7 +69,7 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
             expect(name, each, str)
         if len(set(names)) < len(names) or not names:
             raise InputError(name, names, "must be one or more, each once")
-    known, theta, motion = entries(scene), angle_key(scene), scene.motion
+    known, theta, motion = entries(scene), command_key(scene), scene.motion
     for key in keys:
         if key not in (*known, theta):
             raise refusal(key, "a key", [*known, theta])
@@ -225,7 +225,7 @@ def _refuse_untraceable(scene: Scene, keys: Sequence[str]) -> None:
             raise InputError(f"loads.{index}.table", load.table.theta_2, "must cover a whole turn to be traced")
     if motion.through == "follow" and change_points(scene.linkage):
         raise InputError("motion.through", motion.through, 'cannot be traced through change points: "sign" can')
-    theta = angle_key(scene)
+    theta = command_key(scene)
     if theta in keys:
         if motion.law is not None:
             raise InputError(theta, "a key", "is that of the scene's motion law")

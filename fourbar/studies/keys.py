@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fourbar.effects.numbers import ANY, AT_LEAST_ZERO, OF_EFFECT, POSITIVE, ROWS
+from fourbar.effects.numbers import ANY, AT_LEAST_ZERO, OF_EFFECT, POSITIVE, ROWS, unit_of
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import namespace, polar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 
-ANGLE_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4")
-"""Of the commanded angle."""
+COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
+"""Of what is commanded."""
 SAME_FOR_ALL = (
     *("title", "source", "drive", "bar", "branch", "through", "free", "law", "frame", "table", "picture"),
     *("from", "to", "steps", "limit", "offset"),
@@ -39,17 +39,23 @@ class SceneNumber(NamedTuple):
         return namespace(values).isfinite(values) & low
 
 
-def _pair(key: str, place: Place, unit: str, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, SceneNumber]:
+def _entry(key: str, place: Place, bound: str = ANY) -> dict[str, SceneNumber]:
+    """Make the entry of a number."""
+    unit = unit_of(key)
+    assert unit is not None, key
+    return {key: SceneNumber(place, unit, bound)}
+
+
+def _pair(key: str, place: Place, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, SceneNumber]:
     """Make the two entries of a magnitude with its angle."""
-    one, other = ((*place, name) for name in names)
-    return {f"{key}.0": SceneNumber(one, unit), f"{key}.1": SceneNumber(other, "rad")}
+    return _entry(f"{key}.0", (*place, names[0])) | _entry(f"{key}.1", (*place, names[1]))
 
 
 def _of_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of an effect under its key, at its place."""
     numbers = OF_EFFECT.get(effect.key, {})
     if effect.key == "gravity":
-        return _pair(key, place, numbers["magnitude"][0], ("magnitude", "angle"))
+        return _pair(key, place, ("magnitude", "angle"))
     if effect.key in ROWS:
         field = ROWS[effect.key]
         return {
@@ -70,43 +76,42 @@ def _of_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
 def _of_ends(key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of both ends of a line between two bars."""
     one, other = (
-        _pair(f"{key}.{name}.at", (*place, end), "m", ("distance", "angle"))
+        _pair(f"{key}.{name}.at", (*place, end), ("distance", "angle"))
         for name, end in (("from", "start"), ("to", "end"))
     )
     return one | other
 
 
 def entries(scene: Scene) -> dict[str, SceneNumber]:
-    """List the numbers of a scene that a study varies, lengths first, by key; the commanded angle is not among them."""
-    found = {"lengths.ground": SceneNumber(("linkage", "ground"), "m", POSITIVE)}
+    """List the numbers of a scene that a study varies, lengths first, by key; what is commanded is not among them."""
+    found = _entry("lengths.ground", ("linkage", "ground"), POSITIVE)
     bars = [BAR_NAMES[number] for number in MOVING_BARS]
-    found |= {f"lengths.{name}": SceneNumber(("linkage", name, "length"), "m", POSITIVE) for name in bars}
-    found["lengths.ground_angle"] = SceneNumber(("linkage", "ground_angle"), "rad")
     for name in bars:
-        own: Place = ("linkage", name)
-        found[f"bars.{name}.mass"] = SceneNumber((*own, "mass"), "kg", AT_LEAST_ZERO)
-        found[f"bars.{name}.inertia"] = SceneNumber((*own, "inertia"), "kg m^2", AT_LEAST_ZERO)
-        found |= _pair(f"bars.{name}.centre", (*own, "centre"), "m")
-    if scene.motion.law is None and scene.motion.stroke is None:
-        _, omega, alpha = scene.motion.names
-        found[f"motion.{omega}"] = SceneNumber(("motion", omega), "rad/s")
-        found[f"motion.{alpha}"] = SceneNumber(("motion", alpha), "rad/s^2")
+        found |= _entry(f"lengths.{name}", ("linkage", name, "length"), POSITIVE)
+    found |= _entry("lengths.ground_angle", ("linkage", "ground_angle"))
+    for name in bars:
+        for number in ("mass", "inertia"):
+            found |= _entry(f"bars.{name}.{number}", ("linkage", name, number), AT_LEAST_ZERO)
+        found |= _pair(f"bars.{name}.centre", ("linkage", name, "centre"))
+    if scene.motion.law is None:
+        for name in scene.motion.names[1:]:
+            found |= _entry(f"motion.{name}", ("motion", name))
     if scene.drive is not None:
         found |= _of_ends("drive", ("drive",))
     for index, load in enumerate(scene.loads):
         if load.force is not None:
-            found |= _pair(f"loads.{index}.force", ("loads", index, "force"), "N")
-            found |= _pair(f"loads.{index}.at", ("loads", index, "at"), "m")
-        found[f"loads.{index}.moment"] = SceneNumber(("loads", index, "moment"), "N m")
+            found |= _pair(f"loads.{index}.force", ("loads", index, "force"))
+            found |= _pair(f"loads.{index}.at", ("loads", index, "at"))
+        found |= _entry(f"loads.{index}.moment", ("loads", index, "moment"))
     for index, point in enumerate(scene.points):
-        found |= _pair(f"{point.key}.from_pin", ("points", index, "from_pin"), "m")
+        found |= _pair(f"{point.key}.from_pin", ("points", index, "from_pin"))
     for index, effect in enumerate(scene.effects):
         found |= _of_effect(effect, f"effects.{effect.key}", ("effects", index))
     return found
 
 
-def angle_key(scene: Scene) -> str:
-    """Return the key of the commanded angle."""
+def command_key(scene: Scene) -> str:
+    """Return the key of what is commanded."""
     return f"motion.{scene.motion.names[0]}"
 
 

@@ -21,7 +21,7 @@ from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import require_whole
 from fourbar.quantities import OK
-from fourbar.scene import Command, Scene, command, require_input
+from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Sweep
 from fourbar.solution import Array
 from fourbar.solve import solve
@@ -91,7 +91,6 @@ def ratio(scene: Scene, degree: int = MOST) -> GearRatio:
         does not assemble, or stands at a limit of the input, somewhere in the range.
     """
     expect("scene", scene, Scene)
-    require_input(scene, "the ratio over theta_2")
     degree = require_whole("degree", degree, range(1, MOST + 1), f"must be 1 to {MOST}")
     for term in scene.effects:
         if term.loaded_pins:
@@ -125,6 +124,14 @@ def ratio(scene: Scene, degree: int = MOST) -> GearRatio:
 def _over_range(scene: Scene) -> Command:
     """Positions of the range, with the scene's speed and acceleration; at rest where it states none."""
     at = command(scene)
+    if at.commanded != "theta_2":
+        found = solve(scene, "position" if at.speed is None else "acceleration", at=at)
+        turning = np.diff(found.theta_2)
+        if (found.status_code != OK).any() or not ((turning > 0.0).all() or (turning < 0.0).all()) or len(turning) < 1:
+            allowed = "must be a range over which theta_2 rises or falls throughout, as a mimic joint is of theta_2"
+            raise InputError(f"motion.{at.commanded}", scene.motion.angle, allowed)
+        speed, acceleration = (0.0 if rate is None else rate for rate in (found.omega_2, found.alpha_2))
+        return Command(found.theta_2, found.branch, speed, acceleration)
     if scene.motion.law is not None:
         return at
     if isinstance(scene.motion.theta_2, Sweep):
@@ -153,7 +160,7 @@ def _fitted(case: Case, state: State, at: Command, angles: tuple[Array, Array], 
     about, half = 0.5 * (low + high), 0.5 * (high - low)
     x = at.theta_2 - about
     # weighted as by Chebyshev's nodes, which makes the greatest error nearly the least one possible
-    weight = 1.0 / np.sqrt(np.sqrt(np.maximum(1.0 - (x / half) ** 2, 1.0 / SAMPLES)))
+    weight = np.sqrt(np.abs(np.gradient(x)) / np.sqrt(np.maximum(1.0 - (x / half) ** 2, 1.0 / SAMPLES)))
     joint_A, output = (
         Chebyshev.fit(x, angle, degree, domain=[-half, half], w=weight).convert(kind=Polynomial) for angle in angles
     )

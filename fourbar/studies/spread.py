@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, expect, installing
-from fourbar.quantities import ANGLES, NOT_ASSEMBLED, PIN_FORCES
+from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.solution import Array, parts, values_of
 from fourbar.solve import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
-from fourbar.studies.keys import LEFT_OUT, angle_key, at_place, entries, left_out, refusal
+from fourbar.studies.keys import LEFT_OUT, at_place, command_key, entries, left_out, refusal
 from fourbar.studies.study import Study, vary
 from fourbar.writing import between, data_frame, extent, html_table, listed
 
@@ -165,7 +165,7 @@ def tolerances(
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
         for name in names:
             number = values_of(solution, name)[:, -width:]
-            if name in ANGLES:  # each member counts its turns from its own first position
+            if name.startswith("theta_"):  # each member counts its turns from its own first position
                 turns = np.rint((number - values[name][name][columns]) / (2 * np.pi))
                 number = number - 2 * np.pi * turns
             for part, sampled in parts(name, number).items():
@@ -194,7 +194,7 @@ def _members(scene: Scene, samples: int, seed: int) -> Study:
         change = norm.ppf(inside) if tolerance.sigma else 2.0 * column - 1.0
         numbers[tolerance.key] = at_place(scene, entry.place) + tolerance.width * change
     if scene.motion.law is None:
-        numbers[angle_key(scene)] = command(scene).angle
+        numbers[command_key(scene)] = command(scene).places
     return vary(scene, numbers)
 
 

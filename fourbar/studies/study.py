@@ -7,18 +7,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import InputError, LimitError, expect
+from fourbar.effects.numbers import unit_of
+from fourbar.errors import InputError, expect
 from fourbar.evaluation.blocks import each, evaluation, is_compiled, keep, positions_at_once
 from fourbar.evaluation.case import BLOCK, Case
 from fourbar.evaluation.stages import FORCE
 from fourbar.formulas.mobility import on_smooth_path
 from fourbar.formulas.position import lengths_read_from, loop
-from fourbar.quantities import ANGLES, INVALID
+from fourbar.linkage import in_unit
+from fourbar.quantities import ANGLES, INVALID, NOT_ASSEMBLED
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
+from fourbar.scene.stroke import triangle
 from fourbar.solution import Array, Solution
 from fourbar.solve import arrays, requested, solved, unwrap_angles
-from fourbar.studies.keys import ANGLE_KEYS, angle_key, entries, placed, refusal, with_numbers
+from fourbar.studies.keys import COMMAND_KEYS, command_key, entries, placed, refusal, with_numbers
 from fourbar.writing import extent, listed
 
 if TYPE_CHECKING:
@@ -47,7 +50,7 @@ class Study:
 
     def __repr__(self) -> str:
         """Say what varies."""
-        return f"Study {self.scene.title!r}: {extent(self.at.theta_2)}\n" + listed("varied", self.values)
+        return f"Study {self.scene.title!r}: {extent(self.at.angle)}\n" + listed("varied", self.values)
 
     def solved(
         self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0, compiled: bool | None = None
@@ -74,6 +77,7 @@ class Study:
             unwrap_angles({name: result[name][rows] for name in ("theta_2", *ANGLES) if name in result}, at.bar)
 
         each(evaluate, list(_parts(len(self), max(1, size // shape[1]))), at_once=quick)
+        code[np.isnan(at.angle)] = NOT_ASSEMBLED  # the cylinder cannot have the stroke
         code[self.invalid] = INVALID
         for array in result.values():
             array[self.invalid] = np.nan
@@ -94,8 +98,7 @@ class Study:
                 return value
             return _repeated(value[rows, 0], count) if value.shape[1] == 1 else value[rows, columns].ravel()
 
-        angle, branch, speed, acceleration = (flat(value) for value in self.at[:4])
-        return Command(angle, branch, speed, acceleration, bar=self.at.bar)
+        return Command(*(flat(value) for value in self.at))
 
     def _members(self, rows: slice, count: int, scene: Scene) -> Scene:
         """Make the scene of some members whose numbers are arrays, each repeated for `count` positions."""
@@ -148,10 +151,11 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
 
     Parameters
     ----------
-    values : arrays of one length m, or single numbers, SI and rad, by keys as in the scene file: lists by index
-        ("loads.0.moment"), pairs likewise ("bars.coupler.centre.0"). "motion.theta_2" (or theta_3, theta_4, where that
-        is commanded) is (n,), for all members, or (m, n); a scene that states no angles needs it. What the scene leaves
-        out (the inertia of a uniform bar, its centre at mid-bar) follows the length of each member.
+    values : arrays of one length m, or single numbers, SI and rad or texts like "48 cm", by keys as in the
+        scene file: lists by index ("loads.0.moment"), pairs likewise ("bars.coupler.centre.0"). "motion.theta_2" (or
+        theta_3, theta_4, stroke, where that is commanded) is (n,), for all members, or (m, n); a scene that states none
+        needs it. What the scene leaves out (the inertia of a uniform bar, its centre at mid-bar) follows the length of
+        each member.
 
     Raises
     ------
@@ -165,12 +169,10 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     [['ok'], ['ok'], ['not_assembled']]
     """
     expect("scene", scene, Scene)
-    if scene.motion.stroke is not None:
-        raise LimitError("motion.stroke: a study varies linkages at angles of a bar, not at strokes")
     expect("values", values, Mapping)
     if scene.motion.free is not None:
         raise InputError("motion.free", "a free motion", "is integrated for one linkage; a study prescribes theta_2")
-    known, theta = entries(scene), angle_key(scene)
+    known, theta = entries(scene), command_key(scene)
     given = {key: _numbers(key, value, [*known, theta]) for key, value in values.items()}
     angles = _angles(scene, given, theta)
     sizes = {key: array.size for key, array in given.items() if key != theta and array.size != 1}
@@ -187,6 +189,7 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         invalid = invalid | ~known[key].holds(array)
     numbers = {key: np.where(invalid, np.nan, array) for key, array in numbers.items()}
     angle = np.broadcast_to(angles, (m, angles.shape[1]))
+    stroke = lever = None
     motion: Any = scene.motion if scene.motion.law is None else command(scene)
     speed, acceleration = (
         numbers.pop(f"motion.{name}")[:, None] if f"motion.{name}" in numbers else number
@@ -194,8 +197,13 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     )
     if scene.motion.law is not None:
         speed, acceleration = (np.broadcast_to(value, angle.shape) for value in (speed, acceleration))
-    branch = _branches(scene, numbers, angles, m)
-    return Study(scene, numbers, invalid, Command(angle, branch, speed, acceleration, bar=scene.motion.bar))
+    if scene.motion.stroke is not None:
+        varied = with_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
+        own, stroke = triangle(varied.linkage, varied.drive), angle
+        angle, speed, acceleration, lever = own.turned(stroke, speed, acceleration, scene.motion.side)
+    branch = _branches(scene, numbers, angles if stroke is None else angle, m)
+    at = Command(angle, branch, speed, acceleration, bar=scene.motion.bar, stroke=stroke, lever=lever)
+    return Study(scene, numbers, invalid, at)
 
 
 def _branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:
@@ -220,12 +228,12 @@ def _numbers(key: str, value: Any, known: list[str]) -> Array:
     if key not in known:
         raise refusal(key, _shown(value), known)
     try:
-        array = np.asarray(value)
+        array = np.asarray(in_unit(key, value, unit_of(key) or "1"))
     except ValueError:  # rows of different lengths
         raise InputError(key, "a ragged list", "must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or array.size == 0:
         raise InputError(key, _shown(value), "must be an array of numbers, at least one")
-    most = 2 if key in ANGLE_KEYS else 1
+    most = 2 if key in COMMAND_KEYS else 1
     if array.ndim > most:
         allowed = "must have the shape (n,) or (m, n)" if most == 2 else "must have the shape (m,)"
         raise InputError(key, f"shape {array.shape}", allowed)
@@ -246,4 +254,5 @@ def _angles(scene: Scene, given: Mapping[str, Array], key: str) -> Array:
         return np.atleast_2d(given[key])
     if motion.law is None and (motion.angle is None or isinstance(motion.angle, FromLimit)):
         raise InputError(key, motion.angle, "depends on the linkage; a study states it: (n,) or (m, n) angles")
-    return command(scene).angle[None, :]
+    at = command(scene)
+    return (at.angle if at.stroke is None else at.stroke)[None, :]

@@ -94,15 +94,11 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
         assert "followed for 500 steps" in printed and not out.exists()
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
     (tmp_path / "released.toml").write_text(RELEASED)
     command = [sys.executable, "-m", "fourbar", "analyze", str(tmp_path / "released.toml")]
-    with subprocess.Popen(
-        command,
-        stderr=subprocess.PIPE,
-        # a job in the background inherits SIGINT ignored; no other thread runs here
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
-    ) as running:
+    with subprocess.Popen(command, stderr=subprocess.PIPE) as running:
         time.sleep(5.0)
         assert running.poll() is None
         running.send_signal(signal.SIGINT)

@@ -222,8 +222,6 @@ def start(
         stdout=subprocess.DEVNULL,
         stderr=stderr,
         start_new_session=True,
-        # a job in the background inherits SIGINT ignored; no other thread runs here
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
     )
 
 
@@ -243,6 +241,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.timeout(120 + 20 * KILLS)
 def test_whatever_ended_it_a_rerun_goes_on_and_ends_with_the_same_bytes(tmp_path: Path, undisturbed: Path) -> None:
     """Interrupted, killed at random moments and met with a full disk, one after the other in one folder."""

@@ -32,7 +32,7 @@ from tests.support.scenes import crank_rocker
 
 PAGE = (Path(__file__).parents[2] / "docs" / "results-format.md").read_text()
 NOT_QUANTITIES = (
-    *("title", "drive", "drive_bar", "status_code", "branch", "ground", "stopped_at", "commanded"),
+    *("title", "drive", "drive_bar", "status_code", "branch", "ground", "stopped_at", "at"),
     *("points", "velocity", "acceleration"),
 )
 OF_A_SCENE = ("assembled", "undecided", "torque_inertia", "drive_force_inertia")

@@ -3,6 +3,7 @@ parts.acting = make(picture, "g", { id: "acting" });
 picture.insertBefore(parts.acting, parts.forces);
 parts.under = make(picture, "g", { id: "under" });   // springs, and what sits in the pins: it hides no bar
 picture.insertBefore(parts.under, parts.bars[2]);
+const BARREL = 0.85;   // of the shortest stroke of the sweep; the rod comes out of it
 const COILS = 7, OPENING = 250 / DEG, RINGS = { viscous: 1.5, friction: 1.8, pin_friction: 1.8, flywheel: 4 };
 const sizeOf = () => view.width < 480 ? 7 : 9;   // of a symbol, px
 
@@ -81,8 +82,11 @@ function drawActing(p, i) {
       for (const [x, y] of [a, b]) make(parts.acting, "circle", { class: "act-head act-spring", cx: x, cy: y, r: 3 });
     } else if (one.kind === "cylinder") {
       const a = toScreen(framed(p, one.bar, one.at)), b = toScreen(framed(p, ...one.end)), on = share => [0, 1].map(j => a[j] + share * (b[j] - a[j]));
+      const barrel = Math.min(0.95, BARREL * view.k * Math.min(...table().stroke.filter(s => s !== null)) / Math.hypot(b[0] - a[0], b[1] - a[1]));
       make(parts.acting, "path", { class: "act act-drive", d: pathOf([a, b]) });
-      make(parts.acting, "path", { class: "act act-drive barrel", d: pathOf([on(0.1), on(0.6)]) });
+      make(parts.acting, "path", { class: "act act-drive barrel", d: pathOf([on(0.1 * barrel), on(barrel)]) });
+      const [x, y] = on(0.5 * barrel), away = 12 / Math.hypot(b[0] - a[0], b[1] - a[1]);
+      named(one.name, x + away * (b[1] - a[1]), y - away * (b[0] - a[0]));
       for (const [x, y] of [a, b]) make(parts.acting, "circle", { class: "act-head act-drive", cx: x, cy: y, r: 3 });
     } else if (one.kind === "force") {
       const foot = forceFoot(p, one), angle = one.turns ? { 2: p.theta2, 3: p.theta3, 4: p.theta4 }[one.bar] : 0;

@@ -2,7 +2,7 @@
 const angle = (name, label) => [name, `${label}, deg`, DEG], other = (name, label, si) => [name, `${label}, ${nameOf(si)}`, inUnit(si, 1)];
 const INPUT = () => [angle("theta_2", "\u03b8\u2082"), other("omega_2", "\u03c9\u2082", "rad/s"), other("alpha_2", "\u03b1\u2082", "rad/s^2")];
 const quantitiesOf = () => [
-  ...throughTime ? INPUT() : [],
+  ...single() ? INPUT() : [],
   angle("theta_3", "\u03b8\u2083"), angle("theta_4", "\u03b8\u2084"),
   other("omega_3", "\u03c9\u2083", "rad/s"), other("omega_4", "\u03c9\u2084", "rad/s"),
   other("alpha_3", "\u03b1\u2083", "rad/s^2"), other("alpha_4", "\u03b1\u2084", "rad/s^2"),
@@ -34,11 +34,10 @@ function chartFrame(chart, low, high) {
   const width = Math.max(280, chart.parentElement.clientWidth || picture.parentElement.clientWidth), height = 170, left = 62, bottom = 26;
   chart.replaceChildren();
   set(chart, { viewBox: `0 0 ${width} ${height}` });
-  const over = timed() ? data.time : grid, first = over[0], span = over[over.length - 1] - first || 1;
+  const { values: over, factor, sign } = axis(), first = over[0], span = over[over.length - 1] - first || 1;
   const x = t => left + (width - left - 12) * (t - first) / span, y = v => 10 + (height - 10 - bottom) * (high - v) / (high - low);
-  const most = Math.max(3, width / 75), decade = 10 ** Math.floor(Math.log10(span / most));
-  const [factor, sign] = timed() ? [1, " s"] : [DEG, "\u00b0"];
-  const step = timed() ? [1, 2, 5, 10].map(m => m * decade).find(d => span / d <= most) : [15, 30, 45, 60, 90, 180].find(d => span * DEG / d <= most) ?? 360;
+  const most = Math.max(3, width / 75), wide = Math.abs(span) * factor, decade = 10 ** Math.floor(Math.log10(wide / most));
+  const step = (factor === DEG ? [15, 30, 45, 60, 90, 180] : [1, 2, 5, 10].map(m => m * decade)).find(d => wide / d <= most) ?? 360;
   for (let n = Math.ceil(first * factor / step - 1e-9); n * step <= (first + span) * factor + 1e-9 * step; n++) {
     const at = x(n * step / factor), shown = String(Number((n * step).toPrecision(12)));
     make(chart, "line", { class: "axis", x1: at, x2: at, y1: 10, y2: height - bottom });
@@ -56,7 +55,7 @@ function chartFrame(chart, low, high) {
 // The curves of the data shown, as they stay when other data are.
 function captured(name) {
   const values = Object.fromEntries(QUANTITIES.filter(q => q[0] in table() || /^[va]_/.test(q[0]) && "omega_3" in table()).map(q => [q[0], column(q[0])]));
-  return { name, over: throughTime ? data.time : grid, throughTime, values };
+  return { name, over: axis().values, axis: axis().name, values };
 }
 const peakOf = values => values.reduce((most, v) => Math.abs(v) > Math.abs(most) ? v : most, 0);
 function comparison(name, values) {
@@ -73,7 +72,7 @@ function drawChart() {
   const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => ["torque", "drive_force"].includes(q[0])) ?? available[0])[0];
   select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
   const values = column(wanted);
-  const behind = reference?.throughTime === timed() ? reference.values[wanted] ?? [] : [];
+  const behind = reference?.axis === axis().name ? reference.values[wanted] ?? [] : [];
   const limit = wanted.startsWith("theta") ? { cut: false } : ceiling([...values, ...behind]), finite = [...values, ...behind].filter(Number.isFinite);
   let low = Math.min(...finite), high = Math.max(...finite);
   if (limit.cut) { low = Math.max(low, -limit.top); high = Math.min(high, limit.top); }

@@ -86,7 +86,7 @@ function show(about, own) {
   const theta = own?.theta ?? grid[row], same = about.data.theta_2.length === grid.length && about.data.theta_2[0] === grid[0] && about.data.theta_2[grid.length - 1] === grid[grid.length - 1];
   const keep = row;
   adopt(about.data);
-  row = same && own?.theta == null ? keep : throughTime ? Math.min(keep, grid.length - 1) : nearest(theta);
+  row = same && own?.theta == null ? keep : single() ? Math.min(keep, grid.length - 1) : nearest(theta);
   if (!playing) phase = row;
   furnish();
   refresh();
@@ -113,7 +113,7 @@ function showPositions() {
   const body = byId("positions").tBodies[0], t = table(), names = COLUMNS.filter(name => name in t);
   if (!byId("table-of").open) return;
   const factor = si => si === "rad" ? DEG : inUnit(si, 1), unitName = si => si === "rad" ? "deg" : nameOf(si);
-  const heads = ["\u03b8\u2082, deg", ...throughTime ? ["time, s"] : [], ...names.map(name => LABELS[name] ? `${LABELS[name][0]}, ${unitName(LABELS[name][1])}` : `|${typeset(name)}|, ${nameOf("N")}`)];
+  const heads = ["\u03b8\u2082, deg", ...single() ? [`${AXES[data.over.name].join(" ").toLowerCase()},${axis().factor === DEG ? " deg" : axis().sign}`] : [], ...names.map(name => LABELS[name] ? `${LABELS[name][0]}, ${unitName(LABELS[name][1])}` : `|${typeset(name)}|, ${nameOf("N")}`)];
   byId("positions").tHead.replaceChildren(element("tr", {}, ...heads.map(head => element("th", { scope: "col", textContent: head }))));
   const every = Number(byId("every").value), rows = grid.map((_, i) => i).filter(i => i % every === 0 || i === grid.length - 1);
   while (body.rows.length > rows.length) body.deleteRow(-1);
@@ -121,8 +121,8 @@ function showPositions() {
     const at = body.rows[n] ?? rowOf(body);
     at.dataset.row = i;
     const texts = names.map(name => { const v = t[name][i]; return Array.isArray(v) ? text(v[0] === null ? null : inUnit("N", Math.hypot(...v))) : text(v === null ? null : v * factor(LABELS[name][1]), name.endsWith("_error") ? 2 : 5); });
-    at.cells[0].firstChild.textContent = (grid[i] * DEG).toFixed(2);
-    if (throughTime) texts.unshift(data.time[i].toFixed(clock));
+    at.cells[0].firstChild.textContent = grid[i] === null ? "\u2013" : (grid[i] * DEG).toFixed(2);
+    if (single()) texts.unshift((axis().values[i] * axis().factor).toFixed(timed() ? clock : 2));
     while (at.cells.length > texts.length + 1) at.deleteCell(-1);
     texts.forEach((shown, k) => { (at.cells[k + 1] ?? at.insertCell()).textContent = shown; });
   });
@@ -155,7 +155,7 @@ for (const name of ["undo", "redo", "save", "keep", "check", "stop"]) press(name
 press("overwrite", () => { byId("ask").hidden = true; return { do: "save", over: true }; });
 press("apply", () => ({ do: "text", text: byId("file-text").value }));
 press("export", () => ({ do: "export", format: byId("format").value }));
-press("bodies", () => ({ do: "bodies", theta_2: grid[row] }));
+press("bodies", () => ({ do: "bodies", position: timed() ? valuesAt(row)[data.over.commanded] : axis().values[row] }));
 byId("reference").addEventListener("change", event => ask({ do: "refer", to: event.target.value }));
 byId("units").addEventListener("change", event => ask({ do: "units", units: event.target.value }));
 byId("every").addEventListener("change", showPositions);

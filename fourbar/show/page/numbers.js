@@ -21,9 +21,15 @@ let row = data.start, phase = row, playing = false, lastTime = null, lastDraw = 
 let view = { width: 0, height: 0, k: 1, x: 0, y: 0 }, forceScale = { top: 0, cut: false };
 
 const timed = () => throughTime && !edited;   // edited lengths are swept over the angle
-const table = () => data.branches[throughTime ? data.branch : branch];
+const single = () => data.over.name !== "theta_2";   // one motion, over time or what is commanded, of one branch
+const table = () => data.branches[single() ? data.branch : branch];
+const AXES = { theta_2: ["Input angle", "\u03b8\u2082"], theta_3: ["Coupler angle", "\u03b8\u2083"], theta_4: ["Output angle", "\u03b8\u2084"], stroke: ["Cylinder", "stroke"], time: ["Time", "t"] };
+const axis = () => {   // what curves and slider run over
+  const name = edited ? "theta_2" : data.over.name, [factor, sign] = { time: [1, " s"], stroke: [unit.factor, ` ${unit.name}`] }[name] ?? [DEG, "\u00b0"];
+  return { name, factor, sign, values: edited ? grid : data.over.values ?? grid };
+};
 const signAt = i => edited ? branch : table().sign[Math.min(i, grid.length - 1)];
-const at = i => closeLoop(lengths, data.theta_1, grid[i], signAt(i));
+const at = i => grid[i] === null ? null : closeLoop(lengths, data.theta_1, grid[i], signAt(i));
 const shows = name => !edited && name in table(), dynamic = () => shows("F12");
 
 // ---- numbers -------------------------------------------------------------------------------
@@ -77,7 +83,7 @@ function pointMotion(i, [, bar, from]) {
 // Show other data from now on.
 function adopt(next) {
   data = next; unit = data.unit; lengths = data.lengths.slice(); edited = false; branch = data.branch; grid = data.theta_2;
-  throughTime = data.time !== null; direction = data.omega_2 < 0 ? -1 : 1; POINTS = pointsOf();
+  throughTime = data.time !== null; direction = data.over.speed < 0 ? -1 : 1; POINTS = pointsOf();
   clock = throughTime ? Math.max(2, 3 - Math.floor(Math.log10(data.time[data.time.length - 1] || 1))) : 0;   // decimals of a second
 }
 adopt(data);
@@ -94,6 +100,7 @@ function showNumbers(i) {
   byId("mu").textContent = degrees(across);
   byId("torque").textContent = text(inUnit("N m", v.torque));
   byId("drive_force").textContent = text(inUnit("N", v.drive_force));
+  byId("stroke").textContent = text(v.stroke * unit.factor);
   byId("torque-error").textContent = Number.isFinite(v.torque_error) ? `give or take ${text(inUnit("N m", v.torque_error), 2)}` : "";
   byId("energy").textContent = text(inUnit("J", v.energy));
   if (dynamic()) {
@@ -105,17 +112,18 @@ function showNumbers(i) {
       byId(`${name}_angle`).textContent = known ? (Math.atan2(f[1], f[0]) * DEG).toFixed(2).replace("-", "\u2212") : "\u2013";
     }
   }
-  const assembled = at(i) !== null, singular = assembled && Math.abs(at(i).sinMu) < 8 * Number.EPSILON;
+  const assembled = at(i) !== null, singular = assembled && (single() && !edited ? v.status === "singular" : Math.abs(at(i).sinMu) < 8 * Number.EPSILON);
   const status = byId("status");
-  status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? "Coupler and output are in line: velocities have no value here." : REASONS[v.status] || "";
+  status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? single() && !timed() ? "What is commanded decides no velocities here: they have no value." : "Coupler and output are in line: velocities have no value here." : REASONS[v.status] || "";
   status.hidden = status.textContent === "";
   byId("theta").value = i;
-  const here = `${(grid[i] * DEG).toFixed(2)}\u00b0`.replace("-", "\u2212"), instant = timed() ? data.time[i].toFixed(clock) : "";
-  byId("theta-text").textContent = timed() ? `${instant} s` : here;
-  byId("theta").setAttribute("aria-valuetext", timed() ? `${instant} seconds` : `${(grid[i] * DEG).toFixed(2)} degrees`);
+  const over = axis(), written = (over.values[i] * over.factor).toFixed(timed() ? clock : 2), spoken = { " s": " seconds", "\u00b0": " degrees" }[over.sign] ?? over.sign;
+  const here = `${(grid[i] * DEG).toFixed(2)}\u00b0`.replace("-", "\u2212");
+  byId("theta-text").textContent = (written + over.sign).replace("-", "\u2212");
+  byId("theta").setAttribute("aria-valuetext", written + spoken);
   if (!playing) {
-    let words = assembled ? `Theta 2 ${here}, theta 3 ${degrees(v.theta_3)}, theta 4 ${degrees(v.theta_4)} degrees` : `Theta 2 ${here}: does not assemble`;
-    if (timed()) words = `At ${instant} seconds: ` + words;
+    let words = assembled ? `Theta 2 ${here}, theta 3 ${degrees(v.theta_3)}, theta 4 ${degrees(v.theta_4)} degrees` : grid[i] === null ? "does not assemble" : `Theta 2 ${here}: does not assemble`;
+    if (over.name !== "theta_2") words = `${over.name === "time" ? "At" : AXES[over.name].join(" ")} ${written}${spoken}: ` + words;
     if (v.torque !== undefined && v.torque !== null) words += `, torque ${text(inUnit("N m", v.torque), 4)} ${nameOf("N m")}`;
     byId("live").textContent = words;
     byId("picture-text").textContent = `Four-bar linkage, ${branch === 1 ? "open" : "crossed"} branch. ${words}`;

@@ -2,7 +2,7 @@
 let draw = (position = row) => {
   const i = Math.round(position), low = Math.floor(position), share = position - low;
   let p = at(i);
-  if (share > 0 && p) {   // between two positions while it plays: the picture moves on, the numbers stay those of the nearest
+  if (share > 0 && p && at(low) && at(low + 1)) {   // between two positions while it plays: the picture moves on, the numbers stay those of the nearest
     p = closeLoop(lengths, data.theta_1, grid[low] + share * (grid[low + 1] - grid[low]), signAt(i)) ?? p;
   }
   drawLinkage(p, i);
@@ -17,7 +17,7 @@ function stretch(i) {   // the positions around i that assemble without a gap
   while (last < grid.length - 1 && at(last + 1)) last++;
   return [first, last];
 }
-const turnsFully = () => !timed() && Math.abs(grid[grid.length - 1] - grid[0] - TURN) < 1e-6 && grid.every((_, i) => at(i));
+const turnsFully = () => axis().factor === DEG && Math.abs(axis().values[grid.length - 1] - axis().values[0] - TURN) < 1e-6 && grid.every((_, i) => at(i));
 
 let run = null;
 function play(on) {
@@ -88,6 +88,7 @@ function gridFor(theta) {   // the sweep of edited lengths: a full turn, or the 
 function nearest(theta) {
   let best = 0, distance = Infinity;
   grid.forEach((t, i) => {
+    if (t === null) return;
     const away = Math.abs(Math.atan2(Math.sin(t - theta), Math.cos(t - theta)));
     if (away < distance) { best = i; distance = away; }
   });
@@ -97,8 +98,9 @@ function nearest(theta) {
 // What speed 1 means, and whether positions were left out.
 function pace() {
   if (timed()) return data.pace;
-  const turned = Math.abs(grid[grid.length - 1] - grid[0]), words = [`At speed 1\u00d7 one sweep takes ${SWEEP_SECONDS} s`];
-  if (data.omega_2) words[0] += `; at \u03c9\u2082 = ${rounded(inUnit("rad/s", data.omega_2), 4)} ${nameOf("rad/s")} the mechanism takes ${rounded(turned / Math.abs(data.omega_2), 3)} s`;
+  const { name, values } = axis(), turned = Math.abs(values[values.length - 1] - values[0]), words = [`At speed 1\u00d7 one sweep takes ${SWEEP_SECONDS} s`];
+  const speed = name === data.over.name ? data.over.speed : 0, [symbol, si] = name === "stroke" ? ["stroke speed", "m/s"] : [AXES[name][1].replace("\u03b8", "\u03c9"), "rad/s"];
+  if (speed) words[0] += `; at ${symbol} = ${rounded(inUnit(si, speed), 4)} ${nameOf(si)} the mechanism takes ${rounded(turned / Math.abs(speed), 3)} s`;
   if (!edited && data.positions > grid.length) words.push(`Shown are ${grid.length} of the ${data.positions} positions`);
   return words.join(". ") + ".";
 }
@@ -108,13 +110,14 @@ function sceneFile() {
   if (!edited && branch === data.branch) return data.toml;
   let file = data.toml;
   Object.values(BAR_NAMES).forEach((name, k) => { file = file.replace(new RegExp(`^${name} = .*$`, "m"), () => `${name} = "${lengths[k]} m"`); });
-  if (edited && !throughTime) {
+  if (edited && !single()) {
     const range = `theta_2 = { from = "${grid[0]} rad", to = "${grid[grid.length - 1]} rad", steps = ${grid.length - 1} }`;
     file = file.replace(/^theta_2 = (\[[^\]]*\]|.*)\n/m, "").replace(/^\[motion\]\n/m, () => `[motion]\n${range}\n`);
   }
   return file.replace(/^branch = .*$/m, `branch = "${branch === 1 ? "open" : "crossed"}"`);
 }
 
+const SINES = { theta_2: "|sin(\u03b8\u2084 \u2212 \u03b8\u2083)|", theta_3: "|sin(\u03b8\u2084 \u2212 \u03b8\u2082)|", theta_4: "|sin(\u03b8\u2083 \u2212 \u03b8\u2082)|", stroke: "sine of its bar times lever" };
 function refresh() {
   showDimensions();
   const type = typeName(lengths), was = typeName(data.lengths);
@@ -123,9 +126,11 @@ function refresh() {
   byId("theta").max = grid.length - 1;
   byId("theta").disabled = grid.length < 2;
   byId("edited").hidden = !edited || !("F12" in table());
-  byId("branch").parentElement.hidden = timed() || lineAddress !== "";
-  for (const element of document.querySelectorAll(".swept")) element.hidden = timed();
-  for (const element of document.querySelectorAll(".timed")) element.hidden = !timed();
+  byId("branch").parentElement.hidden = single() && !edited || lineAddress !== "";
+  const [what, symbol] = AXES[axis().name];
+  byId("axis").textContent = `${what} ${symbol}`;
+  byId("over").textContent = timed() ? "Over time" : `Over ${symbol}`;
+  byId("sine").textContent = edited ? SINES.theta_2 : SINES[data.over.commanded];
   for (const element of document.querySelectorAll(".driven")) element.hidden = !shows("torque");
   for (const element of document.querySelectorAll(".pushed")) element.hidden = !shows("drive_force");
   for (const element of document.querySelectorAll(".erring")) element.hidden = !shows("torque_error");
@@ -155,11 +160,11 @@ function readLengths() {
   if (message) return;
   if (playing) play(false);
   lengths = values;
-  const wasTimed = timed();
+  const wasSingle = single() && !edited;
   edited = values.some((value, k) => value !== data.lengths[k]);
   const before = row;
   grid = edited ? gridFor(theta) ?? grid : data.theta_2;
-  row = phase = timed() && wasTimed ? before : nearest(theta);
+  row = phase = single() && !edited && wasSingle ? before : nearest(theta);
   refresh();
 }
 const shown = value => Number((value * unit.factor).toPrecision(12));
@@ -172,7 +177,7 @@ function reset() {
   if (playing) play(false);
   branch = data.branch;
   byId("branch").value = branch;
-  direction = data.omega_2 < 0 ? -1 : 1;
+  direction = data.over.speed < 0 ? -1 : 1;
   original();
   row = phase = data.start;
   draw();

@@ -191,7 +191,8 @@ function drawLinkage(p, i) {
   parts.labels.style.display = show("show-labels") ? "" : "none";
   for (const element of Object.values(parts.label)) element.style.display = "none";
   const visible = (name, on) => { parts.label[name].style.display = on ? "" : "none"; };
-  const known = p ?? { theta2: grid[i], O2: [0, 0], O4: [lengths[0] * Math.cos(data.theta_1), lengths[0] * Math.sin(data.theta_1)], A: [lengths[1] * Math.cos(grid[i]), lengths[1] * Math.sin(grid[i])] };
+  const O4 = [lengths[0] * Math.cos(data.theta_1), lengths[0] * Math.sin(data.theta_1)], fixed = { O2: [0, 0], O4 };
+  const known = p ?? (grid[i] === null ? fixed : { ...fixed, theta2: grid[i], A: [lengths[1] * Math.cos(grid[i]), lengths[1] * Math.sin(grid[i])] });
   const s = Object.fromEntries(["O2", "A", "B", "O4"].filter(name => known[name]).map(name => [name, toScreen(known[name])]));
   const pins = Object.values(s), middle = [0, 1].map(j => pins.reduce((sum, q) => sum + q[j], 0) / pins.length);
   for (const name of ["O2", "A", "B", "O4"]) {

@@ -1,6 +1,5 @@
 """Curves over theta_2 or time: angles and their rates, points, torque, pin forces, energy."""
 
-import math
 import re
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -12,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.evaluation.case import Case, state_at
-from fourbar.linkage import MOVING_BARS
+from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command
 from fourbar.show.duty import driving, energies
 from fourbar.show.plot.style import (
     BAR_COLOURS,
@@ -28,6 +26,7 @@ from fourbar.show.plot.style import (
     force_line,
     largest,
     legend_above,
+    length_unit,
     number,
     quantity,
     unit_for,
@@ -51,24 +50,18 @@ POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
 
 def bases(axes: "Axes", view: View) -> Array:
-    """Draw the axis of theta_2 (or time), positions that do not assemble shaded and the position drawn marked.
+    """Draw the axis of the command or of time, positions that do not assemble shaded, the position drawn marked.
 
     Returns what the curves are drawn over.
     """
-    over, here = view.degrees, math.degrees(float(view.here.theta_2[0]))
-    if view.time is not None:
-        assert view.here.time is not None
-        longest = max(float(other.time[-1]) for other in view.alike if other.time is not None)
-        factor, unit = (1.0, "s") if longest >= 1.0 else unit_for(longest, "s")
-        over, here = factor * view.time, factor * float(view.here.time[0])
-        axes.set_xlabel(f"$t$ ({unit})")
-    else:
-        axes.set_xlabel(r"$\theta_2$ (°)")
+    axis = view.axis
+    over, here = axis.values, axis.factor * float(view.here.at.places[0])
+    axes.set_xlabel(f"{axis.label} ({axis.unit.strip()})")
     low, high = float(over[0]), float(over[-1])
     if high == low:
         low, high = low - 1.0, high + 1.0
     axes.set_xlim(low, high)
-    if view.time is None:
+    if axis.unit == "°":
         degree_ticks(axes.xaxis, high - low)
     closed = np.flatnonzero(np.diff(np.concatenate([[False], ~view.sweep.assembled, [False]]).astype(int)))
     for first, after in closed.reshape(-1, 2):
@@ -95,9 +88,9 @@ def poles(view: View) -> Indices:
     if view.scene.motion.free is not None:  # no drive, no pole
         return np.array([], dtype=np.intp)
     if view.scene.drive is not None:
-        case = Case.of(view.scene)
-        state = state_at(view.scene, Command(s.theta_2, s.branch, 0.0, 0.0))
-        sine = view.scene.drive.leverage(state, case.sines(state.at))[0]
+        case, state = Case.of(view.scene, s.at.bar), state_at(view.scene, s.at)
+        with np.errstate(all="ignore"):
+            sine = view.scene.drive.leverage(state, case.sines(state.at))[0]
         return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
     pair = {2: (s.theta_4, s.theta_3), 3: (s.theta_4, s.theta_2), 4: (s.theta_3, s.theta_2)}[view.scene.drive_bar]
     sine = np.sin(pair[0] - pair[1])
@@ -131,7 +124,7 @@ def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None
     index = int(np.nanargmax(np.where(np.isfinite(worst), np.abs(worst), np.nan)))
     if abs(worst[index]) <= limit:
         return
-    where = f"θ₂ = {view.degrees[index]:.5g}°" if view.time is None else f"t = {view.time[index]:.4g} s"
+    where = view.axis.words(view.sweep.at.places[index], 5) if view.time is None else f"t = {view.time[index]:.4g} s"
     note(
         view,
         f"{what} clipped at {number(limit * factor)} {name_of_unit}; the largest evaluated, {name} = "
@@ -140,9 +133,9 @@ def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None
 
 
 def draw_angles(axes: "Axes", view: View) -> None:
-    """theta_3 and theta_4; over time theta_2 too."""
+    """Those of the bars that are not the axis."""
     over = bases(axes, view)
-    bars = (3, 4) if view.time is None else (2, 3, 4)
+    bars = [bar for bar in MOVING_BARS if view.time is not None or f"theta_{bar}" != view.sweep.commanded]
     for bar in bars:
         values = np.degrees(getattr(view.sweep, f"theta_{bar}"))
         axes.plot(over, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\theta_{bar}$")
@@ -151,25 +144,26 @@ def draw_angles(axes: "Axes", view: View) -> None:
     if len(bars) > 2:
         axes.set(ylabel=r"$\theta$ (°)", title="Angles of the bars")
     else:
-        axes.set(ylabel=r"$\theta_3,\ \theta_4$ (°)", title="Angles of coupler and output")
+        ylabel = ",\\ ".join(rf"\theta_{bar}" for bar in bars)
+        axes.set(ylabel=f"${ylabel}$ (°)", title=f"Angles of {' and '.join(BAR_NAMES[bar] for bar in bars)}")
     legend_above(axes)
 
 
 def _rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: str) -> None:
-    """Of the input (where it is not zero), the coupler and the output."""
-    over = bases(axes, view)
+    """Of the commanded bar (where it is not zero) and the other two."""
+    over, driven = bases(axes, view), view.sweep.at.bar
     name = {"omega": "ω", "alpha": "α"}[letter]
-    digits = {2: "₂", 3: "₃", 4: "₄"}
-    curves = {name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in (3, 4)}
+    digits, others = {2: "₂", 3: "₃", 4: "₄"}, [bar for bar in MOVING_BARS if bar != driven]
+    curves = {name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in others}
     factor, shown_unit = unit_for(0.0, unit, view.units)
-    command = getattr(view.sweep, f"{letter}_2")
+    command = getattr(view.sweep, f"{letter}_{driven}")
     if np.any(command):
-        axes.plot(over, factor * command, color=BAR_COLOURS[2], lw=1.0, label=rf"$\{letter}_2$")
-    for bar, values in zip((3, 4), curves.values(), strict=True):
+        axes.plot(over, factor * command, color=BAR_COLOURS[driven], lw=1.0, label=rf"$\{letter}_{driven}$")
+    for bar, values in zip(others, curves.values(), strict=True):
         axes.plot(over, factor * values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=rf"$\{letter}$ ({shown_unit})", title=title)
-    limit = limit_of([getattr(other.sweep, f"{letter}_{bar}") for other in view.alike for bar in (3, 4)])
+    limit = limit_of([getattr(other.sweep, f"{letter}_{bar}") for other in view.alike for bar in others])
     clip(axes, view, curves, limit, what, unit)
     legend_above(axes)
 
@@ -231,6 +225,14 @@ def draw_power(axes: "Axes", view: View) -> None:
     _of_drive(
         axes, view, attrgetter("power"), "P", "W", f"Power of the drive on bar {bar}" if bar else "Power of the drive"
     )
+
+
+def draw_stroke(axes: "Axes", view: View) -> None:
+    """Draw the stroke of a linear drive."""
+    over = bases(axes, view)
+    factor, unit = length_unit(max(view.scene.linkage.lengths), view.units)
+    axes.plot(over, factor * view.sweep.stroke, color=INK)  # type: ignore[operator]
+    axes.set(ylabel=f"stroke ({unit})", title="Stroke of the drive")
 
 
 def force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:

@@ -1,6 +1,5 @@
 """The figures by name, and how a scene becomes a file."""
 
-import math
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
@@ -10,14 +9,14 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
-from fourbar.scene import Scene, require_input
+from fourbar.scene import Scene
 from fourbar.show.between import between
 from fourbar.show.plot import curves, freebody, hodograph, linkage, studies
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import CAPTION, FORCE_COLOURS, TITLE, format_of, matplotlib_style, plain, rendered, save
 from fourbar.show.plot.transmission import draw_transmission
-from fourbar.show.plot.view import View, common_position, on_branch, over_time, view
-from fourbar.show.tables import STATIC
+from fourbar.show.plot.view import View, common_position, on_branch, over_time, view, where_in_words
+from fourbar.show.tables import static
 from fourbar.solution import SI, Conversion, require_units
 
 if TYPE_CHECKING:
@@ -86,7 +85,7 @@ def _hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
 def _free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
     here = shown.here
     if not np.isfinite(here.F12).all():  # type: ignore[arg-type]
-        where = f"theta_2 = {math.degrees(here.theta_2[0]):.6g} deg"
+        where = where_in_words(here)
         raise InputError("figure", "freebody", f"needs forces, which have no value at {where}: {here.status[0]}")
     freebody.draw_free_bodies(figure, shown, labels)
 
@@ -98,6 +97,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "kinematics": (_kinematics, (5.6, 6.8), False),
     "points": (_points, (11.0, 5.6), True),
     "torque": (_single(curves.draw_drive), (5.6, 3.2), True),
+    "stroke": (_single(curves.draw_stroke), (5.6, 3.2), False),
     "forces": (_single(curves.draw_forces), (5.6, 3.2), True),
     "hodograph": (_hodographs, (6.4, 6.6), True),
     "energy": (_single(curves.draw_energy), (5.6, 3.2), True),
@@ -114,9 +114,12 @@ def _painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[f
         if not isinstance(value, str) or value not in allowed:
             raise InputError(key, value, "must be one of " + ", ".join(allowed))
     painter, size, dynamic = FIGURES[figure]
-    require_input(scene, "a figure")
-    if dynamic and scene.motion.omega_2 is None and not over_time(scene):
-        raise InputError("motion.omega_2", None, f"is needed for the figure {figure!r}; {STATIC}")
+    if dynamic and scene.motion.speed is None and not over_time(scene):
+        raise InputError(
+            f"motion.{scene.motion.names[1]}", None, f"is needed for the figure {figure!r}; {static(scene)}"
+        )
+    if figure == "stroke" and (scene.drive is None or scene.motion.stroke is not None):
+        raise InputError("figure", figure, "needs a linear drive (drive.from, drive.to) whose stroke is not commanded")
     if figure == "energy" and scene.motion.free is None:
         raise InputError("figure", figure, "needs a free motion: motion.free")
     if figure == "torque" and scene.motion.free is not None:
@@ -172,8 +175,11 @@ def _look_between(shown: View) -> None:
         return
     shown.sweep = found.solution
     if found.reversals:
-        where = ", ".join(f"{math.degrees(theta_2):.4g}° ({pin})" for theta_2, pin in found.reversals)
-        shown.notes.append(f"Dry friction reverses, and the pin forces jump, at θ₂ = {where}.".replace("-", "−"))
+        axis = shown.axis
+        where = ", ".join(f"{axis.factor * place:.4g}{axis.unit} ({pin})" for place, pin in found.reversals)
+        shown.notes.append(
+            f"Dry friction reverses, and the pin forces jump, at {axis.symbol} = {where}.".replace("-", "−")
+        )
 
 
 def draw(

@@ -100,16 +100,13 @@ def write_film(
 
 def frames(shown: View, count: int) -> list[int]:
     """Choose the positions shown one after the other, by index: the segment that assembles around the one drawn."""
-    closes = shown.sweep.assembled
-    here = int(np.argmin(np.abs(shown.sweep.theta_2 - shown.here.theta_2[0])))
-    if shown.time is not None and shown.here.time is not None:
-        here = int(np.argmin(np.abs(shown.time - shown.here.time[0])))
+    closes, at = shown.sweep.assembled, shown.sweep.at
+    here = int(np.argmin(np.abs(at.places - shown.here.at.places[0])))
     gaps = np.flatnonzero(~closes)
     first, last = max(gaps[gaps < here], default=-1) + 1, min(gaps[gaps > here], default=len(closes)) - 1
     if shown.time is not None:
         return [round(i) for i in np.linspace(first, last, count)]
-    theta_2 = shown.sweep.theta_2
-    if abs(theta_2[last] - theta_2[first] - math.tau) < 1e-6:
+    if abs(at.angle[last] - at.angle[first] - math.tau) < 1e-6:
         return [round(i) for i in np.linspace(first, last, count, endpoint=False)]
     there = [round(i) for i in np.linspace(first, last, max(2, count // 2))]
     return there + there[-2:0:-1]
@@ -153,8 +150,12 @@ def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
         put(index)
         if move_vectors is not None:
             move_vectors(index)
-        theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
-        when = "" if shown.time is None else f"$t$ = {shown.time[index]:.2f} s, "
-        axes.set_title(rf"{when}$\theta_2$ = {theta}°, {shown.branch_name} branch", pad=pad)
+        axis, places = shown.axis, sweep.at.places
+        theta = f"{axis.factor * places[index]:.1f}".replace("-", "−")
+        where = rf"{axis.label} = {theta}{axis.unit}"
+        if shown.time is not None:
+            theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
+            where = rf"$t$ = {shown.time[index]:.2f} s, $\theta_2$ = {theta}°"
+        axes.set_title(f"{where}, {shown.branch_name} branch", pad=pad)
 
     return figure, move

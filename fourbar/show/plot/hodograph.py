@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes
 
 EVERY = 60.0
-"""Dots on a hodograph stand this far apart in theta_2, deg ..."""
+"""Dots on a hodograph stand this far apart in the commanded angle, deg ..."""
 MOST_DOTS = 12
-"""... or, over time, a round number of seconds that gives no more than these."""
+"""... or, over time or a stroke, a round number that gives no more than these."""
 
 LONG_NUMBERS = 2000.0
 """From here on the numbers along a radius are too wide for four of them."""
@@ -64,12 +64,13 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
 
 def _spacing(view: View) -> tuple[Array, float, str]:
     """Say what the dots are evenly spaced in, by how much, and that in words."""
-    if view.time is None:
-        return view.degrees, EVERY, f"{EVERY:g}° of θ₂"
-    duration = float(view.time[-1] - view.time[0]) or 1.0
+    axis = view.axis
+    if axis.unit == "°":
+        return axis.values, EVERY, f"{EVERY:g}° of {axis.symbol}"
+    duration = float(axis.values[-1] - axis.values[0]) or 1.0
     step = 10.0 ** math.floor(math.log10(duration))
     every = next(share * step for share in (0.1, 0.2, 0.5, 1.0) if duration <= MOST_DOTS * share * step)
-    return view.time, every, f"{every:g} s"
+    return axis.values, every, f"{every:g}{axis.unit}"
 
 
 def _free_direction(forces: list[np.ndarray]) -> float:

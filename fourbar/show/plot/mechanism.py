@@ -39,6 +39,8 @@ def draw_mechanism(axes: "Axes", view: View, solution: Solution, index: int, lab
     """
     factor, _, size = scale_of(view)
     place = place_of(view.scene.linkage, solution, index, factor)
+    if view.sweep.stroke is not None:
+        place = place._replace(barrel=symbols.BARREL * factor * float(np.nanmin(view.sweep.stroke)))
     where = {name: components(pin) for name, pin in place.pins.items()}
     centre = sum(place.pins.values()) / 4.0
     middle, drawn = components(centre), []

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.scene import require_input
+from fourbar.scene import command
 from fourbar.show.influence import influences, largest_value, ranked, shown_quantities
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
@@ -24,7 +24,7 @@ from fourbar.show.plot.style import (
     save,
     unit_for,
 )
-from fourbar.show.plot.view import View
+from fourbar.show.plot.view import View, axis_of
 from fourbar.show.tolerances import part_unit, parted, shown_parts
 from fourbar.solution import SI, Conversion, unit_of
 from fourbar.studies.derivatives import sensitivity
@@ -57,9 +57,8 @@ def draw_tolerances(found: Tolerances, path: str | Path, units: Conversion = SI)
     """
     target = Path(path)
     kind = format_of(target)
-    require_input(found.scene, "a picture of bands")
     if len(found.theta_2) < 2:
-        raise InputError("motion.theta_2", "one position", "a picture of bands needs a sweep")
+        raise InputError(f"motion.{found.scene.motion.names[0]}", "one position", "a picture of bands needs a sweep")
     with matplotlib_style():
         from matplotlib.figure import Figure
 
@@ -71,7 +70,7 @@ def draw_tolerances(found: Tolerances, path: str | Path, units: Conversion = SI)
             _band(axes, found, part, units)
         for axes in panels[len(parts) + 1 :]:
             axes.set_axis_off()
-        _shares(panels[len(parts)], found, parts[0])
+        _shares(panels[len(parts)], found, parts[0], units)
         title = plain(found.scene.title, 80) or "Four-bar linkage"
         figure.suptitle(f"{title}: what the tolerances do ({found.samples} samples)", **TITLE)
         caption = (
@@ -83,16 +82,17 @@ def draw_tolerances(found: Tolerances, path: str | Path, units: Conversion = SI)
         save(figure, target, kind)
 
 
-def _over(axes: "Axes", found: Tolerances) -> Any:
-    degrees = np.degrees(found.theta_2)
-    axes.set_xlim(degrees.min(), degrees.max())
-    degree_ticks(axes.xaxis, 2.0 * float(np.ptp(degrees)))
-    axes.set_xlabel(r"$\theta_2$ (°)")
-    return degrees
+def _over(axes: "Axes", found: Tolerances, units: Conversion) -> Any:
+    over = axis_of(found.scene, command(found.scene), units)
+    axes.set_xlim(over.values.min(), over.values.max())
+    if over.unit == "°":
+        degree_ticks(axes.xaxis, 2.0 * float(np.ptp(over.values)))
+    axes.set_xlabel(f"{over.label} ({over.unit.strip()})")
+    return over.values
 
 
 def _band(axes: "Axes", found: Tolerances, part: str, units: Conversion) -> None:
-    spread, over = found.spreads[part], _over(axes, found)
+    spread, over = found.spreads[part], _over(axes, found, units)
     ends = [spread.low, spread.high, spread.least, spread.greatest]
     away = [end - spread.nominal for end in ends]
     sizes = np.abs(np.concatenate([*away, spread.worst]))
@@ -111,10 +111,10 @@ def _band(axes: "Axes", found: Tolerances, part: str, units: Conversion) -> None
     axes.set(ylabel=f"deviation ({unit})", title=part)
 
 
-def _shares(axes: "Axes", found: Tolerances, part: str) -> None:
+def _shares(axes: "Axes", found: Tolerances, part: str, units: Conversion) -> None:
     from matplotlib.transforms import offset_copy
 
-    spread, over = found.spreads[part], _over(axes, found)
+    spread, over = found.spreads[part], _over(axes, found, units)
     with np.errstate(all="ignore"):
         shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
     order = np.argsort(-np.nan_to_num(shares).sum(axis=1))

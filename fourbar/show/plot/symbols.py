@@ -37,6 +37,8 @@ SMALLEST, SHARE = 0.5, 0.12
 ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
 LONGEST = 7.0
 """Of an arrow, in sizes of a support: the largest of the sweep, or where values diverge all that are as large."""
+BARREL = 0.85
+"""Of the shortest stroke of the sweep is the barrel of a cylinder; the rod is what comes out of it."""
 COILS = 7
 OPENING = math.radians(250.0)
 """Of an arc with an arrow head."""
@@ -55,6 +57,8 @@ class Place(NamedTuple):
     theta_2: float
     torque: float
     """N m; NaN where there is none."""
+    barrel: float = 0.0
+    """Length of what of a cylinder keeps its length."""
 
     def small(self, pin: str, size: float) -> float:
         """Shrink the size of what stands around a pin where a bar there is short: it would hide the bar."""
@@ -111,13 +115,20 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
         assert symbol.end is not None
         start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
         _line(axes, drawn, _zigzag(start, end, 0.6 * size), colour, 1.0)
-        drawn.artists += axes.plot([start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=8)
+        drawn.artists += axes.plot(
+            [start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=5.5
+        )
     elif symbol.kind == "cylinder":
         assert symbol.end is not None
         start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
+        along = (end - start) / abs(end - start)
         _line(axes, drawn, np.array([start, end]), colour, 1.2)
-        _line(axes, drawn, start + np.array([0.1, 0.6]) * (end - start), colour, 4.5)
-        drawn.artists += axes.plot([start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=8)
+        _line(axes, drawn, start + np.array([0.1, 1.0]) * place.barrel * along, colour, 4.5)
+        drawn.text, drawn.away = f"${symbol.name}$", 1j * along
+        drawn.label = components(start + 0.5 * place.barrel * along)
+        drawn.artists += axes.plot(
+            [start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=5.5
+        )
     elif symbol.kind == "force":
         _force(axes, symbol, place, size, drawn)
     elif symbol.kind in ("moment", "drive"):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.formulas.mobility import limit_positions
+from fourbar.linkage import MOVING_BARS
 from fourbar.show.plot.curves import bases
 from fourbar.show.plot.style import INK, MUTED, OPEN, legend_above
 from fourbar.show.plot.view import View
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 RECOMMENDED = 40.0
 """Smallest transmission angle that is usually recommended, deg (R. L. Norton, Design of Machinery)."""
-CENTRE = "dead centre: bars 2, 3 in line"
 REMARK = 0.34
 """Part that a remark takes along an axis, as a part of its length."""
 
@@ -53,26 +53,35 @@ def free_place(mu: Array) -> float:
 
 
 def _marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
-    """Limits (bars 3, 4 collinear) and dead centres (bars 2, 3 collinear): theta_2, mu (degrees), mark, name."""
+    """Limits of the commanded bar and dead centres, on the axis: places, mu (degrees), mark, name."""
     if view.time is not None:
         return []
-    degrees = view.degrees
-    margin = 1.5 * float(np.median(np.diff(degrees))) if len(degrees) > 1 else 0.0
-    limits = [t for own in limit_positions(view.scene.linkage) for t in _inside(view, own.theta_2, margin)]
-    centres, heights = [], []
-    for found in limit_positions(view.scene.linkage, 4):
-        difference = found.theta_4 - found.theta_3
-        for t in _inside(view, found.theta_2, 0.0):
-            if view.sweep.branch[np.argmin(np.abs(degrees - t))] == found.branch:
-                centres.append(t)
-                heights.append(math.degrees(math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))))
-    marked = [(limits, [0.0] * len(limits), "s", "limit: bars 3, 4 in line"), (centres, heights, "D", CENTRE)]
+    at, marked = view.sweep.at, list[tuple[list[float], list[float], str, str]]()
+    own = np.degrees(at.angle)
+    order = np.argsort(own)
+    margin = 1.5 * float(np.median(np.abs(np.diff(own)))) if len(own) > 1 else 0.0
+    one, other = (bar for bar in MOVING_BARS if bar != at.bar)
+    for bar in sorted({2, 4, at.bar}, key=lambda bar: bar != at.bar):
+        turned, heights = list[float](), list[float]()
+        for found in limit_positions(view.scene.linkage, bar):
+            theta = {2: found.theta_2, 3: found.theta_3, 4: found.theta_4}
+            sign = math.copysign(1.0, math.sin(theta[other] - theta[one]))
+            difference = found.theta_4 - found.theta_3
+            for place in _inside(own, theta[at.bar], margin if bar == at.bar else 0.0):
+                if bar == at.bar or at.branch[np.argmin(np.abs(own - place))] == sign:
+                    turned.append(place)
+                    heights.append(math.degrees(math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))))
+        if at.stroke is not None:  # over which its bar's angle rises or falls throughout
+            turned = np.interp(turned, own[order], view.axis.values[order]).tolist()
+        pair = ", ".join(str(each) for each in MOVING_BARS if each != bar)
+        mark, what = ("s", "limit") if bar == at.bar else ("D", "dead centre")
+        marked.append((turned, heights, mark, f"{what}: bars {pair} in line"))
     return [entry for entry in marked if entry[0]]
 
 
-def _inside(view: View, angle: float, margin: float) -> list[float]:
+def _inside(own: Array, angle: float, margin: float) -> list[float]:
     """List an angle (rad) and its full turns that lie in the sweep, degrees."""
-    low, high = float(view.degrees[0]) - margin, float(view.degrees[-1]) + margin
+    low, high = float(own.min()) - margin, float(own.max()) + margin
     start = math.degrees(angle)
     first = math.ceil((low - start) / 360.0)
     return [start + 360.0 * k for k in range(first, math.floor((high - start) / 360.0) + 1)]

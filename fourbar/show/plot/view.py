@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from fourbar.evaluation.case import state_at
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, PINS
-from fourbar.scene import Command, Scene, command, require_input
-from fourbar.scene.motion import FromLimit
+from fourbar.scene import Command, Scene, command, command_at, default_places
+from fourbar.show.plot.style import length_unit, unit_for
 from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve
 
@@ -27,7 +27,7 @@ LEAD = math.radians(60.0)
 class View:
     """A scene on one branch.
 
-    `sweep` runs over theta_2 in rising order, `here` is the one position drawn to scale, `notes`
+    `sweep` runs over what is commanded in rising order, `here` is the one position drawn to scale, `notes`
     collects what a caption has to say about the panels.
     """
 
@@ -48,9 +48,13 @@ class View:
         return [self, *self.others]
 
     @property
-    def degrees(self) -> Array:
-        """theta_2 of the sweep, degrees."""
-        return np.degrees(self.sweep.theta_2)
+    def axis(self) -> "Axis":
+        """What curves are drawn over: time, or what is commanded."""
+        if self.time is not None:
+            longest = max(float(other.time[-1]) for other in self.alike if other.time is not None)
+            factor, unit = (1.0, "s") if longest >= 1.0 else unit_for(longest, "s")
+            return Axis("t", "$t$", f" {unit}", factor, factor * self.time)
+        return axis_of(self.scene, self.sweep.at, self.units)
 
     @property
     def time(self) -> Array | None:
@@ -60,9 +64,9 @@ class View:
     @property
     def at(self) -> str:
         """The position drawn, in words."""
-        theta = f"θ₂ = {math.degrees(float(self.here.theta_2[0])):.4g}°"
         if self.here.time is None:
-            return theta.replace("-", "−")
+            return self.axis.words(float(self.here.at.places[0]))
+        theta = f"θ₂ = {math.degrees(float(self.here.theta_2[0])):.4g}°"
         return f"{theta}, t = {self.here.time[0]:.4g} s".replace("-", "−")
 
     @property
@@ -73,14 +77,43 @@ class View:
     @property
     def branch_name(self) -> str:
         """Return "open", "crossed", or "both signs" where the motion follows a smooth path through change points."""
-        branch = self.sweep.branch
+        branch = self.sweep.at.branch
         return "open" if np.all(branch == 1) else "crossed" if np.all(branch == -1) else "both signs"
 
     def state(self) -> State:
         """Kinematics at the position drawn."""
-        here = self.here
-        alpha_2 = 0.0 if here.alpha_2 is None else here.alpha_2
-        return state_at(self.scene, Command(here.theta_2, here.branch, here.omega_2, alpha_2))
+        return state_at(self.scene, self.here.at)
+
+
+class Axis(NamedTuple):
+    """What curves are drawn over."""
+
+    symbol: str
+    label: str
+    """As it stands at the axis."""
+    unit: str
+    factor: float
+    """From SI to the unit."""
+    values: Array
+    """Of the sweep, in the unit."""
+
+    def words(self, place: float, digits: int = 4) -> str:
+        """Say a place, which is in SI."""
+        return f"{self.symbol} = {self.factor * place:.{digits}g}{self.unit}".replace("-", "−")
+
+
+def axis_of(scene: Scene, at: Command, units: Conversion) -> Axis:
+    """Make the axis of what is commanded."""
+    if at.stroke is not None:
+        factor, unit = length_unit(max(scene.linkage.lengths), units)
+        return Axis("stroke", "stroke", f" {unit}", factor, factor * at.stroke)
+    return Axis(f"θ{'₀₁₂₃₄'[at.bar]}", rf"$\{at.commanded}$", "°", math.degrees(1.0), np.degrees(at.angle))
+
+
+def where_in_words(solution: Solution) -> str:
+    """Say the first position of a solution as the scene's file has it."""
+    angle, stroke = math.degrees(solution.at.angle[0]), solution.at.stroke
+    return f"{solution.commanded} = {f'{angle:.6g} deg' if stroke is None else f'{stroke[0]:.6g} m'}"
 
 
 def point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Array]:
@@ -128,23 +161,20 @@ def over_time(scene: Scene) -> bool:
 
 
 def sweep_command(scene: Scene) -> Command:
-    """List the positions of a scene in rising theta_2; a single position is put among those of the default range."""
-    motion = scene.motion
+    """List the positions as what is commanded rises; a single one is put among those of the default range."""
     own = command(scene)
-    if len(own.theta_2) > 1:
-        order = np.argsort(own.theta_2, kind="stable")
-        return own._replace(angle=own.theta_2[order], branch=own.branch[order])
-    assert motion.theta_2 is None or isinstance(motion.theta_2, (float, FromLimit, np.ndarray))
-    wide = command(replace(scene, motion=replace(motion, theta_2=None)))
+    if len(own.angle) > 1:
+        return own.part(np.argsort(own.places, kind="stable"))
+    wide = command_at(scene, default_places(scene, float(own.angle[0])))
     # the same position may lie whole turns away from the default range
-    turns = np.round((0.5 * (wide.theta_2[0] + wide.theta_2[-1]) - own.theta_2) / math.tau)
-    theta_2, first = np.unique(np.concatenate([wide.theta_2, own.theta_2 + turns * math.tau]), return_index=True)
-    return wide._replace(angle=theta_2, branch=np.concatenate([wide.branch, own.branch])[first])
+    turns = np.round((0.5 * (wide.angle[0] + wide.angle[-1]) - own.angle) / math.tau) if own.stroke is None else 0.0
+    places, first = np.unique(np.concatenate([wide.places, own.places + turns * math.tau]), return_index=True)
+    return command_at(scene, places, np.concatenate([wide.branch, own.branch])[first])
 
 
 def common_position(scenes: "list[Scene]") -> float | None:
-    """Choose a position that shows each of several scenes over the same theta_2; None where each has its own."""
-    if any(over_time(scene) for scene in scenes) or len(command(scenes[0]).theta_2) == 1:
+    """Choose a position that shows each of several scenes over the same range; None where each has its own."""
+    if any(over_time(scene) for scene in scenes) or len(command(scenes[0]).angle) == 1:
         return None
     sweeps = [solve(scene, at=sweep_command(scene)) for scene in scenes]
     sweeps = [sweep for sweep in sweeps if sweep.assembled.any()]
@@ -161,14 +191,14 @@ def view(scene: Scene, position: float | None = None) -> View:
 
     Parameters
     ----------
-    position : theta_2 drawn to scale, rad; left out: the scene's own where it names one (the start of
-        a motion through time), else 60 deg into the longest stretch that assembles, clear of poles.
+    position : what is commanded where the linkage is drawn to scale, rad or m; left out: the scene's own where it
+        names one (the start of a motion through time), else 60 deg into the longest stretch that assembles, clear of
+        poles.
 
     Raises
     ------
     NotAssembledError : no position of the sweep assembles, or the one named does not.
     """
-    require_input(scene, "a picture")
     if over_time(scene):
         return _through_time(scene, position)
     where = sweep_command(scene)
@@ -176,12 +206,12 @@ def view(scene: Scene, position: float | None = None) -> View:
     _something(sweep)
     own = command(scene)
     if position is None:
-        position = float(own.theta_2[0]) if len(own.theta_2) == 1 else representative([sweep])
-    branch = np.array([where.branch[np.argmin(np.abs(where.theta_2 - position))]], dtype=np.int8)
-    here = solve(scene, at=Command(np.array([position]), branch, own.omega_2, own.alpha_2))
-    if not here.assembled[0]:
-        raise NotAssembledError(f"the linkage does not assemble at theta_2 = {math.degrees(position):.6g} deg")
-    return View(scene, sweep, here)
+        position = float(own.places[0]) if len(own.angle) == 1 else representative([sweep])
+    branch = where.branch[[np.argmin(np.abs(where.places - position))]]
+    shown = View(scene, sweep, solve(scene, at=command_at(scene, np.array([position]), branch)))
+    if not shown.here.assembled[0]:
+        raise NotAssembledError(f"the linkage does not assemble at {where_in_words(shown.here)}")
+    return shown
 
 
 def _something(sweep: Solution) -> None:
@@ -193,21 +223,18 @@ def _through_time(scene: Scene, position: float | None) -> View:
     """Evaluate a motion; drawn is the instant that assembles first, or whose theta_2 comes nearest to the position."""
     sweep = solve(scene)
     _something(sweep)
-    assert sweep.time is not None and sweep.omega_2 is not None and sweep.alpha_2 is not None
+    angle, name = sweep.at.angle, sweep.commanded
     if position is None:
         index = int(np.argmax(sweep.assembled))
     else:
-        low, high = math.degrees(np.min(sweep.theta_2)), math.degrees(np.max(sweep.theta_2))
+        low, high = math.degrees(np.min(angle)), math.degrees(np.max(angle))
         if not low <= math.degrees(position) <= high:
             raise NotAssembledError(
-                f"the motion does not pass theta_2 = {math.degrees(position):.6g} deg: it stays within "
+                f"the motion does not pass {name} = {math.degrees(position):.6g} deg: it stays within "
                 f"{low:.6g} and {high:.6g} deg"
             )
-        index = int(np.argmin(np.abs(sweep.theta_2 - position)))
-    one = slice(index, index + 1)
-    here = solve(scene, at=Command(sweep.theta_2[one], sweep.branch[one], sweep.omega_2[one], sweep.alpha_2[one]))
-    here.time = sweep.time[one]
-    shown = View(scene, sweep, here)
+        index = int(np.argmin(np.abs(angle - position)))
+    shown = View(scene, sweep, solve(scene, at=sweep.at.part(slice(index, index + 1))))
     if sweep.stopped_at is not None:
         shown.notes.append(f"The linkage stops at a limit position at t = {sweep.stopped_at:.4g} s.")
     return shown
@@ -217,12 +244,13 @@ def representative(sweeps: "list[Solution]") -> float:
     """Choose a position, the same for all sweeps, that shows the bars apart; well conditioned where one is."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], sweeps[0].assembled, [False]]).astype(int))).reshape(-1, 2)
     run = slice(*ends[int(np.argmax(ends[:, 1] - ends[:, 0]))])
-    theta_2 = sweeps[0].theta_2[run]
-    quality = np.full(len(theta_2), np.inf)
+    places = sweeps[0].at.places[run]
+    lead = LEAD if sweeps[0].at.stroke is None else math.inf
+    quality = np.full(len(places), np.inf)
     for sweep in sweeps:
         for condition in (sweep.condition, sweep.drive_condition):
             if condition is not None:
                 quality = np.minimum(quality, np.nan_to_num(condition[run]))
     good = quality >= min(CLEAR, float(quality.max()))
-    target = theta_2[0] + min(LEAD, 0.5 * (theta_2[-1] - theta_2[0]))
-    return float(theta_2[good][np.argmin(np.abs(theta_2[good] - target))])
+    target = places[0] + min(lead, 0.5 * (places[-1] - places[0]))
+    return float(places[good][np.argmin(np.abs(places[good] - target))])

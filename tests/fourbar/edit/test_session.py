@@ -130,7 +130,14 @@ def test_a_gesture_is_one_step_back(session: Session) -> None:
 
 
 def dragged(session: Session, what, to: complex, **more) -> dict:
-    asked = {"do": "drag", "what": what, "to": [to.real, to.imag], "grain": PIXEL, "theta_2": math.radians(50.0)}
+    asked = {
+        "do": "drag",
+        "what": what,
+        "to": [to.real, to.imag],
+        "grain": PIXEL,
+        "theta_2": math.radians(50.0),
+        "branch": 1,
+    }
     told = session.do(asked | more)
     assert "refused" not in told, told
     return told
@@ -182,7 +189,9 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
     load, s = session.now.scene.loads[1], at_50(session)
     assert load.force[0] == pytest.approx(1.0, rel=0.02)
     assert math.sin(load.force[1] + s.theta_3[0]) == pytest.approx(1.0, abs=1e-3)
-    assert "refused" in session.do({"do": "drag", "what": "O2", "to": [0, 0], "grain": 1.0, "theta_2": 0.0})
+    assert "refused" in session.do(
+        {"do": "drag", "what": "O2", "to": [0, 0], "grain": 1.0, "theta_2": 0.0, "branch": 1}
+    )
 
 
 def test_numbers_get_the_digits_of_a_pixel_and_keep_their_unit() -> None:

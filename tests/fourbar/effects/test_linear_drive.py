@@ -13,7 +13,6 @@ import fourbar
 from fourbar.effects import SpringEnd
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
-from fourbar.mjcf import mjcf
 from fourbar.mjcf.sdf import sdf
 from fourbar.mjcf.usd import usd
 from fourbar.show.duty import motor_duty, motor_entry, shaking_force, shaking_moment
@@ -405,7 +404,7 @@ def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(one:
 
 def test_files_of_simulators_refuse_it_by_name() -> None:
     scene = driven(1, 4, loads=())
-    for write in (mjcf, sdf, usd):
+    for write in (sdf, usd):
         with pytest.raises(fourbar.FourBarError, match=r"linear drive \(drive\.from, drive\.to\)"):
             write(scene)
 

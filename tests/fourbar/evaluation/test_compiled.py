@@ -14,7 +14,8 @@ from fourbar.evaluation import blocks, compiled, compiled_case
 from fourbar.evaluation.error_bars import EVALUATIONS
 from fourbar.quantities import NOT_ASSEMBLED, OK
 from fourbar.studies.study import vary
-from fourbar_validation.lab.stress.forward_error.stability import TOO_SMALL, run
+from fourbar_validation.lab.stress.forward_error.stability import run
+from fourbar_validation.lab.stress.forward_error.tally import TOO_SMALL
 
 pytest.importorskip("numba", reason="the formulas are compiled by numba: pip install numba")
 

@@ -79,12 +79,12 @@ class Opened:
     @property
     def driven(self) -> Scene:
         """The scene with the drive where the file has its own."""
-        return replace(self.scene, drive_bar=2) if self.drive == "flywheel" else self.scene
+        return replace(self.scene, drive=None, drive_bar=2) if self.drive == "flywheel" else self.scene
 
     def errors(self, answers: dict[str, Any], scene: Scene | None = None) -> dict[str, float]:
         """Against the formulas at the state that was last forwarded, by the greatest value in a turn."""
         d, scene = self.data, scene or self.driven
-        round_ = replace(scene, drive_bar=2, motion=replace(scene.motion, free=None))  # without poles
+        round_ = replace(scene, drive=None, drive_bar=2, motion=replace(scene.motion, free=None))  # without poles
         at = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
         expected, turn = fourbar.solve(scene, "force", at=at), fourbar.solve(round_, "force")
         found = {}
@@ -175,6 +175,43 @@ def takes_what_is_applied(file: Opened) -> None:
     assert file.errors({"torque": 0.7})["torque"] < EXACT
 
 
+def cylinder_force(file: Opened) -> float:
+    """By the formulas at the state that was last forwarded."""
+    d = file.data
+    at = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
+    solution = fourbar.solve(file.scene, "force", at=at)
+    assert d.ten_length[file.model.tendon("cylinder").id] == pytest.approx(solution.stroke[0], rel=1e-9)
+    return float(solution.drive_force[0])
+
+
+def relieves_the_flywheel(file: Opened) -> None:
+    file.step()
+    file.forward()
+    before, control = file.torque(), file.model.actuator("cylinder").id
+    file.data.ctrl[control] = cylinder_force(file)
+    file.forward()
+    assert abs(file.torque()) < EXACT * abs(before)
+    file.data.ctrl[control] *= -1.0
+    file.forward()
+    assert file.torque() == pytest.approx(2.0 * before, rel=EXACT)
+
+
+def pushes_as_controlled(file: Opened) -> None:
+    assert file.data.qvel[0] == 10.0
+    file.data.ctrl[file.model.actuator("cylinder").id] = 7.0
+    file.step()
+    file.forward()
+    assert cylinder_force(file) == pytest.approx(7.0, rel=FOUND)
+
+
+def pushes_as_applied(file: Opened) -> None:
+    m, d = file.model, file.data
+    assert d.qvel[0] == 10.0 and all(m.actuator(each).name.startswith("load_") for each in range(m.nu))
+    file.step()
+    file.forward()
+    assert abs(cylinder_force(file)) < FOUND * 7.0
+
+
 def is_released(file: Opened) -> None:
     assert file.data.qvel[0] == 10.0
     file.step()
@@ -239,6 +276,9 @@ SAID: dict[str, Callable[[Opened], None]] = {
     "The scene drives bar 4, this file bar 2": is_driven_elsewhere,
     "ctrl[drive] is the couple of ground on bar ": takes_control,
     "No drive: the couple of ground on bar ": takes_what_is_applied,
+    "Here the flywheel drives: the cylinder's force": relieves_the_flywheel,
+    "ctrl[cylinder] is the cylinder's force": pushes_as_controlled,
+    "No drive: the force along the tendon cylinder": pushes_as_applied,
     "Released: no drive": is_released,
     "After mj_step, qacc, actuator_force and efc_force": is_of_the_instant_after_forward,
     "T2 = actuator_force[drive] - dof_armature[O2] qacc[O2]": gives_torque,
@@ -248,6 +288,7 @@ SAID: dict[str, Callable[[Opened], None]] = {
     "MuJoCo before 3.7": was_wrong_before_3_7,
 }
 """By how a sentence begins, what it promises."""
+CYLINDER = fourbar.LinearDrive(SpringEnd(1, 0.17, -1.1), SpringEnd(3, 0.09, 0.7))
 FILES: dict[str, tuple[Scene, Drive]] = {
     "at omega_2": (acted_on(), "flywheel"),
     "at alpha_2": (acted_on(motion=fourbar.Motion(fourbar.Sweep(0.4, 5.0, 60), 10.0, 30.0)), "flywheel"),
@@ -255,6 +296,9 @@ FILES: dict[str, tuple[Scene, Drive]] = {
     "motor on bar 3": (acted_on(drive_bar=3), "motor"),
     "motor on bar 2": (acted_on(drive_bar=2), "motor"),
     "no drive": (acted_on(), "none"),
+    "cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "flywheel"),
+    "motor along a cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "motor"),
+    "no drive along a cylinder": (acted_on(drive_bar=None, drive=CYLINDER), "none"),
     "released": (acted_on(motion=fourbar.Motion(0.4, 10.0, free=fourbar.Free(0.1, 2))), "flywheel"),
 }
 

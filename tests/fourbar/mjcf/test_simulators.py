@@ -94,12 +94,112 @@ def read_mjx(text: str, steps: int) -> tuple[Array, Array, Array, float, Array]:
     return q, v, a, float(torque), np.array(closing, dtype=float)[:2]
 
 
+def keyframe(text: str) -> tuple[Array, float]:
+    """Speeds of the keyframe, and the timestep."""
+    root = ET.fromstring(text)
+    key, option = root.find("keyframe/key"), root.find("option")
+    assert key is not None and option is not None
+    return np.array([float(x) for x in str(key.get("qvel")).split()]), float(str(option.get("timestep")))
+
+
+def read_genesis(file: Path, steps: int) -> tuple[Array, Array, Array, float, Array]:
+    """As the comment of the file says."""
+    gs = pytest.importorskip("genesis")
+    text = file.read_text()
+    speeds, timestep = keyframe(text)
+    options = {"dt": timestep, "gravity": (0.0, -9.81, 0.0)}
+    world = gs.Scene(
+        sim_options=gs.options.SimOptions(**options),
+        rigid_options=gs.options.RigidOptions(**options),
+        show_viewer=False,
+    )
+    bars = world.add_entity(gs.morphs.MJCF(file=str(file), default_armature=None))
+    world.build()
+    bars.set_dofs_velocity(speeds)
+    for _ in range(steps):
+        world.step()
+    q, v = (x.cpu().numpy().copy() for x in (bars.get_qpos(), bars.get_dofs_velocity()))
+    world.step()
+    a = world.sim.rigid_solver.get_dofs_acc().cpu().numpy().ravel()
+    torque = -float(bars.get_dofs_armature()[0]) * float(a[0])
+    return q, v, a, torque, world.sim.rigid_solver.constraint_solver.efc_force.to_numpy()[:2].ravel()
+
+
+def read_newton(file: Path, steps: int) -> tuple[Array, Array, Array, float, Array]:
+    """As the comment of the file says."""
+    newton = pytest.importorskip("newton")
+    speeds, timestep = keyframe(file.read_text())
+    builder = newton.ModelBuilder(gravity=(0.0, -9.81, 0.0))
+    builder.add_mjcf(str(file))
+    model = builder.finalize(device="cpu")
+    solver, now, then = newton.solvers.SolverMuJoCo(model), model.state(), model.state()
+    start = now.joint_qd.numpy()
+    assert not now.joint_q.numpy()[:3].any()
+    start[:3] = speeds
+    now.joint_qd.assign(start)
+    for _ in range(steps):
+        solver.step(now, then, model.control(), None, timestep)
+        now, then = then, now
+    data, mjw = solver.mjw_data, importlib.import_module("mujoco_warp")
+    for _ in range(2):
+        mjw.forward(solver.mjw_model, data)
+    q, v, a, drive = (x.numpy()[0].astype(float) for x in (data.qpos, data.qvel, data.qacc, data.actuator_force))
+    torque = float(drive[0] - solver.mj_model.dof_armature[0] * a[0])
+    return q, v, a, torque, data.efc.force.numpy()[0, :2].astype(float)
+
+
+MIDWAY = 200
+"""Steps after which the closures have settled from the exact start."""
+
+
+@pytest.mark.nightly
+def test_genesis_reads_as_the_comment_says_and_leaves_out_what_it_names(tmp_path: Path) -> None:
+    motion = fourbar.Motion(fourbar.Sweep(0.4, 0.4 + 2.0 * np.pi, 60), 10.0)
+    joints = (fourbar.Gravity(), fourbar.Viscous.at(A=0.05), fourbar.Friction.at(O4=0.1))
+    kept = crank_rocker(motion=motion, loads=(), effects=joints)
+    ends = fourbar.effects.SpringEnd(1, 0.1, -1.5), fourbar.effects.SpringEnd(3, 0.08, 0.3)
+    springs = fourbar.Springs((fourbar.Spring(*ends, 200.0, 0.02),))
+    whole = crank_rocker(motion=motion, effects=(*joints, springs))
+    stiff = replace(kept, effects=(*joints, Torsion.at(O4=(0.5, 0.2, 0.1))))
+    assembled = float(fourbar.solve(kept, "position").theta_4[0]) - kept.linkage.ground_angle
+    resting = replace(kept, effects=(*joints, Torsion.at(O4=(0.5, assembled, 0.0))))
+    at_B = replace(
+        kept, effects=(fourbar.Viscous.at(A=0.05, B=0.1), fourbar.Friction.at(B=0.2), Torsion.at(B=(1, 0, 0)))
+    )
+    for scene, names in (
+        (kept, []),
+        (whole, ["loads, springs"]),
+        (stiff, ["rest angles of torsion (it rests as assembled)"]),
+        (at_B, ["viscous at B, friction at B, torsion at B"]),
+    ):
+        assert re.findall(r"it leaves out ([^.]*)\. ", mjcf_for(scene, "genesis")) == names
+    gs = pytest.importorskip("genesis")
+    gs.init(backend=gs.cpu, precision="64", logging_level="error")
+    faster = replace(whole, motion=replace(motion, alpha_2=30.0))
+    for scene, moves_as in ((kept, kept), (whole, kept), (faster, kept), (stiff, resting)):
+        (file := tmp_path / "four_bar.xml").write_text(mjcf_for(scene, "genesis"))
+        read = read_genesis(file, MIDWAY)
+        assert max(errors(moves_as, *read)) < YIELDING
+        assert read[1][0] == pytest.approx(10.0, rel=1e-6), "the keyframe's speed, of an accelerated scene too"
+
+
+@pytest.mark.nightly
+def test_newton_reads_the_mjcf_as_the_comment_says(tmp_path: Path) -> None:
+    for motion in (fourbar.Motion(1.0, 10.0), fourbar.Motion(1.0, 10.0, 30.0)):
+        scene = crank_rocker(motion=motion, drive_bar=4)
+        (file := tmp_path / "four_bar.xml").write_text(mjcf_for(scene, "newton"))
+        read = read_newton(file, MIDWAY)
+        assert max(errors(scene, *read)) < SINGLE
+        assert read[2][0] == pytest.approx(motion.acceleration, abs=0.01)
+
+
 SINGLE = 1e-2
 """Of MuJoCo Warp: single precision in a closure of impedance 0.9999 keeps 1e4 roundings; measured 2.5e-3 in a turn."""
 YIELDING = 1e-2
 """Of MJX, whose closure makes up for the missing term by yielding; measured 8.5e-4 in a turn."""
 
 
+@pytest.mark.nightly
 def test_warp_reads_as_the_comment_says() -> None:
     scene = crank_rocker(drive_bar=4)
     text = mjcf_for(scene, "warp")
@@ -107,6 +207,7 @@ def test_warp_reads_as_the_comment_says() -> None:
     assert "forward twice" in text
 
 
+@pytest.mark.nightly
 def test_mjx_reads_as_the_comment_says() -> None:
     scene = crank_rocker(drive_bar=4)
     assert max(errors(scene, *read_mjx(mjcf_for(scene, "mjx"), STEPS))) < YIELDING
@@ -139,6 +240,7 @@ FORCE = 0.01
 """Of Drake's reaction at A after 200 steps of 1 ms, of first order; measured 1.1e-3."""
 
 
+@pytest.mark.nightly
 def test_drake_loads_the_sdf_and_moves_as_released() -> None:
     pytest.importorskip("pydrake")
     plants, parsing = (importlib.import_module(f"pydrake.multibody.{name}") for name in ("plant", "parsing"))
@@ -239,6 +341,7 @@ KAMINO = 0.01
 """Of Kamino's force at B in its third step of 1 ms: single precision, and a first-order step; measured 1.5e-3."""
 
 
+@pytest.mark.nightly
 def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
     newton = pytest.importorskip("newton")
     pytest.importorskip("newton_usd_schemas")

@@ -13,6 +13,7 @@ from fourbar.errors import FourBarError, InputError
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
 from fourbar.scene.motion import Sweep
+from fourbar.studies.keys import at_place, with_numbers
 from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
@@ -22,6 +23,10 @@ ROUND_OFF = 1e-11
 """Relative: eps over the conditions of these sweeps, 1e-4 at least."""
 ENDS = {2: SpringEnd(2, 0.12, 0.4), 4: SpringEnd(4, 0.15, -0.6)}
 GROUND = SpringEnd(1, 0.3, 2.2)
+SAMPLED = 0.02
+"""Relative, of the standard deviation of 256 quasi-random samples, whose tails end at half a sample."""
+DIFFERENCES = 1e-5
+"""Relative, of differences over two millionths of a length of a tenth: (1e-5)^2 times third derivatives of 1e4."""
 
 
 def scene(bar: int, stroke: Any, side: str = "left", *, turned: bool = False, **motion: Any) -> fourbar.Scene:
@@ -118,9 +123,51 @@ def test_who_does_not_take_it_says_so() -> None:
     with pytest.raises(InputError, match=r"motion\.stroke.*cylinder"):
         crank_rocker(motion=fourbar.Motion(stroke=0.3, side="left"))
     own = scene(2, Sweep(0.25, 0.35, 8), stroke_speed=0.2)
-    for refuses in (fourbar.sensitivity, fourbar.extremes, fourbar.equilibrium, fourbar.ratio):
-        with pytest.raises(FourBarError, match=r"motion\.stroke"):
-            refuses(own)
     with pytest.raises(FourBarError, match=r"motion\.stroke"):
-        fourbar.vary(own, {"lengths.input": np.array([0.1])})
+        fourbar.extremes(own)
     assert replace(own, title="b") != own
+
+
+@pytest.mark.parametrize(("bar", "strokes"), [(2, (0.25, 0.35)), (4, (0.45, 0.52))])
+def test_a_study_of_strokes_is_as_its_members_one_by_one(bar: int, strokes: tuple[float, float]) -> None:
+    own = scene(bar, Sweep(*strokes, 6), stroke_speed=0.2, stroke_acceleration=0.1)
+    values = {"lengths.input": [0.1, 0.11], "drive.to.at.0": [0.12, 0.14], "drive.from.at.1": [2.2, 2.3]}
+    values |= {"lengths.ground_angle": [0.0, 0.2], "motion.stroke_speed": [0.2, -0.3]}
+    study = fourbar.solve(fourbar.vary(own, values))
+    for k in range(2):
+        one = fourbar.solve(with_numbers(own, {key: pair[k] for key, pair in values.items()}))
+        assert one.status == study.status[k] and one.status.count("ok") > 5
+        for name in ("theta_2", "theta_4", "alpha_3", "drive_force", "F14", "condition", "stroke"):
+            theirs = getattr(one, name)
+            np.testing.assert_allclose(getattr(study, name)[k], theirs, rtol=ROUND_OFF, atol=1e-12)
+
+
+def test_a_member_whose_cylinder_cannot_have_the_stroke_does_not_assemble() -> None:
+    found = fourbar.solve(fourbar.vary(scene(2, 0.3, stroke_speed=0.2), {"motion.stroke": [0.1, 0.3, 0.5]}))
+    assert found.status == [["not_assembled", "ok", "not_assembled"]] and np.isnan(found.theta_2[0, ::2]).all()
+
+
+@pytest.mark.parametrize(("bar", "stroke"), [(2, 0.3), (4, 0.48)])
+def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) -> None:
+    own, h = scene(bar, stroke, stroke_speed=0.2, stroke_acceleration=0.1), 1e-6
+    found = fourbar.sensitivity(own)
+    assert {"motion.stroke", "motion.stroke_speed", "motion.stroke_acceleration", "drive.to.at.1"} <= set(found.keys)
+    for key in found.keys:
+        at = stroke if key == "motion.stroke" else at_place(own, found.keys[key].place)
+        ends = np.array([at + h, at - h])
+        s = fourbar.solve(fourbar.vary(own, {key: ends[:, None] if key == "motion.stroke" else ends}))
+        for name in ("theta_2", "theta_3", "alpha_4", "drive_force", "F12", "condition"):
+            one, other = getattr(s, name)
+            slope = (one - other)[0] / (2.0 * h)
+            size = np.abs(getattr(found.solution, name)).max() / h
+            np.testing.assert_allclose(found.of(name, key)[0], slope, rtol=DIFFERENCES, atol=1e-11 * size)
+
+
+def test_tolerances_at_a_stroke_spread_as_first_order_says() -> None:
+    drawn = fourbar.Tolerance("drive.to.at.0", 1e-5, sigma=True)
+    own = replace(scene(2, Sweep(0.25, 0.35, 5), stroke_speed=0.2), tolerances=(drawn,))
+    found, slopes = fourbar.tolerances(own, 256), fourbar.sensitivity(own)
+    for name in ("theta_2", "theta_4", "drive_force"):
+        wanted = 1e-5 * np.abs(slopes.of(name, drawn.key))
+        np.testing.assert_allclose(found.spreads[name].deviation, wanted, rtol=SAMPLED)
+    assert not found.without.any()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.effects import SpringEnd
 from fourbar.scene import Command
 from fourbar.scene.motion_law import Law
 from fourbar.show.between import between, sizes
@@ -81,3 +82,23 @@ def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_
     listed = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, 6.0, 9), 10.0))
     assert between(listed, fourbar.solve(listed)) is None
     assert any("torque of these positions" in line for line in heading(listed, fourbar.solve(listed)))
+
+
+def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
+    drive = fourbar.LinearDrive(SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17))
+
+    def of(steps: int) -> fourbar.Scene:
+        motion = fourbar.Motion(stroke=fourbar.Sweep(0.33, 0.17, steps), stroke_speed=-0.2, side="left")
+        return crank_rocker(motion=motion, drive=drive, effects=(fourbar.Friction((("A", 0.01),)),))
+
+    found = between(of(20), fourbar.solve(of(20)))
+    assert (
+        found is not None and found.solution.at.stroke is not None and (np.diff(found.solution.at.stroke) < 0.0).all()
+    )
+    fine = fourbar.solve(of(20000))
+    for name, size in sizes(fine).items():
+        assert sizes(found.solution)[name].max() == pytest.approx(size.max(), rel=PEAK), name
+    slips = np.flatnonzero(np.diff(np.sign(fine.omega_3 - fine.omega_2)))
+    assert [pin for _, pin in found.reversals] == ["A"] * len(slips)
+    for (place, _), i in zip(found.reversals, slips, strict=True):
+        assert fine.at.stroke[i + 1] <= place <= fine.at.stroke[i]

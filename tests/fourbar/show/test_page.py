@@ -187,6 +187,47 @@ def test_a_released_linkage_with_other_lengths_is_swept_over_the_angle(browse) -
     np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[row], atol=PIXEL)
 
 
+DRIVE = fourbar.LinearDrive(SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17))
+STROKES = fourbar.Motion(stroke=fourbar.Sweep(0.17, 0.33, 40), stroke_speed=0.2, side="left")
+OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
+"""Its ends do not assemble."""
+
+
+@pytest.mark.parametrize(
+    ("motion", "name", "at", "over", "pace"),
+    [
+        (STROKES, "stroke", "250.00 mm", "Over stroke", "at stroke speed = 0.2 m/s the mechanism takes 0.8 s"),
+        (OUTPUT, "theta_4", "134.65°", "Over θ₄", "at ω₄ = 4 rad/s the mechanism takes 0.3 s"),
+    ],
+)
+def test_another_command_is_the_axis_and_the_linkage_follows(browse, motion, name, at, over, pace) -> None:
+    scene = crank_rocker(motion=motion, drive=DRIVE)
+    driver, s = browse(animate.page(scene)), fourbar.solve(scene)
+    driver.execute_script("go(20)")
+    assert driver.find_element("id", "theta-text").text == at
+    assert driver.find_element("id", "over").text == over and pace in driver.find_element("id", "pace").text
+    assert not driver.find_element("id", "branch").is_displayed()
+    names = ("theta_2", "theta_3", "theta_4")
+    assert shown(driver, *names) == pytest.approx([math.degrees(getattr(s, n)[20]) for n in names], abs=PRINTED_DEG)
+    assert shown(driver, "drive_force", "condition") == pytest.approx([s.drive_force[20], s.condition[20]], rel=PRINTED)
+    assert shown(driver, "stroke") == pytest.approx([1000.0 * s.stroke[20]], rel=PRINTED)
+    drawn = pins(driver)
+    np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[20], atol=PIXEL)
+    assert state_of(driver, "plotted.over") == pytest.approx(getattr(s.at, "stroke" if name == "stroke" else "angle"))
+    driver.find_element("id", "chart").click()  # its middle
+    assert abs(state_of(driver, "row") - 20) <= 2
+    closed = [i for i in range(41) if s.assembled[i]]
+    rows = clockwork(driver, 400)
+    assert (min(rows), max(rows)) == (closed[0], closed[-1]) and np.abs(np.diff(rows)).max() <= 1
+    driver.execute_script("play(false); go(0)")
+    assert driver.find_element("id", "status").is_displayed() == (not s.assembled[0])
+    driver.execute_script("go(20)")
+    type_length(driver, 3, 283.0)  # edited it is swept over the angle of the input
+    assert driver.find_element("id", "over").text == "Over θ₂" and driver.find_element("id", "branch").is_displayed()
+    driver.find_element("id", "original").click()
+    assert driver.find_element("id", "over").text == over
+
+
 def test_a_changed_length_redraws_by_the_formulas_and_hides_the_forces(browse) -> None:
     scene = crank_rocker()
     driver = browse(animate.page(scene))

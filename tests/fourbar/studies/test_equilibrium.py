@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -20,6 +21,7 @@ from fourbar.studies import equilibrium as module
 from fourbar.studies.circuit_curve import SAMPLES
 from fourbar.studies.equilibrium import Equilibria, Equilibrium, equilibrium
 from fourbar_validation.engines.free_body import FreeBody
+from tests.support.scenes import crank_rocker
 
 MODELS = Path(__file__).parents[3] / "models"
 M, R, INERTIA = 1.5, 0.04, 0.002
@@ -323,3 +325,24 @@ def test_a_zero_that_falls_on_a_sample_is_found_by_signs_too() -> None:
     scene = replace(crank_as_pendulum(Torsion.at(O2=(2.0, sample, 0.0))), linkage=linkage)
     (rest,) = equilibrium(scene).found
     assert rest.place.theta_2 == pytest.approx(sample, abs=1e-9)
+
+
+DRIVE = fourbar.LinearDrive(SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17))
+
+
+@pytest.mark.parametrize("name", ["theta_3", "theta_4", "stroke"])
+def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(name: str) -> None:
+    """Those of the input swept over the same; a single position has those of its circuit."""
+    swept = {"theta_3": (1.0, 1.25), "theta_4": (1.95, 2.4), "stroke": (0.17, 0.3)}[name]
+    side: dict[str, Any] = {"side": "left"} if name == "stroke" else {"branch": -1}
+    motion = Motion(**{name: Sweep(*swept, 90)}, **side)
+    own = crank_rocker(motion=motion, effects=(fourbar.Gravity(),), drive=DRIVE)
+    theta_2 = fourbar.solve(own).theta_2
+    same = replace(own, motion=Motion(Sweep(float(theta_2.min()), float(theta_2.max()), 90)))
+    found, known = equilibrium(own), equilibrium(same)
+    assert len(known.found) == len(found.found) > 0 and found.proven
+    for one, other in zip(found.found, known.found, strict=True):
+        assert one.place == pytest.approx(other.place) and one.frequency == pytest.approx(other.frequency)
+    single = replace(own, motion=Motion(**{name: swept[0]}, **side))
+    whole = replace(own, motion=Motion(float(theta_2[0])))
+    assert len(equilibrium(single).found) == len(equilibrium(whole).found) > 0

@@ -27,7 +27,7 @@ from fourbar.formulas.arithmetic import namespace
 from fourbar.quantities import OF_LINE, STAGE_OF
 from fourbar.scene.motion import Free
 from fourbar.studies.function import NEVER, function
-from fourbar.studies.keys import angle_key, at_place, entries, left_out
+from fourbar.studies.keys import at_place, command_key, entries, left_out
 from fourbar_validation.lab.stress.forward_error.families import FAMILIES
 
 EPS = 2.0**-52
@@ -36,7 +36,7 @@ ROUNDED = 200.0 * EPS
 DIFFERENCES = 1e-7
 """What central differences of a step of 1e-6 leave of a derivative."""
 STEP = 1e-6
-LIBRARIES = ("jax", "torch")
+LIBRARIES = ("jax", pytest.param("torch", marks=pytest.mark.nightly))  # of gigabytes
 pytestmark = pytest.mark.filterwarnings("ignore:There is a performance drop")  # PyTorch maps no product's derivative
 
 
@@ -95,7 +95,7 @@ ANGLES = np.linspace(0.0, 6.0, 13)
 def numbers_of(scene: Scene) -> dict[str, float]:
     """Every number that a scene states, its angle too."""
     found = {key: at_place(scene, entry.place) for key, entry in entries(scene).items() if not left_out(scene, entry)}
-    return {**found, angle_key(scene): float(np.ravel(scene.motion.angle)[0])}
+    return {**found, command_key(scene): float(np.ravel(scene.motion.angle)[0])}
 
 
 def of_solution(solution: Any, name: str) -> Any:
@@ -144,7 +144,7 @@ def test_a_drive_along_a_line(library: Library, ends: tuple[int, int]) -> None:
 def test_other_bars_command(library: Library, motion: Motion) -> None:
     scene = replace(LOADED, motion=motion, loads=())
     solution = fourbar.solve(scene)
-    f = function(scene, ["lengths.output", angle_key(scene)], ["torque", "F12", "condition"])
+    f = function(scene, ["lengths.output", command_key(scene)], ["torque", "F12", "condition"])
     found = f(library.array(0.22), library.array(motion.angle))
     for name, value in found.items():
         assert np.asarray(value) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
@@ -174,7 +174,7 @@ def test_derivatives_keep_their_digits_beside_half_a_turn(library: Library, moti
     """There the tangent of half the angle is large: at 1e-6 rad nine digits of the slopes once were left."""
     lengths = (0.22, 0.25, 0.1) if motion.bar == 4 else (0.1, 0.25, 0.22)
     scene = replace(LOADED, linkage=uniform(0.3, *lengths), motion=motion, loads=(), effects=(Gravity(),))
-    key, wanted = angle_key(scene), fourbar.sensitivity(scene)
+    key, wanted = command_key(scene), fourbar.sensitivity(scene)
     f = function(scene, [key], ["torque", "A", "alpha_3"])
     for transform in {library.jacrev, library.jacrev if library.xp.__name__ == "torch" else library.jacfwd}:
         found = transform(f)(library.array(motion.angle))

@@ -13,9 +13,11 @@ from numpy.polynomial import Polynomial
 import fourbar
 from fourbar import InputError, Motion, PinFriction, Scene, Sweep, uniform
 from fourbar.cli import status
+from fourbar.effects import SpringEnd
 from fourbar.mjcf import mjcf, with_mimic
 from fourbar.scene import Command
 from fourbar.studies.ratio import GearRatio, ratio
+from tests.support.scenes import crank_rocker
 
 MODELS = Path(__file__).parents[3] / "models"
 ROUNDING = 1e-9
@@ -159,3 +161,33 @@ def test_the_commands_print_and_write(tmp_path: Path, capsys: pytest.CaptureFixt
         assert status(bad) == 2
         assert capsys.readouterr().err.count("\n") == 1
     assert not no.exists()
+
+
+SAME_FIT = 0.2
+"""Relative, of greatest errors of fits to one range by other samples: they stand at its ends, where the weights are
+greatest and the first spacing counts; a fit to another range or of another weight is wrong by a factor."""
+
+
+@pytest.mark.parametrize("name", ["theta_4", "stroke"])
+def test_another_command_has_the_polynomials_of_the_range_that_it_passes(name: str) -> None:
+    motion = {
+        "theta_4": Motion(theta_4=Sweep(2.2, 2.75, 400), omega_4=3.0),
+        "stroke": Motion(stroke=Sweep(0.17, 0.3, 400), stroke_speed=0.2, side="left"),
+    }[name]
+    ends = SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+    own = crank_rocker(motion=motion, drive=fourbar.LinearDrive(*ends), effects=(fourbar.Gravity(),))
+    s = fourbar.solve(own)
+    low, high = float(s.theta_2.min()), float(s.theta_2.max())
+    found, known = ratio(own), ratio(replace(own, motion=Motion(Sweep(low, high, 400), 1.0)))
+    np.testing.assert_allclose(found.omega_ratio, s.omega_4 / s.omega_2, rtol=ROUNDING)
+    np.testing.assert_allclose(found.torque * s.omega_2, s.power, atol=ROUNDING * np.abs(s.power).max())
+    for one, other in zip(found.fits, known.fits, strict=True):
+        assert one.angle.value == pytest.approx(other.angle.value, rel=SAME_FIT)
+        assert one.speed.value == pytest.approx(other.speed.value, rel=SAME_FIT)
+
+
+def test_a_range_that_turns_back_is_refused() -> None:
+    with pytest.raises(InputError, match="rises or falls throughout"):
+        ratio(crank_rocker(motion=Motion(theta_4=2.2, omega_4=1.0)))
+    with pytest.raises(InputError, match="rises or falls throughout"):
+        ratio(crank_rocker(motion=Motion(theta_4=Sweep(1.0, 2.2, 50), omega_4=1.0)))

@@ -1,15 +1,17 @@
 """Studies: a member of many linkages is that linkage alone, to the last digit; what no scene takes has a status."""
 
+import tomllib
 from typing import Any
 
 import numpy as np
 import pytest
 
-from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, solve, uniform
+from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, dump, solve, uniform
 from fourbar.effects import (
     Flywheel,
     Friction,
     Gravity,
+    LinearDrive,
     Load,
     PinFriction,
     Spring,
@@ -22,6 +24,7 @@ from fourbar.quantities import VECTORS
 from fourbar.scene import command
 from fourbar.scene.motion import Free, FromLimit
 from fourbar.scene.motion_law import Law
+from fourbar.scene.point import Point
 from fourbar.studies import study as studying
 from fourbar.studies.keys import entries, placed
 from fourbar.studies.study import Study, vary
@@ -176,12 +179,46 @@ REFUSED = {
     "the branch": ({"motion.branch": [1, -1]}, "is the same for every member"),
     "two lengths": ({"lengths.input": [0.1, 0.2], "lengths.output": [0.2, 0.2, 0.2]}, "lengths.input has 2"),
     "two lengths, of angles": ({"lengths.input": [0.1, 0.2], "motion.theta_2": np.ones((3, 2))}, "has 2"),
-    "words": ({"lengths.input": ["10 cm"]}, "must be an array of numbers"),
+    "words": ({"lengths.input": ["ten"]}, "there is no finite number"),
+    "no unit": ({"lengths.input": ["10"]}, "the unit is missing"),
     "truths": ({"lengths.input": [True]}, "must be an array of numbers"),
     "rows of different lengths": ({"lengths.input": [[0.1], [0.1, 0.2]]}, "must be an array of numbers"),
     "nothing": ({"lengths.input": []}, "at least one"),
     "a table": ({"lengths.input": np.ones((2, 2))}, "must have the shape (m,)"),
 }
+
+
+def test_a_key_has_the_unit_that_a_scene_file_has() -> None:
+    drive = LinearDrive(SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.1))
+    linkage = FourBar(0.3, *(Bar(size, 0.2, 0.001, (0.04, 0.2)) for size in (0.1, 0.25, 0.22)), 0.4)
+    acting, points = (*DRIVEN, PinFriction.at(A=(0.1, 0.01))), (Point("P", 3, (0.1, 0.2)),)
+    scene = Scene(linkage, Motion(ANGLES, 2.0, alpha_2=0.5), loads=LOADS, effects=acting, points=points, drive=drive)
+    written = tomllib.loads(dump(scene))
+    for key, number in entries(scene).items():
+        entry: Any = written
+        for name in key.split("."):
+            entry = entry[int(name) if isinstance(entry, list) else name]
+        assert (entry.partition(" ")[2] if isinstance(entry, str) else "1") == number.unit, key
+
+
+def test_texts_with_units_are_the_numbers() -> None:
+    scene = Scene(LINK, Motion(ANGLES, 2.0), effects=DRIVEN)
+    texts = {"lengths.input": ["10 cm", "4 in", 0.1], "bars.coupler.centre.1": "180 deg", "effects.torsion.B.rest": 0.5}
+    si = texts | {"lengths.input": [0.1, 0.1016, 0.1], "bars.coupler.centre.1": np.pi}
+    theta: dict[str, Any] = {"motion.theta_2": [["10 deg", "0.5 rev"], [0.1, 0.2], ["1 rad", 0]]}
+    one, other = vary(scene, texts | theta), vary(scene, si)
+    assert all((one.values[key] == other.values[key]).all() for key in si)
+    assert (one.at.angle == [[np.radians(10.0), np.pi], [0.1, 0.2], [1.0, 0.0]]).all()
+    assert Tolerance("lengths.input", "0.1 mm") == Tolerance("lengths.input", 1e-4)  # type: ignore[arg-type]
+    for key, text, words in (
+        ("lengths.input", "1 deg", 'lengths.input = .*"deg" does not convert to m'),
+        ("effects.viscous.O2", "1 N m", "does not convert to N m s/rad"),
+        ("lengths.x", "1 mm", "unknown key"),
+    ):
+        with pytest.raises(InputError, match=words):
+            Tolerance(key, text)  # type: ignore[arg-type]
+        with pytest.raises(InputError, match=words):
+            vary(scene, {key: [text]})
 
 
 @pytest.mark.parametrize("name", REFUSED)

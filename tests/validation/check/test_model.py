@@ -16,7 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 import fourbar
-from fourbar.effects import Friction
+from fourbar.effects import Friction, SpringEnd
 from fourbar.errors import InputError
 from fourbar.mjcf import mjcf
 from fourbar.quantities import UNKNOWNS
@@ -283,6 +283,25 @@ def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
     assert any("servo" in note for note in found.notes)
     assert any("switched off" in note for note in found.notes)
     assert max(errors(CRANK_ROCKER, found, ONE_STATE).values()) <= SIMULATED.factor
+
+
+def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
+    drive = fourbar.LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7))
+    scene = replace(CRANK_ROCKER, drive_bar=None, drive=drive)
+    text, driven = mjcf(scene), '<general name="cylinder" tendon="cylinder" />'
+    servo = '<position name="ram" tendon="cylinder" kp="400" kv="3" gear="2" ctrlrange="-1 1" forcerange="-1 1"/>'
+    for mine in (text, text.replace(driven, servo)):
+        examined = examine(scene, mine, {})
+        assert any("gives the cylinder's force" in note for note in examined.notes)
+        for how, most in ((ONE_STATE, 1e-9), (THROUGH_TIME, 1e-6)):
+            found = errors(scene, examined, how)
+            assert "torque" not in found and max(found[name] for name in ("drive_force", "F12", "F43", "F14")) < most
+    at = 'name="cylinder_end" pos="'
+    moved = text.replace(at + "0.0", at + "0.1")
+    assert moved != text and errors(scene, examine(scene, moved, {}), ONE_STATE)["drive_force"] > 1e-2
+    assert any(key.startswith("tendons.") for key in keys(scene, examine(scene, moved, {})))
+    with pytest.raises(InputError, match="0 actuators with a control on tendons"):
+        examine(scene, text.replace(driven, ""), {})
 
 
 def test_a_loop_that_nothing_closes_is_seen_in_the_numbers() -> None:

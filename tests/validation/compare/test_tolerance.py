@@ -3,7 +3,19 @@
 import numpy as np
 import pytest
 
-from fourbar_validation.compare.tolerance import difference, in_own_unit, relative, relative_error, used, worst
+import fourbar
+from fourbar.effects import LinearDrive, SpringEnd
+from fourbar_validation.compare.tolerance import (
+    condition_of,
+    difference,
+    in_own_unit,
+    lever,
+    relative,
+    relative_error,
+    used,
+    worst,
+)
+from tests.support.scenes import crank_rocker
 
 NAN, INF = float("nan"), float("inf")
 
@@ -32,3 +44,18 @@ def test_what_is_no_number_uses_more_than_is_allowed(error: float, allowed: floa
 def test_the_worst_error_is_the_one_that_is_no_number() -> None:
     assert worst(np.array([1.0, NAN, 3.0])) == 1
     assert worst(np.array([1.0, 2.0, 0.0])) == 1
+
+
+def test_of_a_stroke_the_angle_of_its_bar_is_conditioned_by_the_lever() -> None:
+    """From O2 to the line over the longer of both arms; what follows by |sin(theta_4 - theta_3)| too."""
+    r, arm = 0.25, 0.09
+    drive = LinearDrive(SpringEnd(1, r, 2.5), SpringEnd(2, arm, 0.3))
+    motion = fourbar.Motion(stroke=np.array([0.2, 0.3, 0.339]), side="left", stroke_speed=0.1)
+    s = fourbar.solve(crank_rocker(motion=motion, drive=drive))
+    share = arm * np.sin(np.arccos((arm * arm + r * r - s.stroke**2) / (2.0 * arm * r))) / s.stroke
+    linkage = crank_rocker().linkage
+    assert s.condition == pytest.approx(np.abs(np.sin(s.theta_4 - s.theta_3)) * share)
+    for name, wanted in (("theta_2", share), ("omega_2", share**2), ("theta_4", lever(linkage) * s.condition)):
+        assert condition_of(name, linkage, s) == pytest.approx(wanted)
+    at_angles = crank_rocker(motion=fourbar.Motion(theta_2=s.theta_2, omega_2=1.0), drive=drive)
+    assert (condition_of("theta_2", linkage, fourbar.solve(at_angles)) == 1.0).all()

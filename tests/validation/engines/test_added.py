@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.effects.spring import SpringEnd
 from fourbar.errors import InputError
 from fourbar.files import save
 from fourbar.quantities import UNKNOWNS
@@ -80,6 +81,41 @@ class Right:
 
     def answer(self, scene: Any, at: Any) -> Answer:
         return FreeBody().answer(scene, at)
+
+
+class OfAnyBar(Right):
+    name = "of any bar"
+    commands = ("theta_4", "stroke")
+    linear_drive = True
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        assert at.stroke is None or np.isnan(at.angle).all()
+        answer = super().answer(scene, at)
+        return Answer(self.name, "exact", at, answer.assembled, answer.quantities)
+
+
+class ThetaFourAlone(OfAnyBar):
+    """It does not say where the input stands."""
+
+    name = "theta_4 alone"
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        answer = super().answer(scene, at)
+        del answer.quantities["theta_2"]
+        return answer
+
+
+def test_a_witness_is_asked_for_the_commands_that_its_class_names() -> None:
+    four = crank_rocker(motion=fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0))
+    three = crank_rocker(motion=fourbar.Motion(theta_3=fourbar.Sweep(0.4, 0.8, 8), omega_3=3.0))
+    stroke = fourbar.Motion(stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left")
+    drive = fourbar.LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
+    for scene in (four, crank_rocker(motion=stroke, drive=drive)):
+        found = verdicts(scene, "OfAnyBar", "ThetaFourAlone", "Right")
+        assert set(found["of any bar"].values()) == set(found["theta_4 alone"].values()) == {"agrees"}
+        assert {"theta_3", "alpha_4", "F12"} <= found["of any bar"].keys() and "closure" not in found["theta_4 alone"]
+        assert found["right"] == {"all": REFUSES}
+    assert verdicts(three, "OfAnyBar")["of any bar"] == {"all": REFUSES}
 
 
 class Angle(Right):

@@ -10,22 +10,26 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from fourbar.effects import Effect, Friction, Gravity, Load, PinFriction, Viscous
+import fourbar
+from fourbar.effects import Effect, Friction, Gravity, LinearDrive, Load, PinFriction, SpringEnd, Viscous
 from fourbar.errors import InputError
 from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solve import solve
 from fourbar_validation.compare.compare import COMPARED, Comparison
+from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, K
 from fourbar_validation.engines import loop
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
+from fourbar_validation.engines.tree import closed
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
+from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
-from tests.support.scenes import thesis
+from tests.support.scenes import crank_rocker, thesis
 from tests.validation.engines.test_effects import ACTING, scene
 
 WITNESS = {witness.name: witness for witness in (*WITNESSES, *FURTHER) if not witness.through_time}
@@ -311,7 +315,7 @@ def larger(right: Callable[..., Any]) -> Callable[..., Any]:
 
 IN_A_TREE = {
     "drift": (partial(scaled, factor=0.0), {"alpha_3", "alpha_4", "torque", "F12"}),
-    "turn": (partial(scaled, factor=1.0 + 1e-9), {"omega_3", "torque"}),
+    "turn": (partial(scaled, factor=1.0 + 1e-9), {"alpha_3", "a_B", "torque"}),
     "rotation": (partial(scaled, factor=1.0 + 1e-9), {"F43", "torque"}),
     "forces": (wrong_loop_force, {"F12", "F32", "F14"}),
     "carried": (longer, {"F12", "F32", "F14"}),
@@ -358,6 +362,56 @@ def test_a_planted_fault_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> No
     right = loop.Assembler.find
     monkeypatch.setattr(loop.Assembler, "find", lambda self, theta_2, branch: right(self, theta_2, -branch))
     assert {"theta_3", "theta_4", "torque"} <= judged(name)
+
+
+MOVED = ("A", "theta_3", "theta_4", "omega_2", "omega_3", "alpha_2", "alpha_4", "a_B", "F12", "F32", "F43", "F14")
+OUTPUT, COUPLER = np.linspace(1.8, 2.5, 8), np.linspace(0.4, 0.8, 8)
+STROKES = {
+    2: (LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)), fourbar.Sweep(0.25, 0.35, 8), "left"),
+    4: (LinearDrive(SpringEnd(1, 0.5, -0.5), SpringEnd(4, 0.09, 0.7)), fourbar.Sweep(0.33, 0.36, 8), "right"),
+}
+
+
+def commanded(what: str, branch: int) -> Scene:
+    """A crank-rocker commanded at another bar than the input, or by the stroke of the cylinder that drives it."""
+    if what in ("theta_3", "theta_4"):
+        bar, angles = int(what[-1]), (OUTPUT if what == "theta_4" else COUPLER) + 20.0 * math.pi
+        stated = {what: angles, f"omega_{bar}": 3.0, f"alpha_{bar}": -2.0, "branch": branch}
+        return crank_rocker(motion=Motion(**stated), drive_bar=bar)
+    drive, sweep, side = STROKES[int(what[-1])]
+    stated = {"stroke": sweep, "stroke_speed": 0.2, "stroke_acceleration": 0.1, "side": side, "branch": branch}
+    return crank_rocker(motion=Motion(**stated), drive=drive)
+
+
+@each_engine
+@pytest.mark.parametrize("what", ["theta_3", "theta_4", "stroke of bar 2", "stroke of bar 4"])
+def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
+    name: str, what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for branch in (1, -1):
+        case = commanded(what, branch)
+        rows = [row for row in judge("", case, [WITNESS[name]]).rows if row.engine == name]
+        if name == "opensim-constraints" and what == "theta_3":
+            assert [(row.verdict, "theta_3 is commanded" in row.reason) for row in rows] == [(REFUSES, True)]
+            continue
+        assert not [row for row in rows if row.failed], branch
+        held = {row.quantity for row in rows if row.verdict == AGREES}
+        assert {*MOVED, "torque" if case.drive is None else "drive_force", "closure"} <= held
+        right = loop.Assembler.find
+        with monkeypatch.context() as patch:
+            patch.setattr(loop.Assembler, "find", lambda self, theta, branch, of=right: of(self, theta, -branch))
+            assert [row for row in judge("", case, [WITNESS[name]]).rows if row.engine == name and row.failed]
+
+
+def test_rates_close_the_loop_and_give_the_commanded_bar_its_own() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        jacobian, turn, (rate, x, y) = rng.normal(size=(2, 3)), rng.normal(size=3), rng.normal(size=3)
+        rates = closed(jacobian, rate, turn, x, y)
+        np.testing.assert_allclose(jacobian @ rates, (-x, -y), atol=1e-12 * np.abs(rates).max())
+        assert turn @ rates == pytest.approx(rate, abs=1e-12 * np.abs(rates).max())
+    with pytest.raises(np.linalg.LinAlgError):
+        closed(np.ones((2, 3)), 1.0)
 
 
 def twice(row: Callable[..., Any]) -> Callable[..., Any]:

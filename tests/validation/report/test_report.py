@@ -192,7 +192,7 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.Monkey
     assert summary.refusals == [("mujoco-simulated", "falls to 0.0e+00; below 0.05 it is not simulated", 100)]
     assert [cost.setting for cost in summary.costs if cost.engine == "sim"] == ["RK4 628/rev to 727/rev"]
     assert summary.orders[0][0] == "scene-000"
-    assert "the 80 of 1100 scenes and engines" in markdown(summary)
+    assert "the 80 of 1200 scenes and engines" in markdown(summary)
     assert markdown(summary).count("\n") < 150
     assert len(text) < 1.8e6  # 20 scenes, each with a figure of 20 kB and some 55 kB of rows of eleven engines
 

@@ -59,7 +59,7 @@ OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, COUPLE.error, LINE.error, "f
 COMPARED = tuple(name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *OF_LINE))
 """Every quantity that an exact engine is held to: all that is printed of a position."""
 OF_THE_LINE = {"stroke": "sin_mu", "drive_line": "sin_mu", "stroke_speed": "v_B", LINE.value: COUPLE.value}
-"""Where the drive is linear, who is held to the other quantity is held to this one too."""
+"""Where the drive is linear, who is held to the other quantity, or answers this one, is held to it."""
 OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
@@ -110,7 +110,8 @@ class Comparison:
             return [Row.unmeasured(self.name, answer.engine, answer.setting, "assembled", FAILS, what)]
         held = tuple(self.expected)
         if self.scene.drive is not None:
-            held = (*held, *(name for name, other in OF_THE_LINE.items() if other in held))
+            answered = answer.quantities
+            held = (*held, *(name for name, other in OF_THE_LINE.items() if other in held or name in answered))
         self.own = reference_of(self.scene, answer)
         if self.reference is None:
             self.reference, self.scales = self.own, {}
@@ -129,7 +130,7 @@ class Comparison:
         """Check that the own angles of an engine close the loop."""
         answer, linkage = self.answer, self.scene.linkage
         assert answer.at is not None and answer.assembled is not None
-        theta_2 = answer.at.angle if answer.at.bar == 2 else answer.quantities["theta_2"]
+        theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else answer.quantities["theta_2"]
         theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
         error = np.where(answer.assembled, closing_gap(linkage, theta_2, theta_3, theta_4), 0.0)
         index, condition = worst(error), 1.0 / half_turns(linkage.ground_angle, theta_2)
@@ -141,10 +142,9 @@ class Comparison:
 
     def assembled(self) -> Row:
         """Compare where both close the loop."""
-        theirs, ours = self.answer.assembled, self.formulas
-        assert theirs is not None
-        bar = int(ours.commanded[-1])
-        differ = (theirs != ours.assembled) & ~touching(self.scene.linkage, getattr(ours, ours.commanded), bar)
+        theirs, ours, at = self.answer.assembled, self.formulas, self.answer.at
+        assert theirs is not None and at is not None
+        differ = (theirs != ours.assembled) & ~touching(self.scene.linkage, at.angle, at.bar)
         count = np.count_nonzero(differ)
         return self.row(
             "assembled",

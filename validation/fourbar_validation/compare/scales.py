@@ -160,20 +160,25 @@ SIZED_BY = ("omega_3", "alpha_3", "a_G2", "a_G3", "a_G4")
 """What the size of a force is made of; a reference without them has none."""
 
 
+def angles_of(answer: Answer) -> bool:
+    """Whether an answer has the angles of all moving bars that are not given."""
+    theta_2 = () if answer.at is None or answer.at.commanded == "theta_2" else ("theta_2",)
+    return answer.at is not None and {"theta_3", "theta_4", *theta_2} <= answer.quantities.keys()
+
+
 def reference_of(scene: Scene, answer: Answer) -> Solution | None:
     """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
-    if answer.at is None or not {"theta_3", "theta_4"} <= answer.quantities.keys():
+    if answer.at is None or not angles_of(answer):
         return None
     known = answer.quantities
-    commanded = answer.at.bar == 2 and answer.at.stroke is None
-    theta_2 = answer.at.angle if commanded else known["theta_2"]
+    theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else known["theta_2"]
     theta = {2: theta_2, 3: known["theta_3"], 4: known["theta_4"]}
     code = np.full(len(theta_2), OK, dtype=np.uint8)
     reference = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2)
     for name in UNITS:
         if name in known:
             setattr(reference, name, known[name])
-    reference.commanded = answer.at.commanded
+    reference.at = answer.at
     if answer.at.speed is not None:
         rates = (("omega", answer.at.speed), ("alpha", answer.at.acceleration))
         for name, x in rates if answer.at.stroke is None else ():  # of a stroke the engine finds them
@@ -187,7 +192,8 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
     one, other = (theta[bar] for bar in theta if bar != answer.at.bar)
     reference.condition = np.abs(np.sin(other - one))
     if answer.at.stroke is not None and scene.drive is not None:
-        reference.condition = reference.condition * line_of(scene.linkage, scene.drive, theta).lever
+        lever = line_of(scene.linkage, scene.drive, theta).lever
+        reference.at, reference.condition = answer.at._replace(lever=lever), reference.condition * lever
     if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
         one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits than its sine

@@ -108,6 +108,11 @@ def simulated_within(error: float, why: str) -> ErrorBound:
     return replace(SIMULATED, factor=error, reason=f"{error:g} of the scale, as wanted: {why}")
 
 
+OF_DIRECTION = frozenset(("drive_line", "stroke_speed", "drive_condition"))
+"""What, as every force, follows from the direction of a linear drive: the places of its ends are rounded as the lengths
+are, and their direction by that over the stroke."""
+
+
 def lever(linkage: FourBar, bar: int = 2) -> float:
     """Compute min(b, c)/longest bar: a loop closes to eps of its longest bar, which turns a shorter bar 3 or 4 by more.
 
@@ -120,10 +125,13 @@ def lever(linkage: FourBar, bar: int = 2) -> float:
 
 def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
     """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive."""
-    s, unit, bar = formulas.condition, UNITS[quantity], int(formulas.commanded[-1])
+    s, unit, bar, commanded = formulas.condition, UNITS[quantity], formulas.at.bar, formulas.at.lever
     if quantity in (OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")):
-        return np.ones_like(s)
+        # a stroke commands the bar as far as its cylinder has a lever
+        return np.ones_like(s) if commanded is None else np.asarray(commanded ** POWER[unit], dtype=float)
     condition = lever(linkage, bar) * s ** POWER[unit]
+    if formulas.stroke is not None and (quantity in OF_DIRECTION or unit in ("N", "N m", "W")):
+        condition = condition * np.minimum(formulas.stroke / max(linkage.lengths), 1.0)
     if unit in ("N", "N m", "W"):
         assert formulas.drive_condition is not None
         condition = condition * formulas.drive_condition

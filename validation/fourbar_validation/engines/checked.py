@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion_law import COMMANDS
-from fourbar_validation.compare.answer import Answer, Array, Engine, WitnessError
+from fourbar_validation.compare.answer import Answer, Array, Engine, WitnessError, not_taken
 from fourbar_validation.compare.rows import in_words, one_line
 
 FURTHEST = 0.1
@@ -20,6 +20,9 @@ another question."""
 
 class Checked:
     """An engine from outside, under the name that it was described by."""
+
+    commands = ("theta_2", "theta_3", "theta_4", "stroke")
+    """Whatever is commanded: the engine itself is asked what it takes."""
 
     def __init__(self, name: str, adapter: str) -> None:
         self.name, self._adapter = name, adapter
@@ -35,6 +38,8 @@ class Checked:
                 engine: Engine = resolve_name(self._adapter)()
                 if scene.drive is not None and not getattr(engine, "linear_drive", False):
                     return Answer(self.name, "exact", refusal="it does not declare linear_drive")
+                if refusal := not_taken(engine, at):
+                    return Answer(self.name, "exact", refusal=refusal)
                 return self._read(engine.answer(given_scene, at), command)
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
@@ -97,7 +102,7 @@ def _motion(at: Any, command: Command) -> Command:
     keys = dict(zip(("angle", "speed", "acceleration"), COMMANDS[command.bar], strict=True))
     for name, size in {"angle": 1.0, "speed": speed, "acceleration": speed**2 + acceleration}.items():
         commanded, value = getattr(command, name), getattr(at, name)
-        if commanded is None:
+        if commanded is None or command.stroke is not None:  # of a stroke nothing of the bar is given
             continue
         made[name] = _numbers(f"at.{keys[name]}", value, (n,) if np.ndim(value) else ())
         if not np.abs(made[name] - commanded).max() <= FURTHEST * size:

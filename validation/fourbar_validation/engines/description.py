@@ -5,13 +5,14 @@ a point of a bar; the bars as a tree that is open at pin B.
 """
 
 import math
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fourbar.effects import Gravity
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
+from fourbar.quantities import COUPLE, LINE, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
 
@@ -31,7 +32,7 @@ ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
 """Points whose accelerations are answered, each as a point of a bar."""
 TELLS = 2.0**-53
 """A component of a direction below this is what the angle's own rounding leaves of zero."""
-SHARED = "the description, theta_2, omega_2, alpha_2 and the branch"
+SHARED = "the description, what is commanded and the branch"
 """What an exact engine takes from the formulas' side, in a report."""
 
 
@@ -124,6 +125,16 @@ def speeds(at: Command) -> tuple[Array, Array]:
         np.broadcast_to(np.asarray(0.0 if x is None else x, float), at.angle.shape) for x in (at.speed, at.acceleration)
     )
     return omega, alpha
+
+
+def driving(scene: Scene) -> str:
+    """Name what is solved for of a scene's drive: its torque, or the force of a linear one."""
+    return (COUPLE if scene.drive is None else LINE).value
+
+
+def unknowns(scene: Scene, names: Iterable[str] = UNKNOWNS) -> list[str]:
+    """List quantities with what is solved for of the scene's drive in the place of a torque."""
+    return [driving(scene) if name == COUPLE.value else name for name in names]
 
 
 def unknown_effect(scene: Scene, table: Container[str], *, linear: bool = False) -> str:

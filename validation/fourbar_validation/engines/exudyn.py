@@ -1,9 +1,10 @@
 """Exudyn: nine absolute coordinates, the multipliers of four pins and a drive; springs and dampers are its own.
 
 A bar is `ObjectRigidBody2D` with coordinates (x, y of its first pin, direction). With g = 0 the nine
-constraints (two of each pin and the drive of bar 2), J = dg/dq, M the mass matrix and f what acts,
+constraints (two of each pin, and the drive: a bar's direction, or the distance of a cylinder's ends), J = dg/dq,
+J_c the pins' rows above that of the commanded bar's direction, M the mass matrix and f what acts,
 
-    J v = e omega_2,   J a = e alpha_2 - (dJ/dt) v,   [J_pins^T e_k] [F12 F32 F43 F14 T_k] = M a - f.
+    J_c v = e omega,   J_c a = e alpha - (dJ_c/dt) v,   J^T [F12 F32 F43 F14 drive] = M a - f.
 
 g, J, (dJ/dt) v, M and f are Exudyn's; the three linear systems are solved here.
 """
@@ -21,6 +22,7 @@ from exudyn.itemInterface import (
     LoadTorqueVector,
     MarkerBodyMass,
     ObjectConnectorCoordinate,
+    ObjectConnectorDistance,
     ObjectJointRevolute2D,
 )
 
@@ -28,7 +30,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import ON_BARS, POINTS, parts, unknown_effect, within_half_a_turn
+from fourbar_validation.engines.description import ON_BARS, POINTS, parts, place, unknown_effect, within_half_a_turn
 from fourbar_validation.engines.effects import TERM_OF, acting
 from fourbar_validation.engines.exudyn_elements import ELEMENT_OF, Bodies
 from fourbar_validation.engines.loaded import Loaded, Values
@@ -52,7 +54,7 @@ class ExudynBars(Loaded):
     )
 
     def __init__(self, scene: Scene) -> None:
-        if reason := unknown_effect(scene, TERM_OF):
+        if reason := unknown_effect(scene, TERM_OF, linear=True):
             raise LimitError(reason)
         exu.config.printToConsole = False
         self.container = exu.SystemContainer()
@@ -71,8 +73,15 @@ class ExudynBars(Loaded):
         for pin, bars in JOINTS.items():
             markers = [bodies.point(bar, *place) for bar, place in zip(bars, at[pin], strict=True)]
             mbs.AddObject(ObjectJointRevolute2D(markerNumbers=markers))
-        markers = [bodies.direction(bar) for bar in (1, 2)]
-        self.drive = mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers))
+        if scene.drive is None:
+            markers = [bodies.direction(bar) for bar in (1, scene.drive_bar)]
+            self.drive = mbs.AddObject(ObjectConnectorCoordinate(markerNumbers=markers))
+        else:
+            ends = (scene.drive.start, scene.drive.end)
+            markers = [bodies.point(end.bar, *place(end, scene.linkage.ground_angle)) for end in ends]
+            mbs.AddObject(
+                ObjectConnectorDistance(markerNumbers=markers, distance=1.0)
+            )  # any: what is asked is its rate
         for effect in scene.effects:
             if effect.key in ELEMENT_OF:
                 ELEMENT_OF[effect.key](effect, bodies)
@@ -93,8 +102,6 @@ class ExudynBars(Loaded):
         self.solver.InitializeSolver(mbs, settings)
         self.turn = {bar: self.state.GetObjectLTGODE2(self.body[bar])[2] for bar in MOVING_BARS}
         self.shifts = [i for i in range(SIZE) if i not in self.turn.values()]
-        self.e_drive = np.zeros(SIZE)
-        self.e_drive[self.turn[scene.drive_bar]] = 1.0
 
     def place(self, q: Sequence[float]) -> None:
         """Set the bars' angles; the pins O2, A and O4 are closed, in which Exudyn's constraints are linear."""
@@ -103,7 +110,6 @@ class ExudynBars(Loaded):
         coordinates = np.zeros(SIZE)
         for bar, angle in zip(MOVING_BARS, (theta_2, theta_2 + of_3_to_2, theta_4), strict=True):
             coordinates[self.turn[bar]] = angle
-        self.mbs.SetObjectParameter(self.drive, "offset", theta_2)
         self.state.SetODE2Coordinates(coordinates)
         jacobian, gap = self._constraint_jacobian(), self._constraint_gap()
         coordinates[self.shifts] = np.linalg.solve(jacobian[OTHER_ROWS][:, self.shifts], -gap[OTHER_ROWS])
@@ -166,35 +172,34 @@ class ExudynBars(Loaded):
         """Locate the points of the bars."""
         return {name: self.point(point) for name, point in POINTS.items()}
 
-    def move(self, omega_2: float, alpha_2: float) -> Values:
+    def move(self, bar: int, speed: float, acceleration: float) -> Values:
         """Speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
-        jacobian = self.jacobians
-        drive = np.eye(SIZE)[-1]
+        of_drive, commanded = self._constraint_jacobian(), np.eye(SIZE)[-1]  # a cylinder's is that of closed pins
+        jacobian = np.vstack((of_drive[:-1], np.eye(SIZE)[self.turn[bar]]))
         try:
-            self.v = v = np.linalg.solve(jacobian, drive * omega_2)
+            self.v = v = np.linalg.solve(jacobian, commanded * speed)
             self.state.SetODE2Coordinates_t(v)
             self.state.SetODE2Coordinates_tt(np.zeros(SIZE))
             at_b = self.acceleration("end3") - self.acceleration("end4")
             drift = np.concatenate((np.zeros(2), self.acceleration("end2"), at_b, np.zeros(3)))
-            self.a = a = np.linalg.solve(jacobian, drive * alpha_2 - drift)
+            self.a = a = np.linalg.solve(jacobian, commanded * acceleration - drift)
         except np.linalg.LinAlgError:
             return {}
         self.state.SetODE2Coordinates_tt(a)
         values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
-        for bar in MOVING_BARS[1:]:
-            values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
-        matrix = np.column_stack((jacobian[:-1].T, self.e_drive))
+        for each in MOVING_BARS:
+            values[f"omega_{each}"], values[f"alpha_{each}"] = self.velocity(each), self.alpha(each)
         self.solver.ComputeMassMatrix(self.mbs)
         inertial = np.array(self.solver.GetSystemMassMatrix()) @ a
 
         def balanced() -> dict[str, Any]:
-            unknowns = np.linalg.solve(matrix, inertial - self._applied())
+            unknowns = np.linalg.solve(of_drive.T, inertial - self._applied())
             pins = zip(JOINTS, unknowns[:-1].reshape(4, 2), strict=True)
-            return {PIN_FORCE[pin]: force for pin, force in pins} | {"torque": unknowns[-1]}
+            return {PIN_FORCE[pin]: force for pin, force in pins} | {self.driving: unknowns[-1]}
 
         try:
             return values | self.settled(balanced)
-        except np.linalg.LinAlgError:  # no torque on that bar balances the linkage here
+        except np.linalg.LinAlgError:  # no torque or force of the drive balances the linkage here
             return values
 
     def _applied(self) -> Array:

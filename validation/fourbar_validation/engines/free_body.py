@@ -28,7 +28,7 @@ from fourbar_validation.engines.free_body_effects import (
     sliding_pins,
     wound,
 )
-from fourbar_validation.engines.free_body_stroke import turned_by
+from fourbar_validation.engines.free_body_stroke import cylinder_of, turned_by
 
 NAME = "free-body"
 COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
@@ -66,7 +66,7 @@ class FreeBody:
             )
         asked = command
         if command.stroke is not None:
-            command = turned_by(scene, command)
+            command = turned_by(command, scene.motion, *cylinder_of(scene))
         bar, closed = command.bar, close(scene.linkage, command.angle, command.branch, command.bar)
         theta = np.insert(closed.theta, bar - 2, command.angle, axis=0)
         answer = Answer(

@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FORCE_AT, components, rotate, rotate_by
+from fourbar_validation.engines.description import FORCE_AT, components, driving, rotate, rotate_by
 
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive
@@ -60,8 +60,11 @@ class EngineBars(Assembled, Protocol):
     def angle(self, bar: int) -> float:
         """Compute the direction of a bar's line, in (-pi, pi], rad."""
 
-    def move(self, omega_2: float, alpha_2: float) -> Values:
-        """Motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
+    def cylinder(self, bar: int) -> tuple[complex, complex]:
+        """Measure from the ground pin of a bar, at angle 0, to a cylinder's end on it, and to that on the ground, m."""
+
+    def move(self, bar: int, speed: float, acceleration: float) -> Values:
+        """Motion and forces where the bars are placed, one moving so, by name; empty where a toggle leaves them 0/0."""
 
     def refusal(self) -> str:
         """Why what was answered does not count, or nothing."""
@@ -77,6 +80,8 @@ class Loaded(EngineBars, Protocol):
     drive_bar: int
     linear: "LinearDrive | None" = None
     """The drive, where it is along a line."""
+    driving: str
+    """What is solved for of the drive."""
     field: tuple[float, float] = (0.0, 0.0)
     """Of gravity, m/s^2."""
     loaded: list[str]
@@ -90,7 +95,7 @@ class Loaded(EngineBars, Protocol):
     def ready(self, scene: Scene, terms: list[Act]) -> None:
         """To be called by an engine that has its bars, with what acts on them."""
         self.ground_angle, self.drive_bar, self.terms = scene.linkage.ground_angle, scene.drive_bar, terms
-        self.linear = scene.drive
+        self.linear, self.driving = scene.drive, driving(scene)
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
 
     # what the engine gives
@@ -126,6 +131,28 @@ class Loaded(EngineBars, Protocol):
     def end(self, point: "SpringEnd") -> Array:
         """Locate an end of a spring or of a linear drive, m, (2,)."""
         return self.first_pin(point.bar) + self.rotate(point.bar, *components(point.distance, point.angle))
+
+    def cylinder(self, bar: int) -> tuple[complex, complex]:
+        """Measure it with the bars laid down along +x."""
+        assert self.linear is not None
+        self.place((0.0, 0.0, 0.0))
+        on_bar, on_ground = sorted((self.linear.start, self.linear.end), key=lambda end: -end.bar)
+        x, y = ((self.end(point) - self.first_pin(bar)).tolist() for point in (on_bar, on_ground))
+        return complex(*x), complex(*y)
+
+    def line(self) -> tuple[Array, Array, Array]:
+        """Place the linear drive: both ends, m, and the unit vector from the one to the other."""
+        assert self.linear is not None
+        one, other = self.end(self.linear.start), self.end(self.linear.end)
+        return one, other, (other - one) / math.hypot(*(other - one))
+
+    def work(self, size: float) -> None:
+        """Let the drive act with a torque, N m, or a force, N."""
+        if self.linear is None:
+            return self.twist(self.drive_bar, size)
+        one, other, along = self.line()
+        self.push(self.linear.start.bar, -size * along, one)
+        return self.push(self.linear.end.bar, size * along, other)
 
     def gravity(self, field: tuple[float, float]) -> None:
         """Set a field (g_x, g_y) for the engine's own gravity, m/s^2."""

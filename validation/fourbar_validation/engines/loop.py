@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
-from fourbar.quantities import ANGLES, COUPLE, LINE, OF_LINE, PIN_FORCES, STAGE_OF, STAGES, VECTORS
+from fourbar.quantities import ANGLES, OF_LINE, PIN_FORCES, STAGE_OF, STAGES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.engines.description import SHARED, speeds
+from fourbar_validation.engines.description import SHARED, driving, speeds, unknowns, within_half_a_turn
 from fourbar_validation.engines.free_body_closure import LONGEST_STEP, NEWTON_STEPS, STARTS
+from fourbar_validation.engines.free_body_stroke import turned_by
 from fourbar_validation.engines.loaded import Assembled, EngineBars, Values
 
 START_ANGLES = np.radians(STARTS).tolist()
@@ -36,38 +37,46 @@ Angles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
 
 
+CLOSING = {2: (3, 4), 3: (2, 4), 4: (3, 2)}
+"""By the commanded bar the two others, which close the loop: in this order the sine between them is the branch's, and
+they stand on the diagonal between their free ends as bars 3 and 4 do from A to O4; bar 2 from A back to O2."""
+
+
 class Assembler:
-    """Assembles a tree at commanded angles of bar 2, one after another."""
+    """Assembles a tree at commanded angles of a bar, one after another."""
 
-    def __init__(self, tree: Assembled) -> None:
-        self.tree = tree
+    def __init__(self, tree: Assembled, bar: int = 2) -> None:
+        self.tree, self.bar = tree, bar
 
-    def find(self, theta_2: float, branch: int) -> Angles | None:
+    def find(self, theta: float, branch: int) -> Angles | None:
         """Assemble on the branch and place the tree there; None where the loop does not close."""
-        tree = self.tree
-        tree.place((theta_2, 0.0, 0.0))
+        tree, bar = self.tree, self.bar
+        theta = theta if bar == 2 else within_half_a_turn(theta)
+        tree.place([theta if each == bar else 0.0 for each in (2, 3, 4)])
         at = tree.positions()
-        pin_a = at.get("A2", at["A"])
-        diagonal = at["O4"] - pin_a
-        e, a, d, b, c = (
+        along = {2: at.get("A2", at["A"]), 3: at["B"] - at["A"], 4: at["B4"] - at["O4"]}
+        diagonal = at["O4"] + along[4] if bar == 4 else at["O4"] - along[bar]
+        e, d, near, far, own = (
             math.hypot(*vector.tolist())
-            for vector in (diagonal, pin_a, at["O4"], at["B"] - at["A"], at["B4"] - at["O4"])
+            for vector in (diagonal, at["O4"], *(along[other] for other in CLOSING[bar]), along[bar])
         )
-        closed = ROUNDING * (a + d + b + c)
-        # with bar 2 held, the gap is stationary only where bars 3 and 4 lie along the diagonal: this is its least value
-        if max(e - (b + c), abs(b - c) - e) > closed:
+        closed = ROUNDING * (own + d + near + far)
+        # with a bar held, the gap is stationary only where the others lie along the diagonal: this is its least value
+        if max(e - (near + far), abs(near - far) - e) > closed:
             return None
         phi = math.atan2(diagonal[1], diagonal[0])
         # the triangle as measured is the nearest start, also where a bar is a millionth of the others
-        triangle = _triangle_angle(e, b, c), _triangle_angle(e, c, b)
+        triangle = _triangle_angle(e, near, far), _triangle_angle(e, far, near)
         for alpha, beta in (triangle, *START_ANGLES):
-            theta_3, theta_4 = phi + branch * alpha, phi + math.pi - branch * beta
+            one, other = phi + branch * alpha, phi + math.pi - branch * beta
+            around = {2: (theta, one, other), 3: (one, theta, other), 4: (other + math.pi, one, theta)}
+            theta_2, theta_3, theta_4 = around[bar]
             q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
-            result = newton(tree, q, branch, closed)
+            result = newton(tree, q, branch, closed, bar)
             if result is not None:
                 return result
-        if max(e - (b + c), abs(b - c) - e) < -closed:
-            raise ArithmeticError(f"the loop closes at theta_2 = {theta_2!r}, but Newton's method does not find it")
+        if max(e - (near + far), abs(near - far) - e) < -closed:
+            raise ArithmeticError(f"the loop closes at theta_{bar} = {theta!r}, but Newton's method does not find it")
         return None
 
 
@@ -77,30 +86,42 @@ def _triangle_angle(e: float, near: float, far: float) -> float:
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
-def newton(tree: Assembled, q: Angles, branch: int, closed: float) -> Angles | None:
-    """Close the gap with bar 2 held, never leaving the branch.
+def newton(tree: Assembled, q: Angles, branch: int, closed: float, bar: int = 2) -> Angles | None:
+    """Close the gap with a bar held, never leaving the branch.
 
-    The determinant of the gap's derivative by (q3, q4) is -b c sin(theta_4 - theta_3): its sign is the
-    branch's. A step is halved until the gap falls and the sign is kept; the last one is taken where
+    The determinant of the gap's derivative by the angles of the others, for bar 2 -b c sin(theta_4 - theta_3), has the
+    branch's sign. A step is halved until the gap falls and the sign is kept; the last one is taken where
     nothing smaller than `closed` (m) falls any further.
     """
+    theta_3 = q[0] + q[1]
 
     def look(q: Angles) -> tuple[float, float, float, float, float, float, float]:
         tree.place(q)
         x, y = tree.gap()
-        (_, a, b), (_, c, d) = tree.jacobian().tolist()
+        (e, a, b), (f, c, d) = tree.jacobian().tolist()
+        if bar == 3:  # bar 2 turns alone where its own joint turns and that of bar 3 turns back
+            a, c = e - a, f - c
+        elif bar == 4:
+            b, d = e - a, f - c
         return x, y, a, b, c, d, a * d - b * c
+
+    def moved(q: Angles, one: float, other: float) -> Angles:
+        if bar == 2:
+            return q[0], q[1] + one, q[2] + other
+        if bar == 3:
+            return q[0] + one, theta_3 - (q[0] + one), q[2] + other
+        return q[0] + other, q[1] + (one - other), q[2]
 
     here = look(q)
     if here[6] * branch >= 0.0:
         return None
     for _ in range(NEWTON_STEPS):
         x, y, a, b, c, d, det = here
-        step_3, step_4 = (b * y - d * x) / det, (c * x - a * y) / det
+        one, other = (b * y - d * x) / det, (c * x - a * y) / det
         size = math.hypot(x, y)
-        part = min(1.0, LONGEST_STEP / max(abs(step_3), abs(step_4), LONGEST_STEP))
+        part = min(1.0, LONGEST_STEP / max(abs(one), abs(other), LONGEST_STEP))
         while True:
-            trial = (q[0], q[1] + part * step_3, q[2] + part * step_4)
+            trial = moved(q, part * one, part * other)
             there = look(trial)
             if math.hypot(there[0], there[1]) < size and there[6] * branch < 0.0:
                 break
@@ -119,6 +140,7 @@ class Exact:
     name: str
     build: Callable[[Scene], EngineBars]
     """Its bars from the description; LimitError says why it cannot hold them."""
+    commands: tuple[str, ...] = ("theta_2", "theta_3", "theta_4", "stroke")
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming what it does not know or cannot hold."""
@@ -126,42 +148,46 @@ class Exact:
             bars = self.build(scene)
         except LimitError as error:
             return Answer(self.name, "exact", refusal=str(error))
-        start, moves = time.perf_counter(), command.omega_2 is not None
+        start, moves, asked = time.perf_counter(), command.speed is not None, command
         wanted = STAGES if moves else ("position",)
+        found = () if command.bar == 2 and command.stroke is None else MADE[: 3 if moves else 1]
         names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
-        names += [f"{LINE.value}_inertia" if scene.drive else "torque_inertia"] if bars.alone and moves else []
-        if scene.drive is not None and moves:
-            names = [LINE.value if name == COUPLE.value else name for name in names]
+        names += [name for name in found if name not in names]
+        if command.stroke is not None:
+            command = turned_by(command, scene.motion, *bars.cylinder(command.bar))
+        names = unknowns(scene, names)
+        names += [f"{driving(scene)}_inertia"] if bars.alone and moves else []
 
-        def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
+        def read(q: Angles, speed: float, acceleration: float) -> Values:
             points, theta_3, theta_4 = bars.positions(), bars.angle(3), bars.angle(4)
             values: Values = {name: points[name] for name in ("A", "B", "G2", "G3", "G4")}
             values |= {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": math.sin(theta_4 - theta_3)}
-            return values | (bars.move(omega_2, alpha_2) if moves else {})
+            values |= {"theta_2": bars.angle(2)} if found else {}
+            return values | (bars.move(command.bar, speed, acceleration) if moves else {})
 
         out, assembled, gap = at_each(bars, command, names, read)
         if reason := bars.refusal():
             return Answer(self.name, "exact", refusal=reason)
         for name in ANGLES:
             out[name][assembled] = np.unwrap(out[name][assembled])
-        answer = Answer(self.name, "exact", command, assembled, out, evidence={"closure_gap": gap})
+        answer = Answer(self.name, "exact", asked, assembled, out, evidence={"closure_gap": gap})
         answer.shared, answer.own, answer.seconds = SHARED, bars.own, time.perf_counter() - start
         return answer
 
 
 Read = Callable[[Angles, float, float], Values]
-"""Of the configuration in which the bars stand, omega_2 and alpha_2: values by name."""
+"""Of the configuration in which the bars stand, speed and acceleration of the commanded bar: values by name."""
 
 
 def at_each(
     bars: Assembled, command: Command, names: Iterable[str], read: Read
 ) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
     """Read each position that assembles, NaN elsewhere; return that, where it assembles, and the greatest gap, m."""
-    n, (omega, alpha) = len(command.theta_2), speeds(command)
+    n, (omega, alpha) = len(command.angle), speeds(command)
     missing: dict[str, Any] = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
-    rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Assembler(bars)
-    for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
-        if (q := position.find(theta_2, branch)) is not None:
+    rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Assembler(bars, command.bar)
+    for i, (theta, branch) in enumerate(zip(command.angle.tolist(), command.branch.tolist(), strict=True)):
+        if (q := position.find(theta, branch)) is not None:
             assembled[i], gap = True, max(gap, math.hypot(*bars.gap()))
             rows[i] = missing | read(q, float(omega[i]), float(alpha[i]))
     return {name: np.array([row[name] for row in rows], float) for name in missing}, assembled, gap

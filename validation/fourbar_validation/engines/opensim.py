@@ -1,7 +1,8 @@
 """OpenSim (Simbody): bars 2 and 4 on the ground, bar 3 on bar 4, closed at pin A by its own constraint and solve.
 
 Coordinates are the direction of bar 2, that of bar 4, and that of bar 3 against bar 4. The closing force, the joint
-reactions, the accelerations and the torque that moves bar 2 as commanded come from Simbody's constrained dynamics.
+reactions, the accelerations and the couple that moves bar 2 or 4 as commanded come from Simbody's constrained dynamics.
+No coordinate is the direction of bar 3, whose command is refused.
 """
 
 import math
@@ -20,6 +21,7 @@ from fourbar_validation.engines.description import (
     ON_BARS,
     POINTS,
     about_first_pin,
+    components,
     parts,
     unknown_effect,
     within_half_a_turn,
@@ -37,12 +39,14 @@ PASSES = 50
 LEAST_CONDITIONED = 1e-11
 """Simbody 4.6 drops a constraint as dependent from 5e-12 to 7e-12 on: 1000 positions near limits of 40 linkages."""
 TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)
-"""t^3/6: the motion prescribed for bar 2, whose second derivative is the time, which is set to alpha_2."""
+"""t^3/6: the motion prescribed for bar 2 or 4, whose second derivative is the time, set to its acceleration."""
+TURNING = {2: "O2", 4: "O4"}
+"""Joint whose coordinate is the direction of a bar."""
 
 
 def refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := unknown_effect(scene, TERM_OF):
+    if reason := unknown_effect(scene, TERM_OF, linear=True):
         return reason
     for number in MOVING_BARS:
         if scene.linkage.bar(number).mass == 0.0:
@@ -75,6 +79,8 @@ class OpenSimBars(Loaded):
             self.body[bar] = osim.Body(f"bar{bar}", part.mass, vec(*part.centre), about_z)
             model.addBody(self.body[bar])
         self.local = {name: (part.bar, at) for part in self.part.values() for name, at in part.points.items()}
+        self.ends = (("start", scene.drive.start), ("end", scene.drive.end)) if scene.drive else ()
+        self.local |= {name: (end.bar, components(end.distance, end.angle)) for name, end in self.ends}
         self.length = {bar: part.length for bar, part in self.part.items()}
         self.joint = {
             "O2": self._joint("O2", 1, ZERO, 2, ZERO),
@@ -84,10 +90,10 @@ class OpenSimBars(Loaded):
         self.pin_a = osim.PointConstraint(self.body[2], vec(self.length[2]), self.body[3], vec())
         self.pin_a.set_isEnforced(False)  # until a position is found: OpenSim would assemble it at angles of its own
         model.addConstraint(self.pin_a)
-        prescribed = osim.PolynomialFunction(vector(TIME_IS_ALPHA))
-        coordinate = self.joint["O2"].updCoordinate()
-        coordinate.setPrescribedFunction(prescribed)
-        coordinate.setDefaultIsPrescribed(True)
+        for pin in TURNING.values():
+            self.joint[pin].updCoordinate().setPrescribedFunction(osim.PolynomialFunction(vector(TIME_IS_ALPHA)))
+            self.joint[pin].updCoordinate().setDefaultIsPrescribed(pin == "O2")
+        self.commanded = 2
         self.applied = {bar: self._at_first_pin(bar) for bar in MOVING_BARS}
         self.state = model.initSystem()
         self.pin_a.setIsEnforced(self.state, True)
@@ -158,23 +164,36 @@ class OpenSimBars(Loaded):
         """Locate the points of the bars."""
         return {name: self.point(point) for name, point in POINTS.items()}
 
-    def move(self, omega_2: float, alpha_2: float) -> Values:
+    def move(self, bar: int, speed: float, acceleration: float) -> Values:
         """Compute speeds and accelerations, pin forces and torque; nothing where a toggle leaves them 0/0."""
+        if bar != self.commanded:
+            self.commanded, q = bar, self.state.getQ().to_numpy()
+            for each, pin in TURNING.items():
+                self.joint[pin].updCoordinate().setIsPrescribed(self.state, each == bar)
+            self.state.setQ(vector(q))
+            self.model.realizePosition(self.state)
         try:
-            turns, accelerations = self._set_motion(omega_2, alpha_2)
+            turns, accelerations = self._set_motion(speed, acceleration)
         except np.linalg.LinAlgError:
             return {}
         self.a = accelerations
-        leverage = float(PER_COORDINATE[self.drive_bar] @ turns)
-        # without leverage no torque on that bar moves bar 2
+        leverage = float(self._drive_column() @ turns)
+        # without leverage nothing that the drive does moves that bar
         return self._motion() | ({} if leverage == 0.0 else self.settled(lambda: self._forces(leverage)))
 
-    def _set_motion(self, omega_2: float, alpha_2: float) -> tuple[Array, Array]:
-        """Solve the constraint equations for the coordinates' speeds per speed of bar 2, and their accelerations."""
+    def _drive_column(self) -> Array:
+        """Differentiate the driven bar's direction, or the stroke of a linear drive, by the coordinates, (3,)."""
+        if self.linear is None:
+            return PER_COORDINATE[self.drive_bar]
+        start, end = (np.zeros((2, 3)) if at.bar == 1 else self._station_jacobian(name) for name, at in self.ends)
+        return np.asarray(self.line()[2] @ (end - start))
+
+    def _set_motion(self, speed: float, acceleration: float) -> tuple[Array, Array]:
+        """Solve the constraint equations for the coordinates' speeds per speed commanded, and their accelerations."""
         equations = self._equations()
-        turns = np.linalg.solve(equations, PER_COORDINATE[2])
-        self.state.setTime(alpha_2)
-        self.state.setU(vector(turns * omega_2))
+        turns = np.linalg.solve(equations, np.eye(3)[0])
+        self.state.setTime(acceleration)
+        self.state.setU(vector(turns * speed))
         self.model.realizeVelocity(self.state)
         bias, matrix = osim.Vector(), osim.Matrix()
         self.matter.calcBiasForAccelerationConstraints(self.state, bias)
@@ -185,7 +204,7 @@ class OpenSimBars(Loaded):
 
     def _motion(self) -> Values:
         values: Values = {}
-        for bar in (3, 4):
+        for bar in MOVING_BARS:
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
         for name, point in ON_BARS.items():
             bar, at = self.local[point]
@@ -196,11 +215,11 @@ class OpenSimBars(Loaded):
     def _forces(self, leverage: float) -> dict[str, Any]:
         """Joint reactions, closing force and torque of its constrained dynamics.
 
-        Simbody holds bar 2 to its motion by a couple: over the leverage it is a torque of the drive. What it finds is
-        given back as forces and found anew, until its multipliers hold nothing but rounding.
+        Simbody holds the commanded bar to its motion by a couple: over the leverage it is what the drive gives. What it
+        finds is given back as forces and found anew, until its multipliers hold nothing but rounding.
         """
         self.act()
-        pin_a, torque, closing, before = self.point("end2"), 0.0, np.zeros(2), (math.inf, math.inf)
+        pin_a, drive, closing, before = self.point("end2"), 0.0, np.zeros(2), (math.inf, math.inf)
         seen: set[tuple[float, float]] = set()
         for number in range(PASSES):
             for bar, wrench in self.wrenches.items():
@@ -208,9 +227,9 @@ class OpenSimBars(Loaded):
                     function.setValue(value)
             self.state.setTime(self.state.getTime())  # Simbody computes again what depends on it
             self.model.realizeAcceleration(self.state)
-            couple, force = self._couple_on_2(), self._closing_force()
-            torque, closing = torque + couple / leverage, closing + force
-            self.twist(self.drive_bar, couple / leverage)
+            couple, force = self._couple_of_command(), self._closing_force()
+            drive, closing = drive + couple / leverage, closing + force
+            self.work(couple / leverage)
             self.push(2, force, pin_a)
             self.push(3, -force, pin_a)
             size = abs(couple), math.hypot(*force)
@@ -220,10 +239,10 @@ class OpenSimBars(Loaded):
             before = size
             seen.add(size)
         reactions = {name: self._reaction(pin) for pin, name in {"O2": "F12", "B": "F43", "O4": "F14"}.items()}
-        return {**reactions, "F32": closing, "torque": torque}
+        return {**reactions, "F32": closing, self.driving: drive}
 
     def _equations(self) -> Array:
-        """Differentiate the constraints by the coordinates: the motion of bar 2, and pin A along two axes."""
+        """Differentiate the constraints by the coordinates: the commanded motion, and pin A along two axes."""
         matrix = osim.Matrix()
         self.matter.calcG(self.state, matrix)
         return np.array(matrix.to_numpy())[:3]
@@ -239,8 +258,8 @@ class OpenSimBars(Loaded):
     def _reaction(self, pin: str) -> Array:
         return np.array(self.joint[pin].calcReactionOnChildExpressedInGround(self.state).get(1).to_numpy()[:2])
 
-    def _couple_on_2(self) -> float:
-        return float(self.joint["O2"].calcReactionOnChildExpressedInGround(self.state).get(0).get(2))
+    def _couple_of_command(self) -> float:
+        return float(self.joint[TURNING[self.commanded]].calcReactionOnChildExpressedInGround(self.state).get(0).get(2))
 
     def _closing_force(self) -> Array:
         """Compute the force of bar 3 on bar 2 from the constraint's multipliers; on bodies it is -G^T lambda."""
@@ -251,7 +270,7 @@ class OpenSimBars(Loaded):
         return np.array([-result.get(0), -result.get(1)])
 
 
-OpenSimConstraints = partial(Exact, "opensim-constraints", OpenSimBars)
+OpenSimConstraints = partial(Exact, "opensim-constraints", OpenSimBars, ("theta_2", "theta_4", "stroke"))
 
 
 def vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:

@@ -9,14 +9,12 @@ lambda = F43 and e_drive = the derivative of the driven bar's rotation, or of th
 comes from the engine.
 """
 
-import math
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import COUPLE, LINE
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import ON_BARS, POINTS
@@ -24,6 +22,9 @@ from fourbar_validation.engines.loaded import Act, Loaded, Values, no_wrenches
 
 if TYPE_CHECKING:
     from fourbar.effects.spring import SpringEnd
+
+
+OMEGAS, ALPHAS = (tuple(f"{name}_{bar}" for bar in MOVING_BARS) for name in ("omega", "alpha"))
 
 
 class Tree(Loaded, Protocol):
@@ -35,6 +36,8 @@ class Tree(Loaded, Protocol):
     )
     turns: dict[int, Array]
     """Derivatives of the bars' rotations by the coordinates, constant in the plane."""
+    rows: Array
+    """Those of bars 2, 3, 4, (3, 3)."""
     v: Array
     a: Array
 
@@ -44,6 +47,7 @@ class Tree(Loaded, Protocol):
         self.alone = bool(scene.loads or scene.effects)
         self.place((0.0, 0.0, 0.0))
         self.turns = {1: np.zeros(3)} | {bar: self.turn(bar) for bar in MOVING_BARS}
+        self.rows = np.stack([self.turns[bar] for bar in MOVING_BARS])
 
     # what the engine gives
     def point_jacobian(self, name: str) -> Array:
@@ -101,12 +105,6 @@ class Tree(Loaded, Protocol):
         self.act()
         return self.needed(self.field, self.wrenches)
 
-    def line(self) -> tuple[Array, Array, Array]:
-        """Place the linear drive: both ends, m, and the unit vector from the one to the other."""
-        assert self.linear is not None
-        one, other = self.end(self.linear.start), self.end(self.linear.end)
-        return one, other, (other - one) / math.hypot(*(other - one))
-
     def drive_column(self) -> Array:
         """Return what the drive does on the coordinates per N m or N: of a line the derivative of its stroke, (3,)."""
         if self.linear is None:
@@ -121,14 +119,6 @@ class Tree(Loaded, Protocol):
         x, y = self.end(point) - self.first_pin(point.bar)
         return self.point_jacobian(f"first_pin{point.bar}") + np.outer((-y, x), self.turns[point.bar])
 
-    def work(self, size: float) -> None:
-        """Let the drive act with a torque, N m, or a force, N."""
-        if self.linear is None:
-            return self.twist(self.drive_bar, size)
-        one, other, along = self.line()
-        self.push(self.linear.start.bar, -size * along, one)
-        return self.push(self.linear.end.bar, size * along, other)
-
     def forces(self, loop_force: Array, drive: float) -> dict[str, Array]:
         """F12, F32, F14 with the loop force on bar 3 at B, its opposite on bar 4, and the drive put back."""
         self.push(3, loop_force, self.point("end3"))
@@ -137,41 +127,55 @@ class Tree(Loaded, Protocol):
         on = self.carried()
         return {"F12": on[2], "F32": -on[3], "F14": on[4]}
 
-    def move(self, omega_2: float, alpha_2: float) -> Values:
+    def move(self, bar: int, speed: float, acceleration: float) -> Values:
         """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0."""
-        jacobian = self.jacobian()
+        jacobian, commanded = self.jacobian(), self.turns[bar]
         try:
-            v = closed(jacobian, omega_2)
-            a = closed(jacobian, alpha_2, *self.drift(v).tolist())
+            v = closed(jacobian, speed, commanded)
+            a = closed(jacobian, acceleration, commanded, *self.drift(v).tolist())
         except np.linalg.LinAlgError:
             return {}
         self.moving(v, a)
         values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
-        for bar in (3, 4):
-            values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
-        name = (COUPLE if self.linear is None else LINE).value
+        values |= zip(OMEGAS, (self.rows @ v).tolist(), strict=True)
+        values |= zip(ALPHAS, (self.rows @ a).tolist(), strict=True)
         solve = partial(multipliers, jacobian, self.drive_column())
 
         def balanced() -> dict[str, Any]:
             unknowns = solve(self.torques())
-            return self.forces(unknowns[:2], float(unknowns[2])) | {"F43": unknowns[:2], name: unknowns[2]}
+            return self.forces(unknowns[:2], float(unknowns[2])) | {"F43": unknowns[:2], self.driving: unknowns[2]}
 
         try:
             values |= self.settled(balanced)
         except np.linalg.LinAlgError:  # no torque or force of the drive balances the linkage here
             return values
         if self.alone:
-            values[f"{name}_inertia"] = float(solve(self.needed((0.0, 0.0), no_wrenches()))[2])
+            values[f"{self.driving}_inertia"] = float(solve(self.needed((0.0, 0.0), no_wrenches()))[2])
         return values
 
 
-def closed(jacobian: Array, of_2: float, x: float = 0.0, y: float = 0.0) -> Array:
-    """Solve J rates + (x, y) = 0 for the rates of the coordinates, bar 2's being given; LinAlgError at a toggle."""
+BAR_2 = np.array([1.0, 0.0, 0.0])
+"""Derivative of its rotation by the coordinates."""
+
+
+def closed(jacobian: Array, rate: float, turn: Array = BAR_2, x: float = 0.0, y: float = 0.0) -> Array:
+    """Solve J rates + (x, y) = 0, turn . rates = rate for the rates of the coordinates; LinAlgError at a toggle.
+
+    By Cramer's rule: for bar 2 the determinant is that of `newton` to the last digit.
+    """
     (e, a, b), (f, c, d) = jacobian.tolist()
-    x, y, det = x + e * of_2, y + f * of_2, a * d - b * c
+    p, q, r = turn.tolist()
+    u, v, w = a * d - b * c, b * f - e * d, e * c - a * f
+    det = p * u + q * v + r * w
     if det == 0.0:
         raise np.linalg.LinAlgError("the bars are in one line")
-    return np.array([of_2, (b * y - d * x) / det, (c * x - a * y) / det])
+    return np.array(
+        [
+            (rate * u - x * (c * r - d * q) - y * (b * q - a * r)) / det,
+            (rate * v - x * (d * p - f * r) - y * (e * r - b * p)) / det,
+            (rate * w - x * (f * q - c * p) - y * (a * p - e * q)) / det,
+        ]
+    )
 
 
 def multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:

@@ -215,6 +215,8 @@ def predicting_from(witness: Witness, scene: Scene, at: Command, answer: Answer)
             return None
         return lambda quantity, where: answer.predicted.get(quantity, np.zeros(len(where)))
     predict = witness.predictor
+    if at.bar != 2 or at.stroke is not None:
+        return None  # what predicts knows the command of bar 2 alone
     if predict is None or (witness.tolerance.conditioned and (not_installed("flint") or unknown(scene))):
         return None  # the law in the condition stands alone
     return lambda quantity, where: predict(scene, at, quantity, where)

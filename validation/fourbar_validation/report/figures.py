@@ -169,7 +169,7 @@ def _label(quantity: str, solution: Solution) -> str:
 
 def _base(solution: Solution, at: Command | None) -> Array:
     """Choose what a curve is drawn over: the time of a free motion, else theta_2 in degrees."""
-    angle = getattr(solution, solution.commanded) if at is None else at.angle
+    angle = (solution.at if at is None else at).angle
     if solution.time is not None and len(solution.time) == len(angle):
         return solution.time
     return np.degrees(angle)

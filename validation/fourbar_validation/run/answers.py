@@ -8,15 +8,17 @@ from functools import partial
 from fourbar.errors import LimitError
 from fourbar.formulas import mobility
 from fourbar.mjcf.settings import LIGHT
-from fourbar.quantities import COUPLE, FORCES, LINE
+from fourbar.quantities import COUPLE, FORCES
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Answer, Engine
 from fourbar_validation.compare.compare import Comparison, Predicted
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
+from fourbar_validation.compare.scales import angles_of
 from fourbar_validation.compare.statements import limits, transmission
 from fourbar_validation.compare.statements.finding import look, worst
+from fourbar_validation.engines.description import driving
 from fourbar_validation.engines.witnesses import Witness, answering_nearby, predicting_from
-from fourbar_validation.run.question import Question
+from fourbar_validation.run.question import Question, without_angles
 
 
 def compare_answers(question: Question) -> Iterator[Row]:
@@ -48,7 +50,7 @@ def compare_answer(question: Question, witness: Witness, answer: Answer) -> list
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
         rows = [replace(row, reason=row.reason + why) if row.failed else row for row in rows]
     answers = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
-    if answers and answer.at is not None and {"theta_3", "theta_4"} <= answer.quantities.keys():
+    if answers and angles_of(answer):
         rows.append(comparison.closure())
     return rows
 
@@ -61,7 +63,7 @@ def _observed_order(question: Question, witness: Witness) -> dict[str, float]:
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
     assert witness.order is not None
-    coarse, fine, order = witness.order(question.scene, question.at, error)
+    coarse, fine, order = witness.order(question.scene, without_angles(question.at), error)
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 
@@ -119,26 +121,22 @@ def compare_inertia(question: Question) -> Iterator[Row]:
     An exact engine answers it in the same assembly; another one is started once more.
     """
     scene = question.scene
-    if question.at.omega_2 is None or not (scene.loads or scene.effects):
+    if question.at.speed is None or not (scene.loads or scene.effects):
         return
     bare = Question(question.name, replace(scene, loads=(), effects=()), question.at, output=question.output)
     for name, (answer, seconds) in question.answered.items():
-        if f"{_driving(scene)}_inertia" in answer.quantities:
-            bare.answered[name] = _of_inertia(answer, _driving(scene)), seconds
+        if f"{driving(scene)}_inertia" in answer.quantities:
+            bare.answered[name] = _of_inertia(answer, driving(scene)), seconds
     for witness in question.witnesses:
         if COUPLE.value in witness.expected and witness.name in question.answered:  # one that broke down has its row
             yield from question.attempt(partial(_inertia, question, bare, witness), witness.name, "inertia alone")
-
-
-def _driving(scene: Scene) -> str:
-    return COUPLE.value if scene.drive is None else LINE.value
 
 
 def _inertia(question: Question, bare: Question, witness: Witness) -> Iterator[Row]:
     answer, (loaded, _) = bare.answer(witness), question.answered.get(witness.name, (None, 0.0))
     if answer.refusal is not None and loaded is not None and loaded.refusal is not None:
         return  # which has its row
-    drive = _driving(question.scene)
+    drive = driving(question.scene)
     rows = compare_answer(bare, replace(witness, expected=(drive,)), answer)
     rows = [row for row in rows if row.quantity == drive or row.verdict in (REFUSES, FAILS)]
     rows = [row for row in rows if row.quantity != "undecided"]

@@ -175,7 +175,7 @@ def _reach(point: Array) -> Array:
 def check_status(question: Question) -> Iterator[Row]:
     """Check that the formulas have no value exactly where another derivation has none."""
     reference, free_body = question.reference, question.free_body
-    if reference is not None and question.at.omega_2 is not None:
+    if reference is not None and question.at.speed is not None:
         yield compare_status(question, reference, *_by_exact_means(question))
     elif reference is None and (free_body is None or free_body.refusal is None):
         what = "the free bodies, by which it is judged, broke down"
@@ -185,7 +185,7 @@ def check_status(question: Question) -> Iterator[Row]:
 def _by_exact_means(question: Question) -> tuple[OfSome | None, OfSome | None]:
     """Give the sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
     scene, at = question.scene, question.at
-    unknown = at.remainder is not None or not_installed("flint")
+    unknown = at.remainder is not None or at.commanded != "theta_2" or not_installed("flint")
     loaded = any(effect.loaded_pins for effect in scene.effects)
     return (
         None if unknown else lambda where: sines(scene.linkage, select_positions(at, where)),

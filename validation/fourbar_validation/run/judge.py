@@ -23,6 +23,7 @@ from fourbar_validation.run.released import check_released
 from fourbar_validation.run.shipped.bounds import extremes
 from fourbar_validation.run.shipped.calls import compiled, study
 from fourbar_validation.run.shipped.changes import sensitivity, tolerances
+from fourbar_validation.run.shipped.equilibria import equilibria
 from fourbar_validation.run.shipped.files import sdf, usd
 
 
@@ -34,25 +35,26 @@ class Check(NamedTuple):
     """Whether it is of something shipped besides `solve`: the engine of its rows, by its own name."""
     free: bool = False
     """Whether it is of a free motion, the others of a prescribed one."""
-    any_bar: bool = False
-    """Whether it holds for a command of bar 3 or 4 too."""
+    theta_2: str = ""
+    """What of it takes a command of theta_2, where another leaves it out."""
 
 
 CHECKS = (
-    Check(check_identities, any_bar=True),
+    Check(check_identities),
     Check(check_status),
     Check(check_points),
     Check(check_law),
     Check(check_blocks),
-    Check(check_error_bars),
+    Check(check_error_bars, theta_2="error bars: balls are asked at theta_2, and `stability --bar` at the other bars"),
     Check(check_residual),
-    Check(Question.find_reversals),
-    Check(compare_answers, any_bar=True),
-    Check(compare_statements),
-    Check(check_mjcf),
+    Check(Question.find_reversals, theta_2="reversals of dry friction: they are drawn over theta_2"),
+    Check(compare_answers),
+    Check(compare_statements, theta_2="statements of the linkage: engines are led to its limits by theta_2"),
+    Check(check_mjcf, theta_2="MJCF as shipped: it drives bar 2"),
     Check(compare_inertia),
-    Check(check_released, free=True),
-    *(Check(rows, shipped=True) for rows in (compiled, study, sensitivity, extremes, tolerances, sdf, usd)),
+    Check(check_released, free=True, theta_2="released motions: engines begin at theta_2"),
+    *(Check(rows, shipped=True) for rows in (compiled, study, sensitivity, extremes, tolerances, equilibria)),
+    *(Check(rows, shipped=True, theta_2=f"{rows.__name__}: the file opens at theta_2") for rows in (sdf, usd)),
 )
 """All that is checked of a scene; one that raises costs its own rows."""
 OF_MANY = 500
@@ -107,13 +109,11 @@ def judge(
         question.left_out.append(f"what else is shipped: {what}")
         shipped = False
     rows: list[Row] = []
-    if other := (question.at.bar != 2 or question.at.stroke is not None):
-        commanded = question.at.commanded if question.at.stroke is None else "stroke"
-        question.left_out.append(f"checks that move theta_2: {commanded} is commanded")
     for check in CHECKS:
-        if other and not check.any_bar:
-            continue
         if check.free == free and (shipped or not check.shipped):
+            if check.theta_2 and question.at.commanded != "theta_2":
+                question.left_out.append(f"{check.theta_2}; {question.at.commanded} is commanded")
+                continue
             called = check.rows.__name__
             engine, part = (called, "") if check.shipped else (FORMULAS, called)
             rows += question.attempt(partial(check.rows, question), engine, part)

@@ -49,8 +49,8 @@ class Cluster:
         """
         from distributed import Client
 
-        # what it logs when the scheduler is lost, tracebacks and all, is one line of ours
-        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+        for of_dask in ("client", "batched"):  # what they log of a lost scheduler, with tracebacks, is one line of ours
+            logging.getLogger(f"distributed.{of_dask}").setLevel(logging.CRITICAL)
         self.scheduler = scheduler
         try:
             self.client = Client(scheduler, set_as_default=False)  # type: ignore[no-untyped-call]

@@ -48,7 +48,7 @@ ROUNDED_SOMEWHERE = 20
 
 def check_points(question: Question) -> Iterator[Row]:
     """Check the scene's own points."""
-    if question.scene.points and question.reference is not None and question.at.omega_2 is not None:
+    if question.scene.points and question.reference is not None and question.at.speed is not None:
         yield points(question, question.scene, question.solution, question.reference)
 
 
@@ -95,15 +95,15 @@ def _known(reference: Solution, quantity: str, n: int) -> Array:
 def check_blocks(question: Question) -> Iterator[Row]:
     """Check a sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
     scene, at, solution = question.scene, question.at, question.solution
-    if at.omega_2 is None or at.remainder is not None:
+    if at.speed is None or at.remainder is not None:
         return
-    n = len(at.theta_2)
+    n = len(at.angle)
     ok = np.flatnonzero(solution.status_code == OK)
     long = np.concatenate((np.resize(ok if len(ok) else np.arange(n), BLOCK), np.arange(n)))
     ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
     repeated = select_positions(at, long)
     if sum(len(effect.loaded_pins) for effect in scene.effects) > 1:  # each may take a search
-        repeated.theta_2[1 : BLOCK - 1] = np.nan
+        repeated.angle[1 : BLOCK - 1] = np.nan
     whole = solve(scene, "force", at=repeated)
     error = (whole.status_code[ends] != solution.status_code[long[ends]]).astype(float)
     for quantity in ("sin_mu", "B", "alpha_3", *FORCES):
@@ -115,6 +115,7 @@ def check_blocks(question: Question) -> Iterator[Row]:
         with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
             size = scale_of(quantity, scene, solution, ours)[long[ends]]
         condition = condition_of(quantity, scene.linkage, solution)[long[ends]]
+        condition = np.where(np.isnan(condition), 1.0, condition)  # what the command decides where nothing closes
         # evaluated by the same code, but not in the same company of a processor's registers
         apart = relative_error(quantity, one, other, size) * condition
         error[known] = np.maximum(error[known], apart[known])
@@ -122,7 +123,7 @@ def check_blocks(question: Question) -> Iterator[Row]:
     solve(scene, at=at, out=alone)  # they are found without vectors then
     for angle, result in alone.items():
         apart = relative_error(angle, result, getattr(solution, angle), np.ones(n))
-        apart *= condition_of(angle, scene.linkage, solution) / half_turns(scene.linkage.ground_angle, at.theta_2)
+        apart *= condition_of(angle, scene.linkage, solution) / half_turns(scene.linkage.ground_angle, at.angle)
         error[-1] = max(error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0))
     reason = f"{len(long)} positions at once against {n}"
     yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=whole.theta_2[ends])
@@ -178,7 +179,7 @@ def check_residual(question: Question) -> Iterator[Row]:
     """Check that what remains of friction couples is rounding: not more, and somewhere not less."""
     scene, solution = question.scene, question.solution
     residual, terms = solution.friction_residual, np.zeros(len(solution))
-    if question.at.omega_2 is None or residual is None:
+    if question.at.speed is None or residual is None:
         return
     assert solution.drive_condition is not None
     for effect in scene.effects:
@@ -202,14 +203,14 @@ def check_law(question: Question) -> Iterator[Row]:
     """Check a motion law by its own table: the piecewise cubic through its points whose acceleration is continuous.
 
     Each piece is the cubic of Hermite through the table's angles with the speeds at its ends; that it is the law's
-    is decided by the accelerations of neighbouring pieces and by the ends alone. theta_2, omega_2 and alpha_2 of
+    is decided by the accelerations of neighbouring pieces and by the ends alone. Angle, speed and acceleration of
     every position, and the conditions on the pieces, by the worst of them.
     """
     law, at = question.scene.motion.law, question.at
     if law is None or at.time is None:
         return
-    assert at.omega_2 is not None
-    t, angle = np.array(law.time), np.array(law.theta_2)
+    assert isinstance(at.speed, np.ndarray)
+    t, angle = np.array(law.time), np.array(law.angle)
     h, rise = np.diff(t), np.diff(angle) / np.diff(t)
     speed = law.at(t)[1]
     first = (6.0 * rise - 4.0 * speed[:-1] - 2.0 * speed[1:]) / h
@@ -226,13 +227,11 @@ def check_law(question: Question) -> Iterator[Row]:
         jerk = (last - first) / h
         errors.append(np.abs([jerk[1] - jerk[0], jerk[-1] - jerk[-2]]) * float(h.min()) / bent)
     piece = np.clip(np.searchsorted(t, at.time, side="right") - 1, 0, len(h) - 1)
-    theta_2, omega_2, alpha_2 = _hermite(
-        at.time - t[piece], angle[piece], speed[piece], first[piece], last[piece], h[piece]
-    )
+    theta, omega, alpha = _hermite(at.time - t[piece], angle[piece], speed[piece], first[piece], last[piece], h[piece])
     along = [
-        np.abs(theta_2 - at.theta_2) / max(1.0, farthest),
-        np.abs(omega_2 - at.omega_2) / size,
-        np.abs(alpha_2 - at.alpha_2) / bent,
+        np.abs(theta - at.angle) / max(1.0, farthest),
+        np.abs(omega - at.speed) / size,
+        np.abs(alpha - at.acceleration) / bent,
     ]
     error = np.max(along, axis=0)
     error[worst(error)] = np.max([error[worst(error)], *(each.max(initial=0.0) for each in errors)])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.compare.answer import Answer, Engine
+from fourbar_validation.compare.answer import Answer, Engine, not_taken
 from fourbar_validation.compare.compare import Scales
 from fourbar_validation.compare.reversals import Reversal, reversals, reversing
 from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, UNDECIDED, Row, breakdown, plain
@@ -94,14 +94,10 @@ class Question:
         if witness.name not in self.answered:
             with kept(self.output, witness.name):
                 engine, begin = self.engine(witness), time.perf_counter()
-                commanded = self.at.commanded if self.at.stroke is None else "stroke"
-                if commanded in getattr(engine, "commands", ("theta_2",)):
-                    given = without_angles(self.at)
-                    answer = engine.answer(self.scene, given)
-                    answer = replace(answer, at=self.at) if answer.at is given else answer
-                else:
-                    refusal = f"it takes a command of theta_2, and here {commanded} is commanded"
+                if refusal := not_taken(engine, self.at):
                     answer = Answer(witness.name, "exact", refusal=refusal)
+                else:
+                    answer = ask_at(engine, self.scene, self.at)
                 self.answered[witness.name] = answer, time.perf_counter() - begin
         return self.answered[witness.name][0]
 
@@ -177,6 +173,13 @@ class Question:
             yield breakdown(self.name, engine, error, part)
 
 
+def ask_at(engine: Engine, scene: Scene, at: Command) -> Answer:
+    """Give an engine what is commanded, and nothing that the formulas computed from it."""
+    given = without_angles(at)
+    answer = engine.answer(scene, given)
+    return replace(answer, at=at) if answer.at is given else answer
+
+
 def without_angles(at: Command) -> Command:
     """Take out of a command by a stroke the bar's motion, which the formulas computed from it: NaN."""
     if at.stroke is None:
@@ -187,11 +190,4 @@ def without_angles(at: Command) -> Command:
 
 def select_positions(at: Command, where: NDArray[np.intp]) -> Command:
     """Take some positions of a command."""
-
-    def of(value: float | Array | None) -> float | Array | None:
-        return value if value is None or np.ndim(value) == 0 else value[where]  # type: ignore[index]
-
-    time = None if at.time is None else at.time[where]
-    speed, acceleration = of(at.speed), of(at.acceleration)
-    moved = Command(at.angle[where], at.branch[where], speed, acceleration, None, time, at.bar)  # type: ignore[arg-type]
-    return moved._replace(stroke=of(at.stroke), lever=of(at.lever))  # type: ignore[arg-type]
+    return at.part(where)._replace(remainder=None)

@@ -176,7 +176,7 @@ def _forces_by(witness: Witness, driven: Question, solution: Solution) -> list[R
     assert reference is not None
     # the formulas are conditioned by the angle that is independent there, an engine by theta_2
     conditioned = replace(solution, condition=reference.condition, drive_condition=reference.drive_condition)
-    conditioned.drive_bar = 2
+    conditioned.drive_bar, conditioned.at = 2, driven.at
     names = [q for q in UNKNOWNS if q in witness.expected]
     # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
     predicted = predicting_from(witness, scene, driven.at, answer)

@@ -15,6 +15,7 @@ import fourbar
 from fourbar.effects import Effect, Flywheel, PinFriction, Spring, SpringEnd, Springs, Torsion
 from fourbar.effects.actions import bodies
 from fourbar.errors import DependencyError, InputError, NotAssembledError
+from fourbar.formulas.mobility import intervals
 from fourbar.formulas.path import state
 from fourbar.formulas.torque import inertia
 from fourbar.scene.motion_law import Law
@@ -23,8 +24,11 @@ from fourbar.show.between import between
 from fourbar.show.duty import energies
 from fourbar.show.plot.curves import broken, limit_of, poles
 from fourbar.show.plot.figures import FIGURES, drawn
+from fourbar.show.plot.film import frames
 from fourbar.show.plot.freebody import free_body
-from fourbar.show.plot.style import number, plain, unit_for
+from fourbar.show.plot.labels import Labels
+from fourbar.show.plot.mechanism import draw_mechanism
+from fourbar.show.plot.style import INK, number, plain, unit_for
 from fourbar.show.plot.transmission import free_place
 from fourbar.show.plot.view import CLEAR, common_position, on_branch, view
 from tests.support.scenes import crank_rocker, thesis
@@ -89,7 +93,7 @@ def clashes(figure) -> list[tuple[str, str]]:
     ]
 
 
-@pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy"}))
+@pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy", "stroke"}))
 def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> None:
     for scene, branches in ((CRANK_ROCKER, "both"), (thesis(), "one")):
         figure = composed(scene, name, branches)
@@ -451,3 +455,97 @@ def test_units_get_the_prefix_that_suits() -> None:
     assert unit_for(0.94, "N m") == (1e3, "mN m")
     assert unit_for(15218.0, "N m") == (1e-3, "kN m")
     assert unit_for(0.0, "N") == (1.0, "N")
+
+
+BOTTOM, SIDE = SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
+COMMANDS = {
+    r"$\theta_3$ (°)": fourbar.Motion(theta_3=fourbar.Sweep(1.25, 0.67, 40), omega_3=-2.0),
+    r"$\theta_4$ (°)": fourbar.Motion(theta_4=fourbar.Sweep(1.95, 2.78, 40), omega_4=4.0),
+    "stroke (mm)": fourbar.Motion(stroke=fourbar.Sweep(0.2, 0.32, 40), stroke_speed=0.2, side="left"),
+}
+"""Each command and the name of the axis that curves are drawn over."""
+
+
+def commanding(motion: fourbar.Motion) -> fourbar.Scene:
+    return crank_rocker(motion=motion, drive=fourbar.LinearDrive(BOTTOM, SIDE), effects=(fourbar.Gravity(),))
+
+
+@pytest.mark.parametrize("label", COMMANDS)
+def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
+    scene = commanding(COMMANDS[label])
+    s, name = fourbar.solve(scene), scene.motion.names[0]
+    over = getattr(s, name) * (1000.0 if name == "stroke" else 180.0 / math.pi)
+    panels = [axes for axes in composed(scene, "overview").axes if axes.get_xlabel() != "$x$ (mm)"]
+    assert len(panels) == 7 and {axes.get_xlabel() for axes in panels} == {label}
+    for axes in panels:
+        assert axes.get_xlim() == pytest.approx((over.min(), over.max()))
+    (drive,) = (axes for axes in panels if axes.get_title(loc="left") == "Force of the drive")
+    line, order = max(drive.lines, key=lambda line: len(line.get_xdata())), np.argsort(over)
+    drawn_at = np.interp(over[order], *(np.array(data)[np.isfinite(line.get_ydata())] for data in line.get_data()))
+    usual = np.abs(s.drive_force[order]) < np.percentile(np.abs(s.drive_force), 80.0)
+    np.testing.assert_allclose(drawn_at[usual], s.drive_force[order][usual], rtol=2e-2, atol=2e-2)
+    (linkage,) = composed(scene, "linkage").axes
+    place = getattr(view(scene).here, name)[0]
+    at = f"stroke = {1000.0 * place:.4g} mm" if name == "stroke" else f"θ₄ = {math.degrees(place):.4g}°"
+    assert at in linkage.get_title(loc="left").replace("θ₃", "θ₄")
+
+
+@pytest.mark.parametrize("label", COMMANDS)
+@pytest.mark.parametrize("figure", ["freebody", "hodograph", "transmission", "kinematics", "sensitivity"])
+def test_every_figure_takes_every_command(label: str, figure: str) -> None:
+    assert not clashes(composed(commanding(COMMANDS[label]), figure))
+
+
+@pytest.mark.parametrize("label", COMMANDS)
+def test_a_film_goes_along_what_is_commanded_and_back(label: str) -> None:
+    shown = view(commanding(COMMANDS[label]))
+    order, last = frames(shown, 21), len(shown.sweep) - 1
+    assert order[0] == 0 and max(order) == last and order.index(last) == 9 and order[-1] > 0
+    assert (np.diff(shown.sweep.at.places) > 0.0).all()
+
+
+def test_one_position_of_another_command_stands_in_its_range() -> None:
+    single = replace(COMMANDS["stroke (mm)"], stroke=0.3)
+    shown = view(commanding(single))
+    triangle = 0.34, 0.16  # the cylinder's longest and shortest stroke
+    places = shown.sweep.at.places
+    assert shown.at == "stroke = 300 mm" and shown.here.stroke[0] == pytest.approx(0.3, rel=1e-14)
+    assert places.max() < triangle[0] and places.min() > triangle[1] and len(places) == 362
+    shown = view(commanding(fourbar.Motion(theta_4=2.0, omega_4=1.0)))
+    (low, high), *_ = (own for own in intervals(CRANK_ROCKER.linkage, 4) if own[0] < 2.0 + math.tau < own[1])
+    assert shown.sweep.theta_4.min() > low and shown.sweep.theta_4.max() < high
+    assert shown.at == "θ₄ = 114.6°"
+
+
+def test_dead_centres_stand_where_the_bars_are_in_line_on_every_axis() -> None:
+    """Bars 2 and 3 stretched: cosine rule for O2, B, O4, where theta_3 = theta_2."""
+    d, a, b, c = CRANK_ROCKER.linkage.lengths
+    stretched = CRANK_ROCKER.linkage.ground_angle + math.acos(((a + b) ** 2 + d * d - c * c) / (2.0 * (a + b) * d))
+    for name in ("theta_2", "theta_3"):
+        motion = fourbar.Motion(**{name: fourbar.Sweep(0.7, 1.25, 40), name.replace("theta", "omega"): 1.0})
+        (axes,) = composed(commanding(motion), "transmission").axes
+        (mark,) = (line for line in axes.lines if line.get_label() == "dead centre: bars 2, 3 in line")
+        assert mark.get_xdata() == pytest.approx([math.degrees(stretched)])
+
+
+def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out() -> None:
+    scene, lengths = commanding(COMMANDS["stroke (mm)"]), []
+    shown = view(scene)
+    from matplotlib.figure import Figure
+
+    for index in (0, 20, 40):
+        axes = Figure().subplots()
+        draw_mechanism(axes, shown, shown.sweep, index, Labels())
+        (barrel,) = (line for line in axes.lines if line.get_linewidth() == 4.5 and line.get_color() == INK)
+        lengths.append(np.hypot(*np.ptp(np.array(barrel.get_data()), axis=1)))
+    assert np.ptp(lengths) < 1e-9 * lengths[0] and lengths[0] < 1000.0 * shown.sweep.stroke.min()
+
+
+def test_the_stroke_is_a_figure_where_it_is_not_the_axis() -> None:
+    scene = commanding(COMMANDS[r"$\theta_4$ (°)"])
+    (axes,) = composed(scene, "stroke").axes
+    curve, s = max(axes.lines, key=lambda line: len(line.get_xdata())), fourbar.solve(scene)
+    np.testing.assert_allclose(np.interp(np.degrees(s.theta_4), *curve.get_data()), 1000.0 * s.stroke, rtol=1e-14)
+    for other in (CRANK_ROCKER, commanding(COMMANDS["stroke (mm)"])):
+        with pytest.raises(InputError, match="needs a linear drive"):
+            drawn(other, "stroke")

@@ -3,11 +3,13 @@
 import math
 import re
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 
 import fourbar
+from fourbar.effects import SpringEnd
 from fourbar.mjcf import RECIPE
 from fourbar.mjcf.settings import WindowMotion
 from fourbar.quantities import UNKNOWNS
@@ -16,12 +18,16 @@ from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.led import Lead
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observed_order
 from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.answers import compare_answer
 from fourbar_validation.run.judge import judge
+from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.random import DrawnType, random_scene
 from tests.support.scenes import crank_rocker, thesis
+from tests.validation.engines.test_engines import commanded
 
 TURN = fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 90)
 
@@ -203,6 +209,67 @@ def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links: 
     mass = float(advised[1])
     scene = hood(links or mass, None if output is None else mass)
     assert {row.verdict for row in judge("hood", scene, SIMULATION).rows} == {AGREES}
+
+
+@pytest.mark.parametrize(("one", "other"), list(combinations((1, 2, 3, 4), 2)))
+def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
+    one: int, other: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive = fourbar.LinearDrive(SpringEnd(one, 0.17, -1.1), SpringEnd(other, 0.09, 0.7))
+    scene = crank_rocker(motion=fourbar.Motion(TURN, 10.0, 5.0), drive=drive, effects=(fourbar.Gravity(),))
+    (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
+    rows = {
+        row.quantity: row for row in judge("", scene, [simulated], order=False).rows if row.engine == simulated.name
+    }
+    assert {row.verdict for row in rows.values()} == {AGREES}
+    assert {
+        "drive_force",
+        "drive_force_inertia",
+        "stroke",
+        "stroke_speed",
+        "F12",
+        "F43",
+        "F14",
+        "as shipped",
+    } <= rows.keys()
+    assert max(rows[name].error for name in ("drive_force", "F12", "F32", "F43", "F14")) < 1e-6
+    right = ClosedLoop.work
+    monkeypatch.setattr(ClosedLoop, "work", lambda self, bar, size, *rest: right(self, bar, 1.01 * size, *rest))
+    rows = {
+        row.quantity: row for row in judge("", scene, [simulated], order=False).rows if row.engine == simulated.name
+    }
+    assert rows["drive_force"].verdict == FAILS
+
+
+@pytest.mark.parametrize("what", ["theta_3", "theta_4", "stroke of bar 2", "stroke of bar 4"])
+def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
+    for branch in (1, -1):
+        scene = commanded(what, branch)
+        question = Question("", scene, fourbar.command(scene))
+        answer = question.answer(simulated)
+        assert {row.verdict for row in compare_answer(question, simulated, answer)} == {AGREES}
+        assert answer.at is not None and answer.at.speed is not None and len(answer.alarms) == 0
+        assert answer.at.bar == question.at.bar and (answer.at.branch == branch).all()
+        speeds = answer.quantities["stroke_speed"] if "stroke" in what else answer.at.speed
+        passed = answer.quantities["stroke"] if "stroke" in what else answer.at.angle
+        speed, growth = (0.2, 0.1) if "stroke" in what else (3.0, -2.0)
+        closes = answer.assembled
+        due = np.sqrt(speed**2 + 2.0 * growth * (passed[closes] - passed[closes][0]))
+        assert closes.sum() >= 4
+        np.testing.assert_allclose(speeds[closes], due, rtol=1e-6)
+    right = Lead.alpha_2
+    monkeypatch.setattr(Lead, "alpha_2", lambda *given: 0.9 * right(*given))
+    failed = [row for row in judge("", scene, [simulated], order=False).rows if row.failed]
+    assert any("speed_error" in row.reason for row in failed)
+
+
+def test_an_input_that_must_hurry_is_not_led() -> None:
+    near = float(fourbar.formulas.mobility.limit_angles(crank_rocker().linkage, 4)[0])
+    (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
+    motion = fourbar.Motion(theta_4=near + np.linspace(0.3, 1e-6, 20), omega_4=-1.0)
+    rows = judge("", crank_rocker(motion=motion), [simulated], order=False).rows
+    assert [row.reason for row in rows if row.verdict == REFUSES and "as fast as on the mean" in row.reason]
 
 
 def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused() -> None:

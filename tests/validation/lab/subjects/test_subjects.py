@@ -155,6 +155,7 @@ def test_a_wrong_a_missing_and_a_nan_reading_show() -> None:
     assert found["F32"] < EXACT
 
 
+@pytest.mark.nightly
 def test_exudyn_refuses_what_it_has_no_element_for() -> None:
     exudyn = pytest.importorskip("fourbar_validation.lab.subjects.exudyn_simulated", exc_type=ImportError)
     scene, (_, setting) = fourbar.load(PROBLEM), exudyn.SETTINGS
@@ -295,6 +296,7 @@ COARSE_OF = {"newton_kamino": 0.2}
 """Single precision and of first order; measured 9.7e-2 in 157 steps."""
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("sealed")
 @pytest.mark.parametrize("module", examine.SIMULATORS)
 def test_each_simulator_that_is_installed_carries_the_loop(module: str) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.effects import SpringEnd
 from fourbar.scene import Scene, command
 from fourbar.studies.keys import entries, left_out
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
@@ -15,10 +16,11 @@ from fourbar_validation.run import judge
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.shipped import calls, files
 from fourbar_validation.run.shipped.variants import moved, stated
+from tests.support.scenes import crank_rocker
 
 SHIPPED = SPECIMENS["shipped"]
 CHECKS = [check.rows for check in judge.CHECKS if check.shipped]
-ENGINES = {"compiled", "study", "sensitivity", "extremes", "tolerances", "sdf", "usd"}
+ENGINES = {"compiled", "study", "sensitivity", "extremes", "tolerances", "equilibria", "sdf", "usd"}
 
 
 def rows_of(scene: Scene, engine: str = "") -> list[Row]:
@@ -77,6 +79,72 @@ def test_a_public_call_that_errs_fails(
     question = Question("", SHIPPED, command(SHIPPED))
     monkeypatch.setattr(fourbar, call, altered(getattr(fourbar, call), change))
     assert quantity in failing(next(check for check in CHECKS if check.__name__ == engine)(question))
+
+
+def changed(**numbers: Any) -> Callable[[Any], Any]:
+    return lambda found: found._replace(found=(found.found[0]._replace(**numbers), *found.found[1:]))
+
+
+def turned(found: Any) -> Any:
+    place = found.found[0].place
+    return changed(place=place._replace(theta_2=place.theta_2 + 1e-7))(found)
+
+
+@pytest.mark.parametrize(
+    ("change", "quantities"),
+    [
+        (lambda found: found._replace(found=found.found[1:]), {"missed"}),
+        (turned, {"torque"}),
+        (lambda found: changed(slope=-found.found[0].slope)(found), {"slope"}),
+        (lambda found: changed(inertia=1.000001 * found.found[0].inertia)(found), {"inertia"}),
+        (changed(frequency=3.0), {"frequency"}),
+    ],
+)
+def test_equilibria_that_err_fail(
+    monkeypatch: pytest.MonkeyPatch, change: Callable[[Any], Any], quantities: set[str]
+) -> None:
+    call = fourbar.equilibrium
+    monkeypatch.setattr(fourbar, "equilibrium", lambda scene: change(call(scene)))
+    assert failing(rows_of(SHIPPED, "equilibria")) >= quantities
+
+
+COMMANDS = {
+    "theta_3": fourbar.Motion(theta_3=fourbar.Sweep(0.67, 1.25, 20), omega_3=2.0, alpha_3=1.0, branch=-1),
+    "theta_4": fourbar.Motion(theta_4=fourbar.Sweep(2.0, 2.75, 20), omega_4=2.0, alpha_4=1.0),
+    "stroke": fourbar.Motion(stroke=fourbar.Sweep(0.2, 0.3, 20), stroke_speed=0.2, side="left"),
+}
+
+
+def commanding(name: str) -> Scene:
+    ends = SpringEnd(1, 0.25, -2.8), SpringEnd(2, 0.09, 0.17)
+    return crank_rocker(motion=COMMANDS[name], drive=fourbar.LinearDrive(*ends), effects=(fourbar.Gravity(),))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_other_commands_are_judged_too_and_what_is_not_is_named(name: str) -> None:
+    record = judge.judge("", commanding(name), (), order=False, shipped=True)
+    assert not [row for row in record.rows if row.failed]
+    compared = {row.engine for row in record.rows if row.compared}
+    assert compared >= ENGINES - {"extremes", "sdf", "usd"} and {"status", "blocks"} <= {
+        r.quantity for r in record.rows
+    }
+    named = [line.split(":")[0] for line in record.left_out if line.endswith(f"; {name} is commanded")]
+    wanted = ["error bars", "reversals of dry friction", "statements of the linkage", "MJCF as shipped", "sdf", "usd"]
+    assert named == wanted
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_study_of_another_command_that_errs_fails(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    scene, call = commanding(name), fourbar.solve
+
+    def wrong(of: Any, *arguments: Any, **options: Any) -> Any:
+        found = call(of, *arguments, **options)
+        if not isinstance(of, Scene):
+            found.drive_force[[1, 2]] = found.drive_force[[2, 1]]
+        return found
+
+    monkeypatch.setattr(fourbar, "solve", wrong)
+    assert "drive_force" in failing(rows_of(scene, "study"))
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
+from fourbar.mjcf.model import CYLINDER
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loaded import Assembled
 from fourbar_validation.engines.tree import closed
@@ -15,6 +16,8 @@ O2, A, O4 = 0, 1, 2
 """Degrees of freedom, in the order of the bodies."""
 TURNED_BY = {2: [O2], 3: [O2, A], 4: [O4]}
 """Joints whose angles a bar's rotation is the sum of."""
+ENDS = (f"{CYLINDER}_start", f"{CYLINDER}_end")
+"""Sites of the cylinder."""
 WARNINGS = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
@@ -31,11 +34,12 @@ class ClosedLoop(Assembled):
     def __init__(self, mjcf: str) -> None:
         self.model = mujoco.MjModel.from_xml_string(mjcf)
         self.data = mujoco.MjData(self.model)
-        self.site = {name: self.model.site(name).id for name in ("A", "O4", "B3", "B4")}
+        self.site = {self.model.site(number).name: number for number in range(self.model.nsite)}
         self.body = {name: self.model.body(name).id for name in ("input", "coupler", "output")}
         loads = [i for i in range(self.model.nu) if self.model.actuator(i).name.startswith("load_")]
         self.loads = [(i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads]
-        self.drive = next((i for i in range(self.model.nu) if self.model.actuator(i).name == "drive"), None)
+        named = {self.model.actuator(i).name: i for i in range(self.model.nu)}
+        self.drive, self.ram = named.get("drive"), named.get(CYLINDER)
         self._jac = np.zeros((3, self.model.nv))
 
     def gap(self) -> tuple[float, float]:
@@ -63,15 +67,20 @@ class ClosedLoop(Assembled):
         x, names = self.data.site_xpos, {"O4": "O4", "A": "A", "B": "B3", "B4": "B4"}
         return {name: x[self.site[site]][:2].copy() for name, site in names.items()}
 
-    def branch(self) -> int:
-        """Return the branch of the state that was last forwarded: det = -b c sin(theta_4 - theta_3)."""
-        return int(-np.sign(np.linalg.det(self.jacobian()[:, [A, O4]])))
+    def branch(self, bar: int = 2) -> int:
+        """Return the branch of the state that was last forwarded, of a command of a bar.
 
-    def set_state(self, q: Sequence[float], omega_2: float) -> None:
-        """Start from own joint angles at omega_2, with the velocities that keep the gap closed."""
+        The null vector of the gap's derivative turns the bar as -b c sin(theta_4 - theta_3) is of bar 2, and as the
+        opposite products are of bars 3 and 4.
+        """
+        turn = self.drive_column(bar) @ np.cross(*self.jacobian()[:, :3])
+        return int(np.sign(turn if bar != 2 else -turn))
+
+    def set_state(self, q: Sequence[float], speed: float, bar: int | None = 2) -> None:
+        """Start from own joint angles at the speed of a bar or of the stroke, with the gap kept closed."""
         mujoco.mj_resetData(self.model, self.data)
         self.place(q)
-        self.data.qvel[:3] = closed(self.jacobian()[:, :3], omega_2)
+        self.data.qvel[:3] = closed(self.jacobian()[:, :3], speed, self.drive_column(bar))
 
     def forward(self) -> None:
         """Everything at the present state: after a Runge-Kutta step some fields are still of the step before."""
@@ -98,11 +107,68 @@ class ClosedLoop(Assembled):
                 on[name] -= force
         return on
 
+    def given(self) -> float:
+        """Return the acceleration that the flywheel's motor is given, rad/s^2."""
+        return 0.0 if self.drive is None else float(self.data.actuator_force[self.drive] / self.model.dof_armature[O2])
+
     def crank_torque(self) -> float:
         """T2: what the flywheel gives the crank, and the motor next to it, N m."""
         flywheel = -self.model.dof_armature[O2] * self.data.qacc[O2]
         motor = 0.0 if self.drive is None else self.data.actuator_force[self.drive]
         return float(flywheel + motor)
+
+    def drive_column(self, drive_bar: int | None) -> Array:
+        """Return the derivative of the driven bar's rotation by the joint angles, or of the cylinder's stroke, (3,)."""
+        if drive_bar is not None:
+            return np.isin((O2, A, O4), TURNED_BY[drive_bar]).astype(float)
+        start, end = ENDS
+        return np.asarray(self.line() / self.stroke() @ (self.jacobian_at(end) - self.jacobian_at(start)))
+
+    def angle(self, bar: int) -> float:
+        """Sum of the joint angles that a bar's direction is, rad."""
+        return float(self.data.qpos[TURNED_BY[bar]].sum())
+
+    def line(self) -> Array:
+        """Vector from the cylinder's one site to the other, (2,), m."""
+        start, end = (self.data.site_xpos[self.site[end]] for end in ENDS)
+        return np.asarray((end - start)[:2])
+
+    def stroke(self) -> float:
+        """Distance of the cylinder's sites, m."""
+        return float(np.hypot(*self.line()))
+
+    def drive_drift(self, drive_bar: int | None) -> float:
+        """Return the second derivative of what `drive_column` is of at the present speeds, nothing accelerating."""
+        if drive_bar is not None:
+            return 0.0
+        (start, end), line, stroke, v = ENDS, self.line(), self.stroke(), self.data.qvel
+        x, y = (self.jacobian_at(end) - self.jacobian_at(start)) @ v
+        across = (line[0] * y - line[1] * x) / stroke
+        return float(line / stroke @ (self.rate_at(end) - self.rate_at(start)) @ v + across * across / stroke)
+
+    def rate_at(self, site: str) -> Array:
+        """Return the rate of `jacobian_at` at the present speeds, (2, nv)."""
+        dot, number = np.zeros((3, self.model.nv)), self.site[site]
+        body = self.model.site_bodyid[number]
+        mujoco.mj_jacDot(self.model, self.data, dot, None, self.data.site_xpos[number], body)
+        return dot[:2]
+
+    def cylinder(self, bar: int) -> tuple[complex, complex]:
+        """Measure from the ground pin of a bar, at angle 0, to the cylinder's end on it and that on the ground, m."""
+        self.place((0.0, 0.0, 0.0))
+        ground = self.model.body("ground").id
+        ends = sorted((self.site[end] for end in ENDS), key=lambda site: self.model.site_bodyid[site] == ground)
+        pivot = self.data.site_xpos[self.site["O4"]] if bar == 4 else np.zeros(3)
+        x, y = (complex(*(self.data.site_xpos[site] - pivot)[:2]) for site in ends)
+        return x, y
+
+    def work(self, drive_bar: int | None, size: float, correction: float = 0.0) -> None:
+        """Let a couple act on the driven bar, N m, or the cylinder's actuator push, N; and a couple on the crank."""
+        self.data.qfrc_applied[:] = (correction, 0.0, 0.0)
+        if drive_bar is None:
+            self.data.ctrl[self.ram] = size
+        else:
+            self.data.qfrc_applied[TURNED_BY[drive_bar]] += size
 
     def keeps_centre(self, name: str) -> bool:
         """Tell whether the compiler left a bar's mass centre where the file has it, and not at the bar's origin."""
@@ -114,11 +180,12 @@ class ClosedLoop(Assembled):
 
 
 def couple_elsewhere(
-    loop: ClosedLoop, light: ClosedLoop, drive_bar: int, alpha_2: float, crank_torque: float
+    loop: ClosedLoop, light: ClosedLoop, drive_bar: int | None, alpha_2: float, crank_torque: float
 ) -> float | None:
-    """Solve for the couple on bar 3 or 4 that accelerates the crank as before; None where it does not move the crank.
+    """Solve for what accelerates the crank as before; None where it does not move the crank.
 
-    The accelerations are linear in the couple; two trials give it, and `light` is left at a third, to be read.
+    That is a couple on bar 3 or 4, or the force of the actuator between the cylinder's two sites. The accelerations are
+    linear in it; two trials give it, and `light` is left at a third, to be read.
 
     Parameters
     ----------
@@ -133,14 +200,12 @@ def couple_elsewhere(
     happened = loop.data.qacc[O2]
     # the light flywheel's motor gives it alpha_2 as commanded; this gives it what the crank really had
     correction = light.model.dof_armature[O2] * (happened - alpha_2)
-    acts_on = TURNED_BY[drive_bar]
-    speed = d.qvel[acts_on].sum()
+    speed = float(loop.drive_column(drive_bar) @ d.qvel)
     guess = crank_torque * d.qvel[O2] / speed if speed else crank_torque
     trials = (0.5 * guess, 1.5 * guess) if guess else (-1.0, 1.0)
 
     def crank_acceleration(couple: float) -> float:
-        d.qfrc_applied[:] = (correction, 0.0, 0.0)
-        d.qfrc_applied[acts_on] += couple
+        light.work(drive_bar, couple, correction)
         mujoco.mj_forward(light.model, d)
         return float(d.qacc[O2])
 

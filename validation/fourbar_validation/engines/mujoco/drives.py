@@ -73,9 +73,9 @@ class Actuated(Driven):
         servo |= {"gaintype": "fixed", "gainprm": numbers(kp), "biastype": "affine"}
         ET.SubElement(actuators, "general", servo, biasprm=numbers(kv * self.omega, -kp, -kv), name="servo", joint="O2")
 
-    def set_state(self, q: Sequence[float], omega_2: float) -> None:
+    def set_state(self, q: Sequence[float], speed: float, bar: int | None = 2) -> None:
         """Start the target where the crank is."""
-        super().set_state(q, omega_2)
+        super().set_state(q, speed, bar)
         if self.kp:
             self.data.act[:] = q[O2]
             self.data.ctrl[self.servo] = self.omega
@@ -113,10 +113,10 @@ class WheelEquality(Driven):
         """Place the wheel where the crank is."""
         super().place((*q, q[O2]))
 
-    def set_state(self, q: Sequence[float], omega_2: float) -> None:
+    def set_state(self, q: Sequence[float], speed: float, bar: int | None = 2) -> None:
         """Let the wheel rotate as the crank does."""
-        super().set_state(q, omega_2)
-        self.data.qvel[3] = omega_2
+        super().set_state(q, speed, bar)
+        self.data.qvel[3] = speed
 
     def crank_torque(self) -> float:
         """Read the multiplier of the joint equality: its row of the Jacobian is 1 at the crank."""

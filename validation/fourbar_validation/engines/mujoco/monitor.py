@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import COUPLE, LINE, PIN_FORCES
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.mujoco.closed_loop import O2, O4, TURNED_BY, A, ClosedLoop
+from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.tree import multipliers
 
 
@@ -84,6 +84,8 @@ class _Motion:
     a_B: Array
     jacobian: Array
     """Derivative of the gap by the joint angles, (2, 3)."""
+    drive: Array
+    """Derivative of the driven bar's rotation, or of the cylinder's stroke, by the joint angles, (3,)."""
     needed: Array
     """What the motion asks for in each joint beyond loads and effects, (3,), N m."""
     answer: dict[str, Array]
@@ -93,16 +95,14 @@ class _Motion:
 class ResidualMonitor:
     """Looks at a simulated motion with the bars alone, sample after sample."""
 
-    def __init__(self, bars: ClosedLoop, drive_bar: int) -> None:
-        self.bars = bars
+    def __init__(self, bars: ClosedLoop, drive_bar: int | None) -> None:
+        self.bars, self.drive_bar = bars, drive_bar
+        self.drive = (COUPLE if drive_bar else LINE).value
         model = self.bars.model
         model.dof_armature[:] = 0.0
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
         if self.bars.drive is not None:
             model.actuator_biastype[self.bars.drive] = mujoco.mjtBias.mjBIAS_NONE
-        self.e_drive = np.zeros(3)
-        self.e_drive[TURNED_BY[drive_bar]] = 1.0
-        self._dot = np.zeros((3, 3))
         self.worst = dict.fromkeys(LIMITS, 0.0)
         self._most = dict.fromkeys(LIMITS, 0.0)
 
@@ -110,13 +110,14 @@ class ResidualMonitor:
         """Take in a forwarded state, the drive's torque and F43 as read; the error to expect of each quantity."""
         q, v, a = (np.array(field) for field in (loop.data.qpos, loop.data.qvel, loop.data.qacc))
         seen = self._motion(q, v, a)
-        power = torque * float(self.e_drive @ v)
+        power = torque * float(seen.drive @ v)
         self._keep("acceleration_gap", float(np.hypot(*seen.jerk)), float(np.hypot(*seen.a_B)))
         # at a pole of T3 or T4 the speed of the driven bar, which vanishes, is as uncertain as the others
-        terms = abs(torque) * float(np.abs(v).max()) + float(np.abs(seen.needed * v).sum())
+        lever = float(np.abs(seen.drive).max())
+        terms = abs(torque) * lever * float(np.abs(v).max()) + float(np.abs(seen.needed * v).sum())
         self._keep("power_gap", abs(power - float(seen.needed @ v)), terms)
         carried = seen.jacobian.T @ loop_force
-        unbalanced = float(np.linalg.norm(seen.needed - carried - self.e_drive * torque))
+        unbalanced = float(np.linalg.norm(seen.needed - carried - seen.drive * torque))
         self._keep("force_gap", unbalanced, float(np.linalg.norm(seen.needed) + np.linalg.norm(carried)))
         try:
             closed = self._closed(q, v, a, seen)
@@ -124,10 +125,10 @@ class ResidualMonitor:
             return dict.fromkeys(seen.answer, math.inf)
         expected = {name: float(np.linalg.norm(value - closed.answer[name])) for name, value in seen.answer.items()}
         # what the solver left over: the pin forces differ by as much as F43
-        remaining = {"torque": abs(torque - float(seen.answer["torque"]))}
+        remaining = {self.drive: abs(torque - float(seen.answer[self.drive]))}
         remaining |= dict.fromkeys(PIN_FORCES, float(np.linalg.norm(loop_force - seen.answer["F43"])))
         for name, error in remaining.items():
-            size = seen.needed if name == "torque" else seen.answer[name]
+            size = seen.needed if name == COUPLE.value else seen.answer[name]
             expected[name] += min(error, EXCUSED * float(np.linalg.norm(size)))
         return expected
 
@@ -146,24 +147,28 @@ class ResidualMonitor:
         mujoco.mj_inverse(bars.model, d)
         mujoco.mj_fwdActuation(bars.model, d)
         jacobian, gap = bars.jacobian(), np.array(bars.gap())
-        rate_3, rate_4 = self._rate("B3"), self._rate("B4")
-        needed = d.qfrc_inverse - d.qfrc_actuator
+        rate_3, rate_4 = bars.rate_at("B3"), bars.rate_at("B4")
+        needed, drive = d.qfrc_inverse - d.qfrc_actuator, bars.drive_column(self.drive_bar)
         answer: dict[str, Array] = {}
         for name, x in (("theta", q), ("omega", v), ("alpha", a)):
             answer[f"{name}_3"], answer[f"{name}_4"] = x[O2] + x[A], x[O4]
         try:
-            result = multipliers(jacobian, self.e_drive, needed)
+            result = multipliers(jacobian, drive, needed)
         except np.linalg.LinAlgError:
             result = np.full(3, np.inf)
-        answer |= {"F43": result[:2], "torque": result[2]}
-        answer |= self._pins(a, result[:2])
+        answer |= {"F43": result[:2], self.drive: result[2]}
+        answer |= self._pins(result[:2], float(result[2]))
         jerk = jacobian @ a + (rate_3 - rate_4) @ v
         a_B = bars.jacobian_at("B4") @ a + rate_4 @ v
-        return _Motion(gap, jacobian @ v, jerk, a_B, jacobian, needed, answer)
+        return _Motion(gap, jacobian @ v, jerk, a_B, jacobian, drive, needed, answer)
 
-    def _pins(self, a: Array, loop_force: Array) -> dict[str, Array]:
+    def _pins(self, loop_force: Array, drive: float) -> dict[str, Array]:
         """F12, F32, F14: what carries the bars on the open tree, and the loop force put back."""
         bars, d = self.bars, self.bars.data
+        if self.drive_bar is None:  # its line crosses the pins, a couple does not
+            d.ctrl[bars.ram] = drive
+            mujoco.mj_fwdActuation(bars.model, d)
+            d.ctrl[bars.ram] = 0.0
         mujoco.mj_rnePostConstraint(bars.model, d)
         on = bars.carried()
         return {"F14": on["output"] + loop_force, "F32": -(on["coupler"] - loop_force), "F12": on["input"] - loop_force}
@@ -178,8 +183,3 @@ class ResidualMonitor:
         at = self._motion(q, v, a)
         a[others] -= np.linalg.solve(self.bars.jacobian()[:, others], at.jerk)
         return self._motion(q, v, a)
-
-    def _rate(self, site: str) -> Array:
-        model, d, number = self.bars.model, self.bars.data, self.bars.site[site]
-        mujoco.mj_jacDot(model, d, self._dot, None, d.site_xpos[number], model.site_bodyid[number])
-        return np.array(self._dot[:2])

@@ -11,6 +11,7 @@ from fourbar.mjcf import Settings, run_through
 from fourbar.mjcf.settings import FULL_TURN
 from fourbar.scene import Command
 from fourbar.scene.motion_law import Law
+from fourbar_validation.compare.answer import Array
 
 LOOKED_AT = 2000
 """Instants at which a law is searched for its greatest speed and acceleration; between them it hardly differs."""
@@ -19,15 +20,20 @@ LOOKED_AT = 2000
 class Steady:
     """A segment of positions in the order of their angles, at constant alpha_2.
 
-    As of `Lawful`, `omega` is the speed at the start and `fastest` the greatest |omega_2|, rad/s.
+    As of `Lawful`, `omega` is the speed at the start, `fastest` the greatest |omega_2|, and `turning` that of the
+    input, rad/s.
     """
 
-    def __init__(self, command: Command, segment: Sequence[int], omega: float, alpha: float) -> None:
-        self.theta_2 = command.theta_2
-        commanded = command.theta_2[list(segment)]
+    bar: int | None = 2
+    """Whose motion it is; None: the stroke's."""
+
+    def __init__(self, theta_2: Array, segment: Sequence[int], omega: float, alpha: float) -> None:
+        self.theta_2 = theta_2
+        commanded = theta_2[list(segment)]
         self.run = run_through(commanded, omega, alpha)
         self.width = len(np.unique(commanded)) - 1
-        self.omega, self.fastest = omega, self.run.fastest
+        self.omega = omega
+        self.fastest = self.turning = self.run.fastest
 
     def timestep(self, settings: Settings) -> float:
         """Choose the timestep for this segment, s: at least as many steps as positions; any where there is but one."""
@@ -41,13 +47,11 @@ class Steady:
         """|omega_2| that is due after a turn (rad) and a time: by the angle turned."""
         return math.sqrt(max(self.run.omega**2 + 2.0 * self.run.alpha * turned, 0.0))
 
-    def alpha(self, seconds: float) -> float:
-        """Return what the drive is given, rad/s^2: the same throughout."""
-        return self.run.alpha
-
 
 class Lawful:
     """A segment of positions in the order of their times, by a motion law."""
+
+    bar = 2
 
     def __init__(self, law: Law, command: Command, segment: Sequence[int]) -> None:
         assert command.time is not None
@@ -58,7 +62,8 @@ class Lawful:
         self.knots = list(law.time)
         self.at_knots = law.at(np.array(law.time))[2].tolist()
         angles, speeds, _ = law.at(np.linspace(self.began, ends, LOOKED_AT))
-        self.fastest, self.width = float(np.abs(speeds).max()), float(np.ptp(angles))
+        self.fastest = self.turning = float(np.abs(speeds).max())
+        self.width = float(np.ptp(angles))
 
     def timestep(self, settings: Settings) -> float:
         """Divide the time from each position to the next into a whole number of steps."""
@@ -96,9 +101,6 @@ def extremes(law: Law) -> tuple[float, float]:
     return float(np.abs(omega).max()), float(np.abs(alpha).max())
 
 
-def order_in_time(command: Command, omega: float, law: Law | None) -> NDArray[np.intp]:
-    """Order the positions as they are passed, as indices."""
-    if law is not None:
-        assert command.time is not None
-        return np.argsort(command.time, kind="stable")
-    return np.argsort(command.theta_2 if omega > 0.0 else -command.theta_2, kind="stable")
+def order_in_time(values: Array, time: Array | None, speed: float) -> NDArray[np.intp]:
+    """Order the positions as they are passed, by what is commanded or by the times of a law, as indices."""
+    return np.argsort(time if time is not None else values if speed > 0.0 else -values, kind="stable")

@@ -18,9 +18,10 @@ from fourbar.mjcf.effects import unwound
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.engines.description import driving
 from fourbar_validation.engines.loaded import Values
 from fourbar_validation.engines.loop import Angles, at_each
-from fourbar_validation.engines.mujoco.closed_loop import O2, TURNED_BY, ClosedLoop, couple_for
+from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop, couple_for
 
 NAME = "mujoco-one-state"
 RUNGS = (0.9999, 0.9998, 0.9996, 0.9992)
@@ -71,21 +72,22 @@ def _one_impedance(
     settings = Settings(timestep=1e-3, impedance=d, pad=pad, flywheel=0.0)
     loop = ClosedLoop(mjcf(scene, settings, keyframe=False))
 
+    drive = driving(scene)
+
     def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
         loop.set_state(unwound(scene, q), omega_2)
-        torque = _torque(loop, TURNED_BY[scene.drive_bar], alpha_2)
-        return {"torque": math.nan if torque is None else torque, **loop.forces()}
+        torque = _torque(loop, scene.drive_bar, alpha_2)
+        return {drive: math.nan if torque is None else torque, **loop.forces()}
 
-    return at_each(loop, command, ("torque", *PIN_FORCES), read)[:2]
+    return at_each(loop, command, (drive, *PIN_FORCES), read)[:2]
 
 
-def _torque(loop: ClosedLoop, acts_on: list[int], alpha: float) -> float | None:
-    """Solve for the couple that gives the crank its acceleration; None at a pole of the torque."""
+def _torque(loop: ClosedLoop, drive_bar: int | None, alpha: float) -> float | None:
+    """Solve for the couple, or the cylinder's force, that gives the crank its acceleration; None at a pole of it."""
     d = loop.data
 
     def crank_acceleration(couple: float) -> float:
-        d.qfrc_applied[:] = 0.0
-        d.qfrc_applied[acts_on] = couple
+        loop.work(drive_bar, couple)
         mujoco.mj_forward(loop.model, d)
         return float(d.qacc[O2])
 

@@ -52,12 +52,12 @@ class Reading(NamedTuple):
     """The driving torque and the pin forces at one state."""
 
     torque: float | None
-    """N m; None where no couple on the driven bar moves the input."""
+    """N m, or a cylinder's force, N; None where it does not move the input."""
     forces: dict[str, Array]
 
 
 class SimulatedRun:
-    """One segment of positions at a prescribed motion; `light` is the model that a drive on bar 3 or 4 is read from."""
+    """One segment of positions at a prescribed motion; `light` is the model that a drive elsewhere is read from."""
 
     def __init__(
         self,
@@ -72,8 +72,13 @@ class SimulatedRun:
         wound = unwound(scene, start)
         self.turns = wound[O2] - start[O2]
         """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
-        loop.set_state(wound, motion_segment.omega)
+        loop.set_state(wound, motion_segment.omega, motion_segment.bar)
+        self.begins = self.progress()
         self.stepper = Stepper(loop.model, loop.data, timestep)
+
+    def progress(self) -> float:
+        """Angle or stroke of what moves as commanded."""
+        return self.loop.stroke() if (bar := self.motion_segment.bar) is None else self.loop.angle(bar)
 
     def to(self, index: int) -> None:
         """Step on to the step nearest to a position."""
@@ -84,16 +89,15 @@ class SimulatedRun:
         torque = self.loop.crank_torque()
         if self.light is None:
             return Reading(torque, self.loop.forces())
-        alpha = self.motion_segment.alpha(self.stepper.time)
-        couple = couple_elsewhere(self.loop, self.light, self.scene.drive_bar, alpha, torque)
+        couple = couple_elsewhere(self.loop, self.light, self.scene.drive_bar, self.loop.given(), torque)
         return Reading(couple, self.light.forces())
 
 
 def assembled(position: Assembler, command: Command, order: Iterable[int]) -> list[Found]:
     """Own joint angles of every commanded position, found one after the other in an order."""
-    result: list[Found] = [None] * len(command.theta_2)
+    result: list[Found] = [None] * len(command.angle)
     for index in order:
-        result[index] = position.find(float(command.theta_2[index]), int(command.branch[index]))
+        result[index] = position.find(float(command.angle[index]), int(command.branch[index]))
     return result
 
 

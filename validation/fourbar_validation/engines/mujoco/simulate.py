@@ -12,14 +12,15 @@ from fourbar.errors import InputError, LimitError
 from fourbar.mjcf import RECIPE, Settings, mjcf
 from fourbar.mjcf.document import mass_ratio
 from fourbar.mjcf.effects import unwound
-from fourbar.quantities import UNKNOWNS
+from fourbar.mjcf.model import CYLINDER
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
+from fourbar.scene.motion_law import COMMANDS
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines.description import speeds, unknown_effect
+from fourbar_validation.engines.description import driving, speeds, unknowns
 from fourbar_validation.engines.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
 from fourbar_validation.engines.loaded import Values
-from fourbar_validation.engines.loop import MADE, Assembler, as_made, blank
+from fourbar_validation.engines.loop import MADE, Assembler, blank
 from fourbar_validation.engines.mujoco.called_back import (
     ActuatorForce,
     at_full_size,
@@ -29,12 +30,13 @@ from fourbar_validation.engines.mujoco.called_back import (
     within,
 )
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from fourbar_validation.engines.mujoco.led import Lead, Led
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, alarms
 from fourbar_validation.engines.mujoco.motions import Lawful, MotionSegment, Steady, extremes, order_in_time
 from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, split_segments
 
 SHARED = (
-    "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; omega_2, alpha_2 or the "
+    "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; what is commanded or the "
     "motion law, and the branch"
 )
 OWN = "assembly, velocities at the start, the motion through time, accelerations, drive torque, pin forces"
@@ -42,6 +44,8 @@ FINE = np.radians(2.0)
 """Between positions further apart than this the loop is tried for closure."""
 COLLINEAR = 1e-9
 """Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
+OF_TENDON = ("stroke", "stroke_speed")
+"""What MuJoCo has of a cylinder."""
 RESIDUALS = ("closure_gap_m", "speed_error", "time_went_back", "bad_states", "solver_iterations", "steps")
 
 
@@ -51,14 +55,18 @@ class MujocoSimulated:
 
     settings: Settings = RECIPE
     name: str = "mujoco-simulated"
+    commands: tuple[str, ...] = ("theta_2", "theta_3", "theta_4", "stroke")
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Run the sweep through in time; read every quantity at the crank's own angle, speed and acceleration."""
         began = time.perf_counter()
         try:
-            refusal = _refusal(scene, command)
-            if refusal is None:
-                answer = _Simulation(self.settings, scene, command).answer()
+            refusal, lead = _refusal_of_motion(scene, command), None
+            if refusal is None and (command.bar != 2 or command.stroke is not None):
+                lead = Lead(scene, command)
+                scene, command = lead.scene, lead.command
+            if refusal is None and (refusal := _refusal(scene, command if lead is None else lead.of_input)) is None:
+                answer = _Simulation(self.settings, scene, command, lead).answer()
         except (LimitError, InputError) as error:  # anything else is a failure, not a declared limit
             refusal = str(error)
         if refusal is not None:
@@ -67,16 +75,19 @@ class MujocoSimulated:
         return answer
 
 
-def _refusal(scene: Scene, command: Command) -> str | None:
-    """Say why this scene is not simulated, or None."""
+def _refusal_of_motion(scene: Scene, command: Command) -> str | None:
+    """Say why there is no motion to simulate, or None."""
     if scene.motion.free is not None:
         return "a free motion has no commanded sweep"
-    if unknown := unknown_effect(scene, [effect.key for effect in scene.effects]):
-        return unknown
-    if command.omega_2 is None or not np.any(command.omega_2):
-        return "omega_2 is 0 or not stated: nothing to simulate through time"
+    if command.speed is None or not np.any(command.speed):
+        return f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate through time"
+    return None
+
+
+def _refusal(scene: Scene, command: Command) -> str | None:
+    """Say why this motion of the input is not simulated, or None."""
     law = scene.motion.law if command.time is not None else None
-    if law is None and (np.ptp(command.omega_2) != 0.0 or np.ptp(command.alpha_2) != 0.0):
+    if law is None and any(np.ptp(values) != 0.0 for values in speeds(command)):
         return "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
     if np.ptp(command.theta_2) == 0.0:
         return "one position: nothing to run through"
@@ -113,26 +124,30 @@ def as_run(scene: Scene, command: Command) -> Scene:
 class _Simulation:
     """One scene: its own assembly, then each segment of positions that assembles, run through in time."""
 
-    def __init__(self, settings: Settings, scene: Scene, command: Command, *, bounded: bool = True) -> None:
-        self.bounded = bounded
+    def __init__(
+        self, settings: Settings, scene: Scene, command: Command, lead: Lead | None = None, *, bounded: bool = True
+    ) -> None:
+        self.bounded, self.lead = bounded, lead
         self.settings, self.command, self.law = settings, command, scene.motion.law
         # the text is that of the command, which a caller may have given instead of the scene's own
-        self.scene = as_run(scene, command)
+        self.scene = as_run(scene, command) if lead is None else scene
         self.supplied = of_loads(scene)
-        n = len(command.theta_2)
-        self.order = order_in_time(command, self.scene.motion.omega_2 or 0.0, self.law)
-        commanded = (command.theta_2, *speeds(command))
-        self.out = blank(n, UNKNOWNS) | {name: x.copy() for name, x in zip(MADE, commanded, strict=True)}
+        n = len(command.angle)
+        values, speed = (command.angle, self.scene.motion.omega_2) if lead is None else (lead.values, lead.speed)
+        self.order = order_in_time(values, command.time if self.law else None, speed or 0.0)
+        self.out = blank(n, [*MADE, *unknowns(scene), *(OF_TENDON if scene.drive else ())])
         self.branch = command.branch.copy()
         self.evidence = dict.fromkeys(RESIDUALS, 0.0) | {"mass_ratio": mass_ratio(scene.linkage)}
         self.steps_per_revolution = 0.0
-        self.predicted = {name: np.zeros(n) for name in UNKNOWNS}
+        self.predicted = {name: np.zeros(n) for name in unknowns(scene)}
 
     def answer(self) -> Answer:
         """Answer over all positions."""
-        position = Assembler(ClosedLoop(self._text(1e-3)))  # kinematics alone: the timestep plays no part
+        bar, linkage = self.command.bar, self.scene.linkage
+        position = Assembler(ClosedLoop(self._text(1e-3)), bar)  # kinematics alone: the timestep plays no part
         result = assembled(position, self.command, self.order)
-        least = least_sine(self.scene.linkage, self.command.theta_2, np.array([q is not None for q in result]))
+        closes = np.array([angles is not None for angles in result])
+        least = least_sine(linkage, self.command.theta_2, closes) if self.lead is None else self.lead.least_sine()
         if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
         for segment in split_segments(result, self.order, partial(self._closes_between, position)):
@@ -140,9 +155,13 @@ class _Simulation:
             assert start is not None
             self._run(segment, start)
         self.out["theta_2"] = within(self.scene, self.out["theta_2"])
-        at, values = as_made(self.out, self.branch)
+        # where nothing moved the command stands for the motion
+        commanded = zip(COMMANDS[bar], (self.command.angle, *speeds(self.command)), strict=True)
+        made = [np.where(np.isnan(self.out[name]), x, self.out[name]) for name, x in commanded]
+        made[0] = made[0] + 2.0 * np.pi * np.round((self.command.angle - made[0]) / (2.0 * np.pi))
+        at = Command(made[0], self.branch, made[1], made[2], bar=bar)
+        values = {name: x for name, x in self.out.items() if bar != 2 or name not in MADE}
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
-        closes = np.array([angles is not None for angles in result])
         return Answer(
             "mujoco-simulated",
             setting,
@@ -158,8 +177,10 @@ class _Simulation:
         """Choose how the input moves through a segment."""
         if self.law is not None:
             return Lawful(self.law, self.command, segment)
+        if self.lead is not None:
+            return Led(self.lead, segment)
         motion = self.scene.motion
-        return Steady(self.command, segment, motion.omega_2 or 0.0, motion.alpha_2)
+        return Steady(self.command.theta_2, segment, motion.omega_2 or 0.0, motion.alpha_2)
 
     def _loop(self, timestep: float, supplied: dict[str, ActuatorForce], flywheel: float | None = None) -> ClosedLoop:
         """Compile a model that takes from `supplying` what its text cannot say."""
@@ -173,7 +194,7 @@ class _Simulation:
 
     def _closes_between(self, position: Assembler, one: int, other: int) -> bool:
         """Tell whether the loop closes everywhere between two positions."""
-        start, stop = float(self.command.theta_2[one]), float(self.command.theta_2[other])
+        start, stop = float(self.command.angle[one]), float(self.command.angle[other])
         pieces = int(np.ceil(abs(stop - start) / FINE))
         branch = int(self.command.branch[one])
         return all(
@@ -185,37 +206,42 @@ class _Simulation:
         motion_segment = self._motion_segment(segment)
         timestep = motion_segment.timestep(self.settings)
         if len(segment) > 1:
-            turn = 2.0 * np.pi / motion_segment.fastest
+            turn = 2.0 * np.pi / motion_segment.turning
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
         supplied = self.supplied
-        if self.law is not None:
+        if isinstance(motion_segment, Lawful):
             supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * motion_segment.alpha(d.time)}
+        elif (lead := self.lead) is not None:
+            supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * lead.alpha_2(m, d)}
         with supplying(supplied):
             loop = self._loop(timestep, supplied)
             light = None if self.scene.drive_bar == 2 else self._loop(timestep, supplied, LIGHT_FLYWHEEL)
             monitor = ResidualMonitor(self._loop(timestep, supplied), self.scene.drive_bar)
             run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
-            begins = float(self.command.theta_2[segment[0]])
             for index in segment:
                 run.to(index)
-                self._read(run, monitor, index, begins)
+                self._read(run, monitor, index)
         self.evidence["steps"] += run.stepper.done
         for name, value in monitor.evidence().items():
             self.evidence[name] = float(np.maximum(self.evidence.get(name, 0.0), value))
 
-    def _read(self, run: SimulatedRun, monitor: ResidualMonitor, index: int, begins: float) -> None:
+    def _read(self, run: SimulatedRun, monitor: ResidualMonitor, index: int) -> None:
         """Read everything of one sample, and what the engine says of itself there."""
         loop, d, turns = run.loop, run.loop.data, run.turns
         loop.forward()
-        self._keep_worst(run, begins)
+        self._keep_worst(run)
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
         if unwound(self.scene, q) != q:
             raise LimitError("a torsion spring is wound by more than half a turn from its rest")
-        self.branch[index] = loop.branch()
+        self.branch[index] = loop.branch(self.command.bar)
         torque, pins = run.read()
         if torque is None:
-            raise LimitError(f"the couple on bar {self.scene.drive_bar} does not move the input: a pole of the torque")
-        values: Values = {"torque": torque, **pins}
+            drive = "the cylinder" if self.scene.drive else f"the couple on bar {self.scene.drive_bar}"
+            raise LimitError(f"{drive} does not move the input: a pole of its size")
+        values: Values = {driving(self.scene): torque, **pins}
+        if self.scene.drive is not None:
+            tendon = loop.model.tendon(CYLINDER).id
+            values |= {"stroke": d.ten_length[tendon], "stroke_speed": d.ten_velocity[tendon]}
         for name, x, ahead in (("theta", d.qpos, turns), ("omega", d.qvel, 0.0), ("alpha", d.qacc, 0.0)):
             values |= {f"{name}_2": x[O2] - ahead, f"{name}_3": x[O2] + x[A] - ahead, f"{name}_4": x[O4]}
         for name, value in values.items():
@@ -223,13 +249,14 @@ class _Simulation:
         for name, error in monitor.look(loop, torque, pins["F43"]).items():
             self.predicted[name][index] = error
 
-    def _keep_worst(self, run: SimulatedRun, begins: float) -> None:
+    def _keep_worst(self, run: SimulatedRun) -> None:
         """Keep the worst of what the engine says of itself."""
         loop, d, seen = run.loop, run.loop.data, self.evidence
-        speed = run.motion_segment.speed(float(d.qpos[O2]) - run.turns - begins, run.stepper.time)
+        due = run.motion_segment.speed(run.progress() - run.begins, run.stepper.time)
+        speed = float(loop.drive_column(run.motion_segment.bar) @ d.qvel)
         worst = {
             "closure_gap_m": float(np.hypot(*loop.gap())),
-            "speed_error": float(abs(abs(d.qvel[O2]) - speed) / (run.motion_segment.fastest or 1.0)),
+            "speed_error": float(abs(abs(speed) - due) / (run.motion_segment.fastest or 1.0)),
             "solver_iterations": float(d.solver_niter.max()),
             "bad_states": float(loop.bad()),
             "time_went_back": float(run.stepper.lost()),

@@ -17,9 +17,9 @@ import numpy as np
 from fourbar.errors import FourBarError, InputError, LimitError
 from fourbar.linkage import PINS
 from fourbar.mjcf import flywheel, mjcf, run_through
-from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.engines.description import driving, unknowns
 from fourbar_validation.engines.loaded import Assembled, Values
 from fourbar_validation.engines.loop import MADE, Angles, Assembler, as_made, at_each, blank
 from fourbar_validation.engines.mujoco.attached import Described, Value
@@ -41,7 +41,7 @@ CORRECTING = 60.0
 """Seconds in which entries are corrected one by one; each takes two evaluations."""
 REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
-ANSWERED = (*UNKNOWNS, *MADE)
+NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
 SHARED = "theta_2, omega_2, alpha_2 and the branch; the rest is the file's"
 OWN = "assembly, speeds, accelerations, drive torque and pin forces, by MuJoCo from the file as compiled"
 MOST_KEYFRAMES = 100_000
@@ -160,6 +160,17 @@ class UserLoop(Assembled):
         for i in self.topology.drives():
             model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
             self.notes.append(f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for")
+        cylinders = self.topology.cylinders() if self.scene.drive is not None else []
+        if self.scene.drive is not None and len(cylinders) != 1:
+            found = f"{len(cylinders)} actuators with a control on tendons"
+            raise InputError("MJCF", found, "the scene's drive is a cylinder: must be one")
+        for i in cylinders:  # takes the force itself as its control
+            model.actuator_gaintype[i], model.actuator_biastype[i] = mujoco.mjtGain.mjGAIN_FIXED, NO_BIAS
+            model.actuator_gainprm[i], model.actuator_dyntype[i] = 0.0, mujoco.mjtDyn.mjDYN_NONE
+            model.actuator_gainprm[i, 0] = 1.0 / model.actuator_gear[i, 0]
+            model.actuator_ctrllimited[i] = model.actuator_forcelimited[i] = False
+            self.notes.append(f"its actuator {model.actuator(i).name!r} gives the cylinder's force that is solved for")
+        self.cylinder = next(iter(cylinders), None)
         for i in range(model.neq):
             if i != self.topology.closure and model.eq_active0[i] and self.topology.closed_by != "tendon":
                 self.data.eq_active[i] = 0
@@ -205,10 +216,12 @@ class UserLoop(Assembled):
         data.qpos[:], data.qvel[:] = q, v
         if self.crank is not None:  # what its own armature takes belongs to the drive
             data.qfrc_applied[self.crank] = self.armature * self.topology.sense["O2"] * alpha_2
-        body = self.topology.root[drive]
 
         def acceleration(couple: float) -> float:
-            data.xfrc_applied[body, 3:] = couple * self.topology.normal
+            if self.cylinder is None:
+                data.xfrc_applied[self.topology.root[drive], 3:] = couple * self.topology.normal
+            else:
+                data.ctrl[self.cylinder] = couple
             mujoco.mj_forward(self.model, data)
             return float((self.from_joints @ data.qacc)[0])
 
@@ -216,9 +229,10 @@ class UserLoop(Assembled):
         trial = inertia * max(abs(alpha_2 - acceleration(0.0)), np.finfo(float).tiny / np.finfo(float).eps)
         couple = couple_for(acceleration, alpha_2, 0.0, trial, REFINEMENTS)
         if couple is None:
-            raise LimitError(f"a couple on bar {drive} does not move the crank of this model")
+            what = "its cylinder" if self.cylinder is not None else f"a couple on bar {drive}"
+            raise LimitError(f"{what} does not move the crank of this model")
         mujoco.mj_rnePostConstraint(self.model, data)
-        values: Values = {"torque": couple}
+        values: Values = {driving(self.scene): couple}
         turned = (self.topology.angles(data), self.from_joints @ data.qvel, self.from_joints @ data.qacc)
         for name, (two, three, four) in zip(("theta", "omega", "alpha"), turned, strict=True):
             values |= {f"{name}_2": two, f"{name}_3": two + three, f"{name}_4": four}
@@ -272,7 +286,7 @@ def one_state(loop: UserLoop, at: Command) -> Answer:
         contacts = max(contacts, int(loop.data.ncon))
         return values
 
-    out, assembled, gap = at_each(loop, at, ANSWERED, read)
+    out, assembled, gap = at_each(loop, at, [*unknowns(loop.scene), *MADE], read)
     if contacts:
         loop.notes.append(f"{contacts} contacts at a position where nothing but pins should touch")
     evidence = {"closure_gap_m": gap, "contacts": float(contacts)}
@@ -287,7 +301,7 @@ def through_time(loop: UserLoop, at: Command) -> Answer:
         raise LimitError("pin O2 is not a hinge in this file: nothing can keep its crank at a speed")
     assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
     position = Assembler(loop)
-    order = order_in_time(at, at.omega_2, None)
+    order = order_in_time(at.theta_2, None, at.omega_2)
     segment = max(split_segments(assembled(position, at, order), order), key=len, default=[])
     if len(segment) < 2:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")
@@ -301,7 +315,8 @@ def through_time(loop: UserLoop, at: Command) -> Answer:
     position.find(float(at.theta_2[segment[0]]), int(at.branch[segment[0]]))
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(at.omega_2)
     heavy = max(loop.armature, flywheel(loop.scene))
-    out, seen = blank(len(segment), ANSWERED), {"closure_gap_m": 0.0, "speed_error": 0.0}
+    names = [*unknowns(loop.scene), *MADE]
+    out, seen = blank(len(segment), names), {"closure_gap_m": 0.0, "speed_error": 0.0}
     alarms: list[str] = []
     stepper = Stepper(model, data, timestep)
     for i, index in enumerate(segment):

@@ -81,6 +81,12 @@ class Topology:
         on_joints = np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT).tolist()
         return [i for i in on_joints if model.actuator_trnid[i, 0] == joint]
 
+    def cylinders(self) -> list[int]:
+        """List the actuators along a tendon that take a control: without one a spring is such an actuator too."""
+        model = self.model
+        on_tendons = np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON).tolist()
+        return [i for i in on_tendons if model.actuator_gainprm[i].any()]
+
     def bar(self, body: int) -> int | None:
         """Find the bar that a body belongs to; None where it is no part of the four-bar."""
         return self.bar_of_root.get(int(self.model.body_weldid[body]))

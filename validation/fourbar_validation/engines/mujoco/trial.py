@@ -83,10 +83,12 @@ class TrialSetup:
             raise LimitError("nothing to run through in time: a sweep of theta_2 at omega_2 is needed")
         if scene.motion.law is not None:
             raise LimitError("settings are tried at a constant alpha_2, not along a motion law")
+        if scene.drive is not None:
+            raise LimitError("settings are tried for a couple on a bar, not for a linear drive (drive.from, drive.to)")
         self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
         motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
         self.scene, self.command = replace(scene, motion=motion), command
-        order = order_in_time(command, self.omega, None)
+        order = order_in_time(command.theta_2, None, self.omega)
         position = Assembler(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
         result = assembled(position, command, order)
         self.segments = [segment for segment in split_segments(result, order) if len(segment) > 1]
@@ -100,7 +102,7 @@ class TrialSetup:
 
     def motion_segment(self, segment: list[int]) -> Steady:
         """Choose how the input moves through a segment."""
-        return Steady(self.command, segment, self.omega, self.alpha)
+        return Steady(self.command.theta_2, segment, self.omega, self.alpha)
 
     def steps(self, settings: Settings) -> int:
         """Count the steps of one run, without making it."""

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.scene import Scene
-from fourbar.studies.keys import angle_key, at_place, entries, with_numbers
+from fourbar.studies.keys import at_place, command_key, entries, with_numbers
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
@@ -44,14 +44,14 @@ def assembled(scene: Scene, theta_2: float, reader: str) -> ClosedState:
 
 def keys(scene: Scene) -> tuple[str, ...]:
     """List the numbers by which is differentiated."""
-    return ("lengths.coupler", "bars.coupler.mass", angle_key(scene))
+    return ("lengths.coupler", "bars.coupler.mass", command_key(scene))
 
 
 def to_either_side(scene: Scene, theta_2: float, key: str, reader: str) -> list[ClosedState]:
     """Assemble the scene with a number a little greater, and a little less."""
     sides = []
     for step in (DIFFERENCE, -DIFFERENCE):
-        if key == angle_key(scene):
+        if key == command_key(scene):
             sides.append(assembled(scene, theta_2 + step, reader))
         else:
             number = float(at_place(scene, entries(scene)[key].place)) + step

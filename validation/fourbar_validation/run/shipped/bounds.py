@@ -7,11 +7,11 @@ import numpy as np
 
 import fourbar
 from fourbar.errors import InputError, LimitError
-from fourbar.quantities import COUPLE, LINE
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.rows import REFUSES, Row
 from fourbar_validation.compare.tolerance import ErrorBound
+from fourbar_validation.engines.description import driving
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import at_free_bodies, moved, row_of
 
@@ -38,7 +38,7 @@ def extremes(question: Question) -> list[Row]:
     """Judge the proven extremes of the torque: with tolerances, the scene's own or some that the run gives it."""
     scene = replace(question.scene, points=(), title="", source="", pictures=())
     _require_conditioned(scene)
-    drive = COUPLE.value if scene.drive is None else LINE.value
+    drive = driving(scene)
     if not scene.tolerances:
         lengths = {name: getattr(scene.linkage, name).length for name in ("input", "coupler")}
         scene = replace(

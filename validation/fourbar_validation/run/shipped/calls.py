@@ -11,11 +11,20 @@ from fourbar.effects.load import Table
 from fourbar.errors import installing
 from fourbar.scene import Scene
 from fourbar.scene.point import Point
+from fourbar.studies.keys import command_key
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import magnitude
-from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.run.question import NotAskedError, Question
-from fourbar_validation.run.shipped.variants import at_free_bodies, held_to, member, moved, sampled, stated, worst_rows
+from fourbar_validation.run.shipped.variants import (
+    at_free_bodies,
+    at_places,
+    held_to,
+    member,
+    moved,
+    sampled,
+    stated,
+    worst_rows,
+)
 
 MEMBERS = 5
 """As many as positions: a square study, whose axes nothing but its numbers tells apart."""
@@ -32,13 +41,13 @@ def compiled(question: Question) -> list[Row]:
     scene = furnished(question.scene, question)
     with np.errstate(all="ignore"):
         result = fourbar.solve(scene, at=question.at, compiled=True)
-        answer = FreeBody().answer(scene, question.at)
+        answer = at_free_bodies(scene, question.at)
     return held_to(question, "compiled", scene, result, answer)
 
 
 def furnished(scene: Scene, question: Question) -> Scene:
     """Give the scene a point on each bar and a load over a table, as large as its forces, where it has none."""
-    coupler, first = scene.linkage.coupler, float(question.at.theta_2[0])
+    coupler, first = scene.linkage.coupler, float(question.solution.theta_2[0])
     if not scene.points:
         arms = {bar: (0.6 * scene.linkage.bar(bar).length, 0.4 * bar) for bar in (2, 3, 4)}
         scene = replace(scene, points=tuple(Point(f"P{bar}", bar, arm) for bar, arm in arms.items()))
@@ -55,20 +64,19 @@ def furnished(scene: Scene, question: Question) -> Scene:
 def study(question: Question) -> list[Row]:
     """Judge a square study in which every number varies, member by member."""
     scene = furnished(sampled(question), question)
-    theta_2 = np.asarray(scene.motion.theta_2)
+    places, key = np.asarray(scene.motion.angle), command_key(scene)
     of = stated(scene, fourbar.sensitivity(scene).keys)
-    del of["motion.theta_2"]
+    del of[key]
     values = {key: np.array([x + number * APART * step for number in range(MEMBERS)]) for key, (x, step) in of.items()}
-    # the angles of each member lie within those of the scene: nothing says that a table reaches further
-    angles = np.array([theta_2 + APART * number * (theta_2.mean() - theta_2) for number in range(MEMBERS)])
+    # the places of each member lie within those of the scene: nothing says that a table reaches further
+    each = np.array([places + APART * number * (places.mean() - places) for number in range(MEMBERS)])
     members = [
-        moved(replace(scene, motion=replace(scene.motion, theta_2=own)), {k: number * APART * of[k].step for k in of})
-        for number, own in enumerate(angles)
+        moved(at_places(scene, own), {k: number * APART * of[k].step for k in of}) for number, own in enumerate(each)
     ]
     rows = []
     with np.errstate(all="ignore"):
         for how in (False, True) if find_spec("numba") else (False,):
-            result = fourbar.solve(fourbar.vary(scene, values | {"motion.theta_2": angles}), compiled=how)
+            result = fourbar.solve(fourbar.vary(scene, values | {key: each}), compiled=how)
             for number, one in enumerate(members):
                 rows += held_to(question, "study", one, member(result, number), at_free_bodies(one))
     return worst_rows(rows)

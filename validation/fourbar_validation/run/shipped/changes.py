@@ -10,6 +10,7 @@ import numpy as np
 import fourbar
 from fourbar.quantities import FORCES, LINE, UNKNOWNS
 from fourbar.scene import Scene
+from fourbar.studies.keys import command_key
 from fourbar.studies.spread import Spread
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.rows import Row
@@ -54,7 +55,8 @@ def sensitivity(question: Question) -> list[Row]:
     scene = sampled(question)
     result = fourbar.sensitivity(scene)
     directions = {key: step for key, (_, step) in stated(scene, result.keys).items()}
-    directions["motion.theta_2"] = 1.0
+    if scene.motion.stroke is None:
+        directions[command_key(scene)] = 1.0
 
     def along(part: float) -> dict[str, Array]:
         return at_free_bodies(moved(scene, {key: part * STEP * step for key, step in directions.items()})).quantities

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
 from fourbar.quantities import LINE, OK, UNKNOWNS, is_scalar
-from fourbar.scene import Scene, command
-from fourbar.scene.motion import Motion
+from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED, Comparison
@@ -24,7 +23,7 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, 
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import predicting_from
 from fourbar_validation.run.printed import points
-from fourbar_validation.run.question import FREE_BODY, NotAskedError, Question
+from fourbar_validation.run.question import FREE_BODY, NotAskedError, Question, ask_at
 
 SAMPLE = 5
 """Positions at which whatever takes more than one call is judged."""
@@ -51,17 +50,21 @@ def sampled(question: Question) -> Scene:
         & np.isfinite(reference.F12).all(axis=1)
     )
     fit &= (reference.drive_condition >= WELL_CONDITIONED) & (at.branch == scene.motion.branch)
-    fit &= ~reversing(scene, solution, NOT_AT_REST) & (solution.omega_2 != 0.0)
+    fit &= ~reversing(scene, solution, NOT_AT_REST) & (np.asarray(at.speed) != 0.0)
     for load in scene.loads:
         for corner in () if load.table is None else load.table.theta_2:
-            fit &= np.abs(np.angle(np.exp(1j * (at.theta_2 - corner)))) > FROM_A_CORNER
+            fit &= np.abs(np.angle(np.exp(1j * (solution.theta_2 - corner)))) > FROM_A_CORNER
     where = np.flatnonzero(fit)
     if not len(where):
         raise NotAskedError("no position that is well-conditioned and moves")
     few = where[np.unique(np.linspace(0, len(where) - 1, SAMPLE + 2).astype(int)[1:-1])]
-    own = scene.motion
-    motion = Motion(at.theta_2[few], own.omega_2, own.alpha_2, own.branch, own.through)
-    return replace(scene, motion=motion, title="", source="", pictures=())
+    return at_places(replace(scene, title="", source="", pictures=()), at.places[few])
+
+
+def at_places(scene: Scene, places: Array) -> Scene:
+    """Command other angles or strokes."""
+    given: dict[str, Any] = {scene.motion.names[0]: places}
+    return replace(scene, motion=replace(scene.motion, **given))
 
 
 class FileNumber(NamedTuple):
@@ -121,10 +124,10 @@ def _toml(value: Any) -> str:
     return "[" + ",\n".join(map(_toml, value)) + "]" if isinstance(value, list) else json.dumps(value)
 
 
-def at_free_bodies(scene: Scene) -> Answer:
-    """Ask the free bodies at the scene's own positions."""
+def at_free_bodies(scene: Scene, at: Command | None = None) -> Answer:
+    """Ask the free bodies at the scene's own positions, or others."""
     with np.errstate(all="ignore"):
-        return FreeBody().answer(scene, command(scene))
+        return ask_at(FreeBody(), scene, command(scene) if at is None else at)
 
 
 def held_to(question: Question, engine: str, scene: Scene, solution: Solution, answer: Answer) -> list[Row]:
@@ -173,7 +176,7 @@ def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
 
     one = replace(study, **{field.name: own(getattr(study, field.name)) for field in fields(study) if field.init})
     one.points, one.velocity, one.acceleration = (own(of) for of in (study.points, study.velocity, study.acceleration))
-    one.drive, one.commanded = study.drive, study.commanded
+    one.drive, one.at = study.drive, study.at.part(index)
     return one
 
 

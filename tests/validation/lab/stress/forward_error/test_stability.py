@@ -9,9 +9,9 @@ import pytest
 import fourbar
 from fourbar.show.tables import heading
 from fourbar_validation.lab.stress.forward_error.families import FAMILIES
-from fourbar_validation.lab.stress.forward_error.libraries import LIBRARIES
 from fourbar_validation.lab.stress.forward_error.stability import run
 from fourbar_validation.lab.stress.forward_error.tally import CHANCE, TOO_SMALL, USELESS, Tally, by_chance
+from tests.fourbar.studies.test_function import LIBRARIES
 
 SAMPLES = 40
 """Per family: about 1 s each; the ten thousand of each are `python -m validation stability`."""
@@ -97,6 +97,7 @@ def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them(library: 
     assert tally.holds() and not tally.untold and {"torque", "F12_x", "theta_4", "a_B_y"} <= tally.worst.keys()
 
 
+@pytest.mark.nightly
 def test_kites_that_stand_still_beside_no_exact_directions() -> None:
     """B rests on O2: its speed across is the product of two roundings, where lengths are no constants."""
     installed("torch")

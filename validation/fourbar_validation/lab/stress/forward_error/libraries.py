@@ -16,7 +16,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import OF_LINE, STAGE_OF
 from fourbar.scene import Scene
 from fourbar.studies.function import NEVER, function
-from fourbar.studies.keys import angle_key, at_place, entries, left_out, placed, with_numbers
+from fourbar.studies.keys import at_place, command_key, entries, left_out, placed, with_numbers
 from fourbar_validation.engines.description import PINS
 
 LIBRARIES = ("jax", "torch")
@@ -76,7 +76,7 @@ def _closed(table: Table | None) -> Table | None:
 def numbers_of(scene: Scene) -> dict[str, float]:
     """List every number that a scene of one position states, its angle too, by key."""
     found = {key: at_place(scene, entry.place) for key, entry in entries(scene).items() if not left_out(scene, entry)}
-    return {**found, angle_key(scene): float(np.asarray(scene.motion.angle))}
+    return {**found, command_key(scene): float(np.asarray(scene.motion.angle))}
 
 
 def evaluated(scene: Scene, library: str) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from fourbar.quantities import OK, STATUS_NAMES
 from fourbar.scene import Scene
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.function import function
-from fourbar.studies.keys import angle_key, with_numbers
+from fourbar.studies.keys import command_key, with_numbers
 from fourbar_validation.engines.balls import STEP_BITS, Values, outputs, stored
 from fourbar_validation.lab.stress.forward_error.libraries import QUANTITIES, alike, loaded, numbers_of
 from fourbar_validation.lab.stress.forward_error.tally import Tally, components, ratio, untold
@@ -26,7 +26,7 @@ Slopes = dict[str, dict[str, tuple[Any, float]]]
 
 def exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
     """Return every output, and its derivatives and theirs by every number, by differences in balls."""
-    numbers, angle = numbers_of(scene), angle_key(scene)
+    numbers, angle = numbers_of(scene), command_key(scene)
     stored(scene, numbers[angle])  # sets the precision
     steps = {key: arb(abs(number) or 1.0) * arb(2) ** -STEP_BITS for key, number in numbers.items()}
 

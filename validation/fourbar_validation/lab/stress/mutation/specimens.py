@@ -60,6 +60,14 @@ SPECIMENS: dict[str, Scene] = {
         drive_bar=None,  # type: ignore[arg-type]
         drive=LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)),
     ),
+    "stroke of the output": replace(
+        CRANK_ROCKER,
+        motion=Motion(stroke=Sweep(0.33, 0.36, 12), stroke_speed=0.2, stroke_acceleration=0.1, side="right"),
+        drive_bar=None,  # type: ignore[arg-type]
+        drive=LinearDrive(SpringEnd(1, 0.5, -0.5), SpringEnd(4, 0.09, 0.7)),
+    ),
+    "output commanded": replace(CRANK_ROCKER, motion=Motion(theta_4=Sweep(1.8, 2.5, 12), omega_4=3.0), drive_bar=4),
+    "coupler commanded": replace(CRANK_ROCKER, motion=Motion(theta_3=Sweep(0.4, 0.8, 12), omega_3=3.0, branch=CROSSED)),
     "cylinder on the ground": replace(
         CRANK_ROCKER,
         drive_bar=None,  # type: ignore[arg-type]
@@ -188,6 +196,18 @@ SPECIMENS: dict[str, Scene] = {
     ),
     "simulated, dry": Scene(
         CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0), effects=(Friction.at(A=0.05, B=0.04), Torsion.at(O4=(0.3, 1.2, -0.05)))
+    ),
+    "simulated cylinder": Scene(
+        CRANK,
+        Motion(Sweep(0.1, 3.0, 8), 10.0),
+        loads=LOADS,
+        drive=LinearDrive(SpringEnd(1, 0.17, -1.1), SpringEnd(3, 0.09, 0.7)),
+    ),
+    "simulated stroke": Scene(
+        CRANK,
+        Motion(stroke=Sweep(0.25, 0.35, 8), stroke_speed=0.2, stroke_acceleration=0.1, side="left"),
+        loads=LOADS,
+        drive=LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4)),
     ),
     "simulated, quickening": Scene(CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), 4, effects=(Flywheel(0.003, 4),)),
 }
