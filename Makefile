@@ -34,9 +34,9 @@ long-engines:
 long-simulators:
 	$(BIN)/python -m pytest -m nightly
 long-problems:
-	PROBLEMS=all $(BIN)/python -m pytest tests/validation/lab/subjects/test_problems.py
+	PROBLEMS=all $(BIN)/python -m pytest tests/validation/lab/simulators/test_problems.py
 long-releases:
-	RELEASES=pip $(BIN)/python -m pytest tests/validation/lab/subjects/test_versions.py
+	RELEASES=pip $(BIN)/python -m pytest tests/validation/lab/simulators/test_versions.py
 long-standing:
 	$(BIN)/python -m validation standing --history mujoco --history pinocchio
 long-free:

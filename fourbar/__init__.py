@@ -87,7 +87,7 @@ _ON_FIRST_USE = {
 """The file edge needs a units library, most scenes few effects: `import fourbar` loads neither."""
 
 
-def _method(module: str, function: str) -> _Any:
+def _attach_method(module: str, function: str) -> _Any:
     """Make a method that a folder above adds to a scene or a solution; its module is loaded when it is called."""
 
     def call(self: _Any, *arguments: _Any, **options: _Any) -> _Any:
@@ -96,8 +96,8 @@ def _method(module: str, function: str) -> _Any:
     return call
 
 
-setattr(Scene, "_repr_html_", _method("fourbar.show.notebook", "scene_html"))  # noqa: B010 - declared where it is drawn
-setattr(Solution, "_repr_html_", _method("fourbar.show.notebook", "solution_html"))  # noqa: B010
+setattr(Scene, "_repr_html_", _attach_method("fourbar.show.notebook", "show_scene"))  # noqa: B010 - declared where it is drawn
+setattr(Solution, "_repr_html_", _attach_method("fourbar.show.notebook", "show_solution"))  # noqa: B010
 
 
 def _plot(
@@ -126,10 +126,10 @@ def _plot(
     NotAssembledError : there is no position to draw.
     DependencyError : matplotlib is missing.
     """
-    from fourbar.show.plot.figures import drawn
+    from fourbar.show.plot.figures import draw_figure
 
     given = {} if units is None else {"units": units}
-    return drawn(self, figure, position=position, branches=branches, dimensions=dimensions, **given)
+    return draw_figure(self, figure, position=position, branches=branches, dimensions=dimensions, **given)
 
 
 _plot.__name__, _plot.__qualname__ = "plot", "Scene.plot"

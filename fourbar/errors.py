@@ -67,7 +67,7 @@ class DependencyError(FourBarError):
     """A library that the request needs is not installed."""
 
 
-def installing(extra: str) -> str:
+def say_install(extra: str) -> str:
     """How to install what an extra of this package needs: no index of packages has the package itself."""
     if (Path(__file__).parents[1] / "pyproject.toml").is_file():
         return f'pip install ".[{extra}]" in the checkout'
@@ -101,7 +101,7 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None) 
         _flush()
         return status
     except SystemExit as left:
-        return _left(left, streams)
+        return _read_exit(left, streams)
     except (click.exceptions.Abort, KeyboardInterrupt):
         return _say("interrupted", INTERRUPTED)
     except click.ClickException as error:
@@ -111,7 +111,7 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None) 
     except FourBarError as error:
         return _say(str(error), BAD_INPUT)
     except ModuleNotFoundError as error:
-        return _say(f"{error.name} is not installed: {installing('all')}", BROKEN)
+        return _say(f"{error.name} is not installed: {say_install('all')}", BROKEN)
     except OSError as error:
         named = error.filename2 or error.filename or "output"  # of a file that is put in place the second is its place
         return _say(f"{named}: {error.strerror or error}", BROKEN)
@@ -121,14 +121,14 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None) 
         return _say(f"internal error: {type(error).__name__}: {error} (FOURBAR_TRACEBACK=1 shows where)", BROKEN)
 
 
-def _left(left: SystemExit, streams: tuple[TextIO | None, ...]) -> int:
+def _read_exit(left: SystemExit, streams: tuple[TextIO | None, ...]) -> int:
     """Return the exit status of a command that raised SystemExit.
 
     Click and rich leave with 1 where the reader of a pipe has gone; it has what it wants. Click lets go of standard
     output then, and does so for every pipe that breaks, that of a worker too.
     """
     if sys.stdout is not streams[0]:
-        return HOLDS if any(map(_unread, streams)) else _say("a pipe inside the program broke", BROKEN)
+        return HOLDS if any(map(_is_unread, streams)) else _say("a pipe inside the program broke", BROKEN)
     if isinstance(left.__context__, BrokenPipeError):
         return HOLDS
     if left.code is None or isinstance(left.code, int):
@@ -136,7 +136,7 @@ def _left(left: SystemExit, streams: tuple[TextIO | None, ...]) -> int:
     return _say(left.code, BROKEN)
 
 
-def _unread(stream: TextIO | None) -> bool:
+def _is_unread(stream: TextIO | None) -> bool:
     """Whether a stream is a pipe that nobody reads any more; taken for one where the system does not know."""
     if not hasattr(select, "poll"):
         return True
@@ -160,11 +160,11 @@ def _flush() -> None:
 def _say(message: str, status: int) -> int:
     import click
 
-    click.echo("error: " + printable(message), err=True)
+    click.echo("error: " + clean_line(message), err=True)
     return status
 
 
-def printable(text: str) -> str:
+def clean_line(text: str) -> str:
     """One line without control characters: a title or file name does not steer the terminal."""
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 

@@ -67,10 +67,10 @@ def require_whole(key: str, value: object, among: Container[int], allowed: str) 
     return int(value)
 
 
-def in_unit(key: str, value: object, unit: str) -> object:
+def convert_to_unit(key: str, value: object, unit: str) -> object:
     """Convert each text like "48 cm" of a value, in lists too, as `require` does; numbers and arrays stay."""
     if isinstance(value, (list, tuple)):
-        return [in_unit(key, each, unit) for each in value]
+        return [convert_to_unit(key, each, unit) for each in value]
     return require(key, value, unit) if unit != "1" and isinstance(value, str) else value
 
 
@@ -82,7 +82,7 @@ def require_numbers(
     A text with a unit is converted as by `require`, in a list too.
     """
     try:
-        array = np.asarray(in_unit(key, value, unit))
+        array = np.asarray(convert_to_unit(key, value, unit))
     except ValueError:  # rows of different lengths
         array = np.asarray(None)
     if array.dtype.kind not in "iuf" or array.ndim > 1 or not np.isfinite(array).all():

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, expect
 from fourbar.linkage import require
 from fourbar.quantities import NOT_ASSEMBLED, OF_LINE, PIN_FORCES, STATUS_NAMES, UNITS, Quantities, is_scalar
-from fourbar.writing import between, data_frame, extent, listed, write_text
+from fourbar.writing import describe_extent, list_names, make_data_frame, write_between, write_text
 
 Array = NDArray[np.float64]
 
@@ -77,16 +77,17 @@ class Solution(Quantities):
     def __repr__(self) -> str:
         """Say in ten lines what it holds."""
         counts = zip(STATUS_NAMES, np.bincount(self.status_code.ravel(), minlength=len(STATUS_NAMES)), strict=True)
-        shown = parts_of(
-            {name: values_of(self, name) for name in _quantities(self)}, scalars=("theta_2", "torque", "drive_force")
+        shown = list_parts(
+            {name: find_values(self, name) for name in _list_quantities(self)},
+            scalars=("theta_2", "torque", "drive_force"),
         )
         on = f"on bar {self.drive_bar}" if self.drive is None else "along a line"
         lines = [
-            f"Solution {self.title!r}: {extent(self.theta_2)}, drive {on}",
+            f"Solution {self.title!r}: {describe_extent(self.theta_2)}, drive {on}",
             "status: " + ", ".join(f"{count} {name}" for name, count in counts if count),
-            *(f"{name}: {between(values)} {unit_of(name.strip('|'))}" for name, values in shown.items()),
+            *(f"{name}: {write_between(values)} {find_unit(name.strip('|'))}" for name, values in shown.items()),
         ]
-        return "\n".join([*lines, listed("evaluated", self.evaluated())])
+        return "\n".join([*lines, list_names("evaluated", self.evaluated())])
 
     @property
     def commanded(self) -> str:
@@ -122,7 +123,7 @@ class Solution(Quantities):
         expect("degrees", degrees, bool)
         if decimal not in (".", ","):
             raise InputError("decimal", decimal, 'must be "." or ","')
-        text = csv_text(self, {**require_units(units), **(DEGREES if degrees else SI)}, decimal)
+        text = write_csv(self, {**require_units(units), **(DEGREES if degrees else SI)}, decimal)
         if path is None:
             return text
         write_text(path, text)
@@ -133,11 +134,13 @@ class Solution(Quantities):
 
         Raises DependencyError where pandas is not installed.
         """
-        known = {name: values for name, values in scalars(self, require_units(units)).items() if values is not None}
-        return data_frame({**leading(self), **known})
+        known = {
+            name: values for name, values in list_scalars(self, require_units(units)).items() if values is not None
+        }
+        return make_data_frame({**list_leading(self), **known})
 
 
-def parts(name: str, values: Array) -> dict[str, Array]:
+def split_parts(name: str, values: Array) -> dict[str, Array]:
     """Split a quantity into scalars: components, and the magnitude of a pin force."""
     if is_scalar(name):
         return {name: values}
@@ -145,32 +148,32 @@ def parts(name: str, values: Array) -> dict[str, Array]:
     return {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **found} if name in PIN_FORCES else found
 
 
-def parts_of(values: Mapping[str, Array | None], scalars: tuple[str, ...]) -> dict[str, Array]:
+def list_parts(values: Mapping[str, Array | None], scalars: tuple[str, ...]) -> dict[str, Array]:
     """Of the quantities that have values the scalars named and the magnitudes of the pin forces."""
     found: dict[str, Array] = {}
     for name in (*scalars, *PIN_FORCES):
         if (own := values.get(name)) is not None:
-            found |= {part: array for part, array in parts(name, own).items() if part[-2:] not in ("_x", "_y")}
+            found |= {part: array for part, array in split_parts(name, own).items() if part[-2:] not in ("_x", "_y")}
     return found
 
 
-def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
+def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
     """One object; arrays over the positions, vectors as [x, y], null where there is no value; `units` says in what.
 
     Entries of other names follow as they are given.
     """
-    names = _quantities(solution)
+    names = _list_quantities(solution)
     document: dict[str, Any] = {
         "schema": SCHEMA,
         "title": solution.title,
-        "angle_unit": unit_in("rad", units)[0],
-        "units": {name: unit_in(unit_of(name), units)[0] for name in names},
+        "angle_unit": find_unit_in("rad", units)[0],
+        "units": {name: find_unit_in(find_unit(name), units)[0] for name in names},
         "status": solution.status,
         "branch": solution.branch.tolist(),
     }
     for name in names:
-        values = values_of(solution, name, units)
-        document[name] = None if values is None else nulled(values)
+        values = find_values(solution, name, units)
+        document[name] = None if values is None else null_nan(values)
     if solution.time is not None:
         document["stopped_at"] = solution.stopped_at
     document["drive_bar"] = solution.drive_bar
@@ -179,11 +182,12 @@ def json_text(solution: Solution, units: Conversion = SI, **more: Any) -> str:
     return json.dumps(document, allow_nan=False) + "\n"
 
 
-def csv_text(solution: Solution, units: Conversion = SI, decimal: str = ".") -> str:
+def write_csv(solution: Solution, units: Conversion = SI, decimal: str = ".") -> str:
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
-    size, first = solution.theta_2.size, leading(solution)
+    size, first = solution.theta_2.size, list_leading(solution)
     columns = {
-        name: [None] * size if values is None else nulled(values) for name, values in scalars(solution, units).items()
+        name: [None] * size if values is None else null_nan(values)
+        for name, values in list_scalars(solution, units).items()
     }
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n", delimiter=";" if decimal == "," else ",")
@@ -193,7 +197,7 @@ def csv_text(solution: Solution, units: Conversion = SI, decimal: str = ".") -> 
     return text.getvalue()
 
 
-def leading(solution: Solution) -> dict[str, list[Any]]:
+def list_leading(solution: Solution) -> dict[str, list[Any]]:
     """List the first columns of a table, one entry for each position; of a study also the number of the member."""
     size = solution.theta_2.size
     first = {
@@ -206,16 +210,16 @@ def leading(solution: Solution) -> dict[str, list[Any]]:
     return {"member": np.repeat(np.arange(len(solution)), size // len(solution)).tolist(), **first}
 
 
-def scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
+def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
     """Every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated.
 
     Of a pin force the magnitude too, and where it is known the time. In other units than SI every heading names its
     own: `F12_x [lbf]`.
     """
     found: dict[str, Array | None] = {}
-    for name in _quantities(solution):
-        values, unit = values_of(solution, name, units), unit_of(name)
-        heading = f" [{unit_in(unit, units)[0]}]" if units and unit != "1" else ""
+    for name in _list_quantities(solution):
+        values, unit = find_values(solution, name, units), find_unit(name)
+        heading = f" [{find_unit_in(unit, units)[0]}]" if units and unit != "1" else ""
         if not is_scalar(name):
             for axis, letter in enumerate("xy"):
                 found[f"{name}_{letter}{heading}"] = None if values is None else values[..., axis].ravel()
@@ -223,12 +227,12 @@ def scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | Non
                 found[f"|{name}|{heading}"] = None if values is None else np.hypot(*values.T).T.ravel()
         else:
             found[name + heading] = None if values is None else values.ravel()
-    if solution.time is None and (time := _time_turned(solution)) is not None:
+    if solution.time is None and (time := _compute_times(solution)) is not None:
         found["time [s]" if units else "time"] = time
     return found
 
 
-def _time_turned(solution: Solution) -> Array | None:
+def _compute_times(solution: Solution) -> Array | None:
     """Compute when each position of a sweep at one constant speed is passed, s; None for any other."""
     if solution.omega_2 is None or solution.alpha_2 is None or solution.theta_2.ndim > 1 or not solution.omega_2.all():
         return None
@@ -249,12 +253,12 @@ def require_units(units: object) -> Conversion:
     return units
 
 
-def unit_in(unit: str, units: Conversion) -> tuple[str, float]:
+def find_unit_in(unit: str, units: Conversion) -> tuple[str, float]:
     """Return the unit in which a quantity of an SI unit is given, and the factor to it."""
     return units.get(unit, (unit, 1.0))
 
 
-def _quantities(solution: "Solution") -> list[str]:
+def _list_quantities(solution: "Solution") -> list[str]:
     """Every quantity of a solution, evaluated or not; time and those of a linear drive only where there is one."""
     left_out = () if solution.drive is not None else OF_LINE
     names = [name for name in UNITS if name not in left_out and (name != "time" or solution.time is not None)]
@@ -262,12 +266,12 @@ def _quantities(solution: "Solution") -> list[str]:
     return names + [f"{start}{name}" for name in points for start in ("", "v_", "a_")]
 
 
-def unit_of(name: str) -> str:
+def find_unit(name: str) -> str:
     """SI unit of a quantity, or of a point of the scene: its path, velocity or acceleration."""
     return UNITS.get(name) or {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
 
 
-def values_of(solution: Solution, name: str, units: Conversion = SI) -> Any:
+def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
     """Return a quantity by its name, those of the scene's own points too; None where it was not evaluated."""
     values: Array | None
     if name in UNITS:
@@ -275,22 +279,22 @@ def values_of(solution: Solution, name: str, units: Conversion = SI) -> Any:
     else:
         table = {"v_": solution.velocity, "a_": solution.acceleration}.get(name[:2])
         values = solution.points.get(name) if table is None else table.get(name[2:])
-    unit = unit_of(name)
+    unit = find_unit(name)
     return values if values is None or unit not in units else values * units[unit][1]
 
 
-def nulled(values: Array) -> list[Any]:
+def null_nan(values: Array) -> list[Any]:
     """Python numbers, None for what is not finite."""
     plain = values.tolist()
     if np.isfinite(values).all():
         return plain  # type: ignore[no-any-return]
-    return _numbers(plain)  # type: ignore[no-any-return]
+    return _replace_nans(plain)  # type: ignore[no-any-return]
 
 
-def _numbers(plain: Any) -> Any:
+def _replace_nans(plain: Any) -> Any:
     """Numbers, in lists or lists of lists, None for what is not finite."""
     if isinstance(plain, list):
-        return [_numbers(inner) for inner in plain]
+        return [_replace_nans(inner) for inner in plain]
     return plain if math.isfinite(plain) else None
 
 

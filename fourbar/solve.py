@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
-from fourbar.evaluation.blocks import each, evaluation, is_compiled, keep, positions_at_once
+from fourbar.evaluation.blocks import choose_block_size, choose_evaluation, evaluate_parts, is_compiled, keep
 from fourbar.evaluation.case import BLOCK, Case
-from fourbar.evaluation.stages import FORCE, Part, commanded, freely
+from fourbar.evaluation.stages import FORCE, Part, evaluate_command, evaluate_freely
 from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
 from fourbar.quantities import (
     ANGLES,
@@ -81,26 +81,26 @@ def solve(
         return scene.solved(stage, out=out, side=side, compiled=compiled)
     if at is not None:
         _refuse(at)
-    moved = _released(scene) if scene.motion.free is not None and at is None else None
+    moved = _solve_released(scene) if scene.motion.free is not None and at is None else None
     where = moved.command if moved is not None else command(scene) if at is None else at
     n = len(where.angle)
-    wanted, names = requested(scene, (n,), where, stage, out)
+    wanted, names = find_requested(scene, (n,), where, stage, out)
     code = np.zeros(n, dtype=np.uint8)
     with np.errstate(all="ignore"):
         case = Case.of(scene, where.bar)._replace(side=side)
         if wanted >= FORCE and scene.counts_turns:
-            case = case.with_start(_beginning(scene, where, moved))
+            case = case.with_start(_find_beginning(scene, where, moved))
         plain = moved is None and where.remainder is None and where.lever is None
         quick = plain and is_compiled(case, wanted, n, compiled)
         result = None
         if n == 1 and moved is None and out is None and not quick:
-            result = _alone(case, where, wanted, names, code)
+            result = _solve_alone(case, where, wanted, names, code)
     if result is None:
-        result = arrays(names, (n,), out)
-        _by_parts(case, where, moved, wanted, names, result, code, quick)
+        result = make_arrays(names, (n,), out)
+        _solve_by_parts(case, where, moved, wanted, names, result, code, quick)
 
     unwrap_angles(result, where.bar)
-    solution = solved(scene, where, code, result)
+    solution = make_solution(scene, where, code, result)
     solution.time, solution.stopped_at = where.time, None if moved is None else moved.stopped_at
     return solution
 
@@ -133,13 +133,13 @@ def _refuse(at: Command) -> None:
     expect("at.time", at.time, np.ndarray, type(None))
 
 
-def last_stage(scene: Scene) -> str:
+def find_last_stage(scene: Scene) -> str:
     """Return the last stage that a scene states enough for: error bars and all, or positions only."""
     motion = scene.motion
     return "position" if motion.speed is None and motion.law is None and motion.free is None else STAGES[-1]
 
 
-def requested(
+def find_requested(
     scene: Scene, shape: tuple[int, ...], at: Command, stage: str | None, out: Mapping[str, Array] | None
 ) -> tuple[int, KeysView[str]]:
     """Return the number of the last stage evaluated, and the names of the quantities; an InputError as of `solve`.
@@ -155,18 +155,20 @@ def requested(
         if not isinstance(stage, str) or stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted = STAGES.index(stage)
-        names = _names(wanted, _absent(scene), tuple(point.name for point in scene.points))
+        names = _list_names(wanted, _list_absent(scene), tuple(point.name for point in scene.points))
     else:
         expect("out", out, Mapping)
         names = out.keys()
-        stages = _stages(tuple(point.name for point in scene.points))
-        wanted = _highest_stage(out, shape, {name: of for name, of in stages.items() if name not in _foreign(scene)})
+        stages = _list_stages(tuple(point.name for point in scene.points))
+        wanted = _find_highest_stage(
+            out, shape, {name: of for name, of in stages.items() if name not in _list_foreign(scene)}
+        )
     if wanted > 0 and at.speed is None:
         raise InputError(f"motion.omega_{at.bar}", None, f"is needed for the stage {STAGES[wanted]!r}")
     return wanted, names if at.bar == 2 else {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
 
 
-def arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None) -> dict[str, Array]:
+def make_arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None) -> dict[str, Array]:
     """To write into: new ones, or those given."""
     given = {} if out is None else out
     return {
@@ -174,19 +176,19 @@ def arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array
     }
 
 
-def _stages(points: tuple[str, ...]) -> dict[str, str]:
+def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
     """Every quantity of a scene, those of its own points too, and its stage."""
     return STAGE_OF | {start + name: stage for name in points for start, stage in OF_POINTS.items()}
 
 
 @cache
-def _names(wanted: int, absent: tuple[str, ...], points: tuple[str, ...]) -> KeysView[str]:
+def _list_names(wanted: int, absent: tuple[str, ...], points: tuple[str, ...]) -> KeysView[str]:
     """List the quantities of the stages up to the last one wanted."""
     before = STAGES[: wanted + 1]
-    return {name: of for name, of in _stages(points).items() if of in before and name not in absent}.keys()
+    return {name: of for name, of in _list_stages(points).items() if of in before and name not in absent}.keys()
 
 
-def solved(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[str, Array]) -> Solution:
+def make_solution(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[str, Array]) -> Solution:
     """Put the arrays of a solution in their places."""
     own: dict[str, dict[str, Array]] = {start: {} for start in OF_POINTS}
     for point in scene.points:
@@ -216,7 +218,7 @@ def unwrap_angles(result: Mapping[str, Array], bar: int) -> None:
             unwrap(result[name])
 
 
-def _by_parts(
+def _solve_by_parts(
     case: Case,
     where: Command,
     moved: "FreeMotion | None",
@@ -227,23 +229,23 @@ def _by_parts(
     quick: bool,
 ) -> None:
     """Evaluate all positions block by block, those of a free motion by their independent angle."""
-    size = BLOCK if quick else positions_at_once(wanted)
+    size = BLOCK if quick else choose_block_size(wanted)
     parts: list[Part] = [(slice(start, start + size),) for start in range(0, len(code), size)]
     if moved is not None:
         parts = [(np.flatnonzero(moved.bar == bar),) for bar in (2, 4)]
 
     def evaluate(part: Part) -> Mapping[str, Any]:
         if moved is not None:
-            found = freely(case, moved, part, wanted, names)
+            found = evaluate_freely(case, moved, part, wanted, names)
         else:
-            found = evaluation(quick)(case, where, part, wanted, names)
+            found = choose_evaluation(quick)(case, where, part, wanted, names)
         keep(case, found, result, code, part, seen=quick)
         return found[1]
 
-    each(evaluate, parts, at_once=quick)
+    evaluate_parts(evaluate, parts, at_once=quick)
 
 
-def _alone(
+def _solve_alone(
     case: Case, where: Command, wanted: int, names: KeysView[str], code: NDArray[np.uint8]
 ) -> dict[str, Array] | None:
     """Solve a single position in plain numbers, for arrays of one entry cost several times as much.
@@ -251,7 +253,7 @@ def _alone(
     None where any is no number: there NumPy goes on with inf and NaN, and statuses follow.
     """
     try:
-        codes, values, _ = commanded(case, where, (0,), wanted, names)
+        codes, values, _ = evaluate_command(case, where, (0,), wanted, names)
     except ArithmeticError:
         return None
     code[0] = codes
@@ -263,7 +265,7 @@ def _alone(
     return {name: (scalars if is_scalar(name) else vectors)[i] for i, name in enumerate(values)}
 
 
-def _released(scene: Scene) -> "FreeMotion":
+def _solve_released(scene: Scene) -> "FreeMotion":
     """Compute the motion that the linkage makes when it is released."""
     from fourbar.evaluation.free_motion import release
 
@@ -283,11 +285,11 @@ def _released(scene: Scene) -> "FreeMotion":
     )
     if scene.counts_turns:
         with np.errstate(all="ignore"):
-            Case.of(scene).with_start(_beginning(scene, moved.command, moved)).refuse_wound(moved.command)
+            Case.of(scene).with_start(_find_beginning(scene, moved.command, moved)).refuse_wound(moved.command)
     return moved
 
 
-def _beginning(scene: Scene, where: Command, moved: "FreeMotion | None") -> Command:
+def _find_beginning(scene: Scene, where: Command, moved: "FreeMotion | None") -> Command:
     """Return the positions among which effects that count turns find where the motion begins, of the bar of `where`."""
     if moved is not None:
         return Command(where.angle[:1], where.branch[:1], 0.0, 0.0)
@@ -295,20 +297,20 @@ def _beginning(scene: Scene, where: Command, moved: "FreeMotion | None") -> Comm
     return own if own.bar == where.bar else where
 
 
-def _foreign(scene: Scene) -> tuple[str, ...]:
+def _list_foreign(scene: Scene) -> tuple[str, ...]:
     """Quantities of the kind of drive that the scene has not."""
     return OF_LINE if scene.drive is None else COUPLE
 
 
-def _absent(scene: Scene) -> tuple[str, ...]:
+def _list_absent(scene: Scene) -> tuple[str, ...]:
     """Those, and what does not exist without dry friction, or without friction that depends on the pin forces."""
-    absent = _foreign(scene)
+    absent = _list_foreign(scene)
     if not any(effect.dry for effect in scene.effects):
         absent = (*absent, *OF_DRY_FRICTION)
     return absent if any(effect.loaded_pins for effect in scene.effects) else (*absent, *OF_PIN_LOADS)
 
 
-def _highest_stage(out: Mapping[str, Array], positions: tuple[int, ...], stages: Mapping[str, str]) -> int:
+def _find_highest_stage(out: Mapping[str, Array], positions: tuple[int, ...], stages: Mapping[str, str]) -> int:
     """Find the last stage that the quantities named need; an InputError where one cannot be written."""
     for name, array in out.items():
         if name not in stages:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, installing
+from fourbar.errors import DependencyError, InputError, say_install
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -21,7 +21,7 @@ TEMPORARY = ".part"
 
 
 @contextmanager
-def naming(path: Path) -> Iterator[None]:
+def name_file(path: Path) -> Iterator[None]:
     """Name the file in what goes wrong while it is open (a full disk), not the temporary one, which no reader knows."""
     try:
         yield
@@ -51,10 +51,10 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
     require_file(target)
     if target.exists() and not target.is_file():
         # a device or pipe is written to; renaming onto it would replace /dev/null itself
-        with naming(target), target.open("wb") as file:
+        with name_file(target), target.open("wb") as file:
             file.write(data)
         return
-    with naming(target):
+    with name_file(target):
         handle, temporary = tempfile.mkstemp(prefix=f".{target.name[:100]}.", suffix=TEMPORARY, dir=target.parent)
         try:
             with os.fdopen(handle, "wb") as file:
@@ -76,22 +76,22 @@ def write_text(path: str | Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
-def data_frame(columns: Mapping[str, Any]) -> "DataFrame":
+def make_data_frame(columns: Mapping[str, Any]) -> "DataFrame":
     """Make a table of pandas; DependencyError where it is not installed."""
     try:
         from pandas import DataFrame
     except ImportError:
-        raise DependencyError(f"to_pandas needs pandas: {installing('pandas')}") from None
+        raise DependencyError(f"to_pandas needs pandas: {say_install('pandas')}") from None
     return DataFrame(columns)
 
 
-def extent(theta_2: Any) -> str:
+def describe_extent(theta_2: Any) -> str:
     """Say how many positions there are, of how many linkages."""
     count = f"{theta_2.shape[-1]} position{'s' if theta_2.shape[-1] != 1 else ''}"
     return count if theta_2.ndim == 1 else f"{len(theta_2)} linkages, {count} each"
 
 
-def between(values: Any) -> str:
+def write_between(values: Any) -> str:
     """Least and greatest of an array."""
     known = values[np.isfinite(values)]
     if not known.size:
@@ -99,12 +99,12 @@ def between(values: Any) -> str:
     return f"{known.min():.6g}" if known.min() == known.max() else f"{known.min():.6g} to {known.max():.6g}"
 
 
-def listed(what: str, names: Iterable[str]) -> str:
+def list_names(what: str, names: Iterable[str]) -> str:
     """Names on one line of a representation, as many as fit."""
     return shorten(f"{what}: {', '.join(names)}", 110, placeholder=" ...")
 
 
-def html_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def make_html(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Make what a notebook shows of a result."""
     lines = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     heads = "".join(f"<th>{escape(cell)}</th>" for cell in head)

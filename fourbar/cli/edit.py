@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from fourbar.cli.given import FILE
-from fourbar.errors import DependencyError, installing
+from fourbar.errors import DependencyError, say_install
 
 
 @click.command()
@@ -28,5 +28,5 @@ def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) 
     try:
         from fourbar.edit.server import edit as opened_there
     except ModuleNotFoundError as error:
-        raise DependencyError(f"{error.name} is not installed: {installing('edit')}") from None
+        raise DependencyError(f"{error.name} is not installed: {say_install('edit')}") from None
     opened_there(scene, exports or scene.with_name(f"{scene.stem}_exports"), port, browse=not no_browser)

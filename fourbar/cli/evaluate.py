@@ -10,13 +10,13 @@ import click
 from fourbar.cli.given import (
     FILE,
     is_bare,
-    lengths_of,
-    opened,
+    open_scene,
     or_out_option,
-    printed_to,
+    print_to,
+    read_lengths,
     scene_argument,
+    show_waiting,
     units_option,
-    waiting,
 )
 from fourbar.errors import InputError, NotAssembledError
 
@@ -34,15 +34,15 @@ def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     Four bare numbers are ratios; lengths like 30cm work too.
     """
     from fourbar.linkage import Bar, FourBar
-    from fourbar.show.words import type_json, type_lines
+    from fourbar.show.words import write_type, write_type_json
 
     ratios = [is_bare(text) for text in lengths]
     if any(ratios) and not all(ratios):
         raise InputError("D A B C", " ".join(lengths), "must be four ratios, or four lengths each with its unit")
-    d, a, b, c = lengths_of(lengths)
+    d, a, b, c = read_lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
     unit = "" if all(ratios) else " m"
-    printed_to((type_json(linkage) if as_json else "\n".join(type_lines(linkage, unit))) + "\n", out)
+    print_to((write_type_json(linkage) if as_json else "\n".join(write_type(linkage, unit))) + "\n", out)
 
 
 @click.command()
@@ -55,7 +55,7 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
 
     Each length has a unit, like 300mm; or --unit mm is the unit of all.
     """
-    from fourbar.files.new import new_scene
+    from fourbar.files.new import write_new_scene
     from fourbar.writing import write_text
 
     if (file is None) == (out is None):
@@ -69,7 +69,7 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
         raise InputError(
             "--lengths", bare[0], "the unit is missing; write each with its own, like 300mm, or --unit mm once"
         )
-    write_text(file, new_scene([f"{text} {unit}" if text in bare else text for text in lengths]))
+    write_text(file, write_new_scene([f"{text} {unit}" if text in bare else text for text in lengths]))
     click.echo(f"wrote {file}; edit it, then: fourbar analyze {file}")
 
 
@@ -98,13 +98,13 @@ def analyze(
     if sensitivity:
         if as_csv or degrees or every is not None or units:
             raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")
-        _sensitivity(scene, as_json, out)
+        _write_sensitivity(scene, as_json, out)
         return
-    from fourbar.show.between import between
-    from fourbar.show.duty import motor_entry
-    from fourbar.show.tables import printed
-    from fourbar.solution import DEGREES, csv_text, json_text
-    from fourbar.solve import last_stage, solve
+    from fourbar.show.between import locate_between
+    from fourbar.show.duty import write_motor
+    from fourbar.show.tables import print_tables
+    from fourbar.solution import DEGREES, write_csv, write_json
+    from fourbar.solve import find_last_stage, solve
 
     if as_json and as_csv:
         raise click.UsageError("--json and --csv are two forms of the output; give one of them")
@@ -115,39 +115,39 @@ def analyze(
         shown |= DEGREES
     elif degrees is False:
         shown.pop("rad", None)
-    with opened(scene) as described, waiting(described):
-        solution = solve(described, last_stage(described))
+    with open_scene(scene) as described, show_waiting(described):
+        solution = solve(described, find_last_stage(described))
     if not solution.assembled.any():
         raise NotAssembledError(
             f"{scene}: motion.{described.motion.names[0]}: the linkage assembles at none of the positions requested"
         )
     if as_json:
-        found = between(described, solution)
-        text = json_text(solution, shown, motor=motor_entry(solution, shown, found and found.solution))
+        found = locate_between(described, solution)
+        text = write_json(solution, shown, motor=write_motor(solution, shown, found and found.solution))
     elif as_csv:
-        text = csv_text(solution, shown, as_csv)
+        text = write_csv(solution, shown, as_csv)
     else:
         width = None if out or not sys.stdout.isatty() else shutil.get_terminal_size().columns
-        text = printed(described, solution, width, shown, every=every)
-    printed_to(text, out)
+        text = print_tables(described, solution, width, shown, every=every)
+    print_to(text, out)
 
 
-def _sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
+def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
     from fourbar.show import influence
-    from fourbar.show.tables import under_heading
+    from fourbar.show.tables import write_table
     from fourbar.studies.derivatives import sensitivity
 
-    with opened(scene) as stated:
+    with open_scene(scene) as stated:
         found = sensitivity(stated)
     if not found.solution.assembled.any():
         raise NotAssembledError(
             f"{scene}: motion.{stated.motion.names[0]}: the linkage assembles at none of the positions"
         )
     if as_json:
-        text = influence.json_text(found)
+        text = influence.write_json(found)
     else:
-        text = under_heading(stated.title, influence.heading(found), influence.table(found))
-    printed_to(text, out)
+        text = write_table(stated.title, influence.write_heading(found), influence.make_table(found))
+    print_to(text, out)
 
 
 @click.command()
@@ -163,15 +163,15 @@ def tolerance(
     """Show what the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
-    from fourbar.show.progress import running
-    from fourbar.show.tables import under_heading
+    from fourbar.show.progress import show_running
+    from fourbar.show.tables import write_table
     from fourbar.solution import DEGREES
     from fourbar.studies.spread import SAMPLES, tolerances
 
     _refuse_units_of_json(as_json, units)
     if out is not None:
         format_of(out)
-    with opened(scene) as stated, running("samples are solved") as progress:
+    with open_scene(scene) as stated, show_running("samples are solved") as progress:
         found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
     if (found.without == found.samples).all():
         raise NotAssembledError(
@@ -180,10 +180,10 @@ def tolerance(
     if out is not None:
         draw_tolerances(found, out, units)
     if as_json:
-        printed_to(shown.json_text(found), None)
+        print_to(shown.write_json(found), None)
     else:
         own = {**DEGREES, **units}
-        printed_to(under_heading(stated.title, shown.heading(found, own), shown.table(found, own)), None)
+        print_to(write_table(stated.title, shown.write_heading(found, own), shown.make_table(found, own)), None)
 
 
 def _refuse_units_of_json(as_json: bool, units: "Conversion") -> None:
@@ -202,17 +202,17 @@ def _refuse_units_of_json(as_json: bool, units: "Conversion") -> None:
 def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: "Conversion", out: Path | None) -> None:
     """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
     from fourbar.show import extremes as shown
-    from fourbar.show.progress import running
-    from fourbar.show.tables import under_heading
+    from fourbar.show.progress import show_running
+    from fourbar.show.tables import write_table
     from fourbar.solution import DEGREES
     from fourbar.studies.enclosure import extremes as proven
 
     _refuse_units_of_json(as_json, units)
-    with opened(scene) as stated, running("pieces of the interval are halved"):
+    with open_scene(scene) as stated, show_running("pieces of the interval are halved"):
         found = proven(stated, quantities)
     if as_json:
-        text = shown.json_text(stated, found)
+        text = shown.write_json(stated, found)
     else:
         own = {**DEGREES, **units}
-        text = under_heading(stated.title, shown.heading(stated, found, own), shown.table(found, own))
-    printed_to(text, out)
+        text = write_table(stated.title, shown.write_heading(stated, found, own), shown.make_table(found, own))
+    print_to(text, out)

@@ -7,17 +7,17 @@ import click
 
 from fourbar.cli.given import (
     FILE,
-    lengths_of,
-    number_of,
-    opened,
+    open_scene,
     out_option,
-    printed_to,
+    print_to,
+    read_lengths,
+    read_number,
     require_unit,
     scene_argument,
+    show_waiting,
     units_option,
-    waiting,
 )
-from fourbar.cli.rest import in_place_of_loop
+from fourbar.cli.rest import replace_loop
 from fourbar.errors import InputError
 
 if TYPE_CHECKING:
@@ -51,9 +51,9 @@ def plot(
     from fourbar.show.plot import draw
 
     require_unit("--position", position)
-    with opened(scene) as described, waiting(described):
+    with open_scene(scene) as described, show_waiting(described):
         unit = "rad" if described.motion.stroke is None else "m"
-        at = None if position is None else number_of("--position", position, unit)
+        at = None if position is None else read_number("--position", position, unit)
         draw(described, out, figure, position=at, branches=branches, units=units, dimensions=dimensions)
 
 
@@ -86,7 +86,7 @@ def animate(
         if not equals:
             raise InputError("--picture", entry, "must be like coupler=FILE")
         attached[bar] = file
-    with opened(scene) as described, waiting(described):
+    with open_scene(scene) as described, show_waiting(described):
         write(described, out, pictures=attached, seconds=seconds, units=units, vectors=vectors)
 
 
@@ -128,16 +128,16 @@ def mjcf(
     if scene is not None:
         if omega is not None:
             raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
-        with opened(scene) as described:
-            text = writer.mjcf_for(described, simulator, drive)
-            printed_to(in_place_of_loop(text, described) if mimic else text, out)
+        with open_scene(scene) as described:
+            text = writer.write_mjcf_for(described, simulator, drive)
+            print_to(replace_loop(text, described) if mimic else text, out)
         return
     assert lengths is not None
-    speed = {} if omega is None else {"omega": number_of("--omega", omega, "rad/s")}
-    made = writer.scene_from_lengths(*lengths_of(lengths), **speed)
-    text = writer.mjcf_for(made, simulator, drive)
-    printed_to(in_place_of_loop(text, made) if mimic else text, out)
-    for line in writer.defaults_used(made):
+    speed = {} if omega is None else {"omega": read_number("--omega", omega, "rad/s")}
+    made = writer.make_scene(*read_lengths(lengths), **speed)
+    text = writer.write_mjcf_for(made, simulator, drive)
+    print_to(replace_loop(text, made) if mimic else text, out)
+    for line in writer.list_defaults(made):
         click.echo(line)
 
 
@@ -148,10 +148,10 @@ def mjcf(
 @out_option
 def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
     """Write a scene as SDF, the loop closed by a fourth joint (Gazebo) or a ball constraint (Drake)."""
-    from fourbar.mjcf.sdf import sdf as written
+    from fourbar.mjcf.sdf import write_sdf as written
 
-    with opened(scene) as described:
-        printed_to(written(described, reader, without_loads=without_loads), out)
+    with open_scene(scene) as described:
+        print_to(written(described, reader, without_loads=without_loads), out)
 
 
 @click.command()
@@ -160,7 +160,7 @@ def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
 @out_option
 def usd(scene: Path, without_loads: bool, out: Path) -> None:
     """Write a scene as USD text (.usda) for Newton, the loop closed by a fourth revolute joint."""
-    from fourbar.mjcf.usd import usd as written
+    from fourbar.mjcf.usd import write_usd as written
 
-    with opened(scene) as described:
-        printed_to(written(described, without_loads=without_loads), out)
+    with open_scene(scene) as described:
+        print_to(written(described, without_loads=without_loads), out)

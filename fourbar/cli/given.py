@@ -20,7 +20,7 @@ FILE = click.Path(path_type=Path)
 KEYS_OF_A_SCENE = ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
 
 
-def _units(context: click.Context, parameter: click.Parameter, text: str) -> "Conversion":
+def _read_units(context: click.Context, parameter: click.Parameter, text: str) -> "Conversion":
     from fourbar.show.units import units
 
     return units(text)
@@ -32,14 +32,14 @@ or_out_option = click.option("-o", "--out", type=FILE, metavar="FILE", help="Wri
 units_option = click.option(
     "--units",
     default="SI",
-    callback=_units,
+    callback=_read_units,
     metavar="UNITS",
     help='"imperial", or a list like "mm N.mm deg"; left out: SI.',
 )
 
 
 @contextmanager
-def opened(path: Path) -> Iterator["Scene"]:
+def open_scene(path: Path) -> Iterator["Scene"]:
     """Read the scene of a file; InputError where it cannot be printed, or not to the file of -o.
 
     The output is looked at before anything is solved, which may take minutes. Mistakes that show only then name the
@@ -64,22 +64,22 @@ def opened(path: Path) -> Iterator["Scene"]:
 
 
 @contextmanager
-def waiting(scene: "Scene") -> Iterator[None]:
+def show_waiting(scene: "Scene") -> Iterator[None]:
     """Show in a terminal that a long free motion, which takes minutes, is running."""
     if scene.motion.free is None:
         yield
         return
     from fourbar.evaluation.free_motion import STEPS
-    from fourbar.show.progress import running
+    from fourbar.show.progress import show_running
 
-    with running(f"the free motion is integrated, in {STEPS} steps at most"):
+    with show_running(f"the free motion is integrated, in {STEPS} steps at most"):
         yield
 
 
-def lengths_of(texts: tuple[str, ...]) -> list[float]:
+def read_lengths(texts: tuple[str, ...]) -> list[float]:
     """Ground, input, coupler and output, m."""
     names = ("ground", "input", "coupler", "output")
-    return [number_of(f"length of {name}", text, "m", positive=True) for name, text in zip(names, texts, strict=True)]
+    return [read_number(f"length of {name}", text, "m", positive=True) for name, text in zip(names, texts, strict=True)]
 
 
 def is_bare(text: str) -> bool:
@@ -91,7 +91,7 @@ def is_bare(text: str) -> bool:
     return True
 
 
-def number_of(key: str, text: str, unit: str, *, positive: bool = False) -> float:
+def read_number(key: str, text: str, unit: str, *, positive: bool = False) -> float:
     """Read a number of the command line: bare in SI, or with a unit."""
     from fourbar.linkage import require
 
@@ -112,7 +112,7 @@ def require_unit(key: str, text: str | None) -> None:
         raise InputError(key, text, f'the unit is missing; did you mean "{text} deg"?')
 
 
-def printed_to(text: str, out: Path | None) -> None:
+def print_to(text: str, out: Path | None) -> None:
     """To standard output, or to a file, whole or not at all."""
     from fourbar.writing import write_text
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fourbar.cli.given import opened, or_out_option, printed_to, scene_argument
+from fourbar.cli.given import open_scene, or_out_option, print_to, scene_argument
 
 if TYPE_CHECKING:
     from fourbar.scene import Scene
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
     """Find where a linkage stays by itself, stable or not, how fast it swings there, and what holds it elsewhere."""
     from fourbar.show import equilibrium as shown
-    from fourbar.show.progress import running
+    from fourbar.show.progress import show_running
     from fourbar.studies.equilibrium import equilibrium as found
 
-    with opened(scene) as described, running("the boxes are halved"):
+    with open_scene(scene) as described, show_running("the boxes are halved"):
         result = found(described)
-    printed_to((shown.json_text if as_json else shown.printed)(described.title, result), out)
+    print_to((shown.write_json if as_json else shown.write_tables)(described.title, result), out)
 
 
 @click.command()
@@ -38,15 +38,15 @@ def ratio(scene: Path, degree: int, as_json: bool, out: Path | None) -> None:
     from fourbar.show import ratio as shown
     from fourbar.studies.ratio import ratio as found
 
-    with opened(scene) as described:
+    with open_scene(scene) as described:
         result = found(described, degree)
-    printed_to((shown.json_text if as_json else shown.printed)(described.title, result), out)
+    print_to((shown.write_json if as_json else shown.write_tables)(described.title, result), out)
 
 
-def in_place_of_loop(model: str, scene: "Scene") -> str:
+def replace_loop(model: str, scene: "Scene") -> str:
     """Give MJCF text joints that follow the input by the best polynomials that MuJoCo holds."""
-    from fourbar.mjcf import with_mimic
+    from fourbar.mjcf import replace_loop
     from fourbar.studies.ratio import ratio as found
 
     best = found(scene).fits[-1]
-    return with_mimic(model, scene, best.about, best.joint_A, best.theta_4)
+    return replace_loop(model, scene, best.about, best.joint_A, best.theta_4)

@@ -26,7 +26,7 @@ LONGEST_TEXT = 10_000
 
 
 @cache
-def offers() -> dict[str, Any]:
+def list_offers() -> dict[str, Any]:
     """List the empty fields, the parts that can be added, and the words to choose from."""
     found = tomllib.loads(files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8"))
     for key, effect in REGISTRY.items():
@@ -65,40 +65,40 @@ class SceneDocument:
     def set(self, path: Path, text: str) -> None:
         """State one entry as it is typed: a text, or a number where the file has one; an empty text takes it away."""
         if len(text) > LONGEST_TEXT:
-            raise InputError(dotted(path), text[:60], f"must have {LONGEST_TEXT} characters at most")
+            raise InputError(name_entry(path), text[:60], f"must have {LONGEST_TEXT} characters at most")
         old = self.at(path)
         if not text.strip() and old is not None and not isinstance(path[-1], int):
             self.remove(path)
         elif text.strip() or old is not None:
-            example = old if old is not None else _in(offers()["fields"], path)
-            self.put(path, text if isinstance(example, str) or example is None else _number(text))
+            example = old if old is not None else _find_table(list_offers()["fields"], path)
+            self.put(path, text if isinstance(example, str) or example is None else _read_number(text))
 
     def put(self, path: Path, value: Any) -> None:
         """State an entry, with the tables that it stands in; an index of -1 appends to a list."""
         *into, last = path
-        holder = self._holder(into)
+        holder = self._find_holder(into)
         if isinstance(last, int) and last < 0:
-            holder.append(_table(value, tomlkit.nl()) if isinstance(holder, AoT) else _inline(value))
+            holder.append(_make_table(value, tomlkit.nl()) if isinstance(holder, AoT) else _write_inline(value))
         elif isinstance(holder, (Table, InlineTable)) or holder is self.tree or isinstance(last, int):
             old = self.at(path)
             if isinstance(old, Table):  # a table of its own is written anew, with its heading
                 del holder[last]
                 old = None
-            holder[last] = _like(old, value) if old is not None else _written(path, value)
+            holder[last] = _make_like(old, value) if old is not None else _write_entry(path, value)
         else:
-            raise InputError(dotted(path), value, "stands in no table")
+            raise InputError(name_entry(path), value, "stands in no table")
 
     def remove(self, path: Path) -> None:
         """Take an entry away, and a table that it leaves empty."""
         *into, last = path
         holder = self.at(into)
         if self.at(path) is None:
-            raise InputError(dotted(path), "", "is not there")
+            raise InputError(name_entry(path), "", "is not there")
         del holder[last]
         if into and not len(holder) and into[0] not in ("lengths", "motion"):
             self.remove(into)
 
-    def _holder(self, path: Path) -> Any:
+    def _find_holder(self, path: Path) -> Any:
         found = self.at(path)
         if found is not None:
             return found
@@ -107,24 +107,24 @@ class SceneDocument:
         else:
             made = tomlkit.table() if len(path) == 1 or path[0] == "bars" else tomlkit.inline_table()
         if len(path) > 1:
-            self._holder(path[:-1])
+            self._find_holder(path[:-1])
         parent = self.at(path[:-1])
         parent[path[-1]] = made
         return self.at(path)
 
 
-def dotted(path: Iterable[str | int]) -> str:
+def name_entry(path: Iterable[str | int]) -> str:
     """Name an entry as errors do."""
     return ".".join(map(str, path))
 
 
-def _in(table: Any, path: Path) -> Any:
+def _find_table(table: Any, path: Path) -> Any:
     for step in path:
         table = table.get(step) if isinstance(table, dict) else None
     return table
 
 
-def _number(text: str) -> int | float | str:
+def _read_number(text: str) -> int | float | str:
     """Return a number without a unit; what is none stays a text, which the reader of the file refuses."""
     for kind in (int, float):
         try:
@@ -134,39 +134,39 @@ def _number(text: str) -> int | float | str:
     return text
 
 
-def _like(old: Any, value: Any) -> Any:
+def _make_like(old: Any, value: Any) -> Any:
     """Return the value as an item with the comment and the blanks of what it replaces."""
-    made = tomlkit.item(_inline(value))
+    made = tomlkit.item(_write_inline(value))
     if isinstance(old, Item):
         made.trivia.comment_ws, made.trivia.comment = old.trivia.comment_ws, old.trivia.comment
         made.trivia.trail = old.trivia.trail
     return made
 
 
-def _table(entries: dict[str, Any], *after: Whitespace) -> Table:
+def _make_table(entries: dict[str, Any], *after: Whitespace) -> Table:
     made = tomlkit.table()
     for key, value in entries.items():
-        made[key] = _inline(value)
+        made[key] = _write_inline(value)
     for blank in after:
         made.add(blank)
     return made
 
 
-def _inline(value: Any) -> Any:
+def _write_inline(value: Any) -> Any:
     """Write tables and lists in one line."""
     if isinstance(value, dict):
         made = tomlkit.inline_table()
         for key, entry in value.items():
-            made[key] = _inline(entry)
+            made[key] = _write_inline(entry)
         return made
     if isinstance(value, list):
         row = tomlkit.array()
         for entry in value:
-            row.append(_inline(entry))
+            row.append(_write_inline(entry))
         return row
     return value
 
 
-def _written(path: Path, value: Any) -> Any:
+def _write_entry(path: Path, value: Any) -> Any:
     """Write a new entry: a table of its own at the top of the file, in one line anywhere else."""
-    return _table(value) if len(path) == 1 and isinstance(value, dict) else _inline(value)
+    return _make_table(value) if len(path) == 1 and isinstance(value, dict) else _write_inline(value)

@@ -46,7 +46,7 @@ class Handle(NamedTuple):
         return self._asdict() | plain
 
 
-def handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
+def list_handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
     """List everything that can be dragged: mass centres, points, loads, and the ends of what acts on a line."""
     found = [
         Handle(f"mass centre of {name}", ("bars", name, "centre"), n, 0j, scene.linkage.bar(n).to_centre)
@@ -106,7 +106,7 @@ def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], given: Dr
     turned = {1: scene.linkage.ground_angle, 2: given.theta_2, 3: float(at.theta_3[0]), 4: float(at.theta_4[0])}
     if not all(map(cmath.isfinite, (*pins.values(), *turned.values()))):
         raise InputError("theta_2", given.theta_2, "is no position of the linkage")
-    for handle in handles(scene, plain):
+    for handle in list_handles(scene, plain):
         frame = cmath.rect(1.0, turned[handle.bar])
         foot = pins[{1: "O2", 2: "O2", 3: "A", 4: "O4"}[handle.bar]] + frame * handle.at
         own_frame = frame if handle.turns else 1.0 + 0.0j
@@ -117,11 +117,11 @@ def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], given: Dr
         if handle.force is not None and list(handle.force) == given.what:
             arrow = (given.to - foot - own_frame * handle.beyond) / own_frame
             size = str(plain["loads"][handle.force[1]]["force"][0])
-            unit = unit_of(size, "N")
+            unit = find_unit(size, "N")
             force = to_si(size, unit) * given.stretch
             angle = cmath.phase(arrow) + (0.0 if force >= 0.0 else math.pi)
-            document.put((*handle.force, 0), rounded(force, abs(force) / 50.0, unit))
-            document.put((*handle.force, 1), _angle(document.at((*handle.force, 1)), angle, 0.02))
+            document.put((*handle.force, 0), write_rounded(force, abs(force) / 50.0, unit))
+            document.put((*handle.force, 1), _write_angle(document.at((*handle.force, 1)), angle, 0.02))
             return
     raise InputError("drag", given.what, "is nothing that can be dragged")
 
@@ -135,14 +135,14 @@ def _drag_pin(document: SceneDocument, given: Dragged, pins: dict[str, complex])
         _put(document, ("lengths", bar), length, given.grain, "m")
     if given.what == "O4":
         angle, key = cmath.phase(given.to), ("lengths", "ground_angle")
-        document.put(key, _angle(document.at(key), angle, given.grain / max(abs(given.to), given.grain)))
+        document.put(key, _write_angle(document.at(key), angle, given.grain / max(abs(given.to), given.grain)))
 
 
 def _put_pair(document: SceneDocument, path: Path, size: float, angle: float, grain: float) -> None:
     """State a distance and an angle, in the units that they have; where there is none, in those of the ground."""
-    unit = unit_of(document.at((*path, 0)) or document.at(("lengths", "ground")), "m")
-    texts = [rounded(size * to_si("1 m", unit), grain * to_si("1 m", unit), unit)]
-    texts.append(_angle(document.at((*path, 1)), angle, grain / max(size, grain)))
+    unit = find_unit(document.at((*path, 0)) or document.at(("lengths", "ground")), "m")
+    texts = [write_rounded(size * to_si("1 m", unit), grain * to_si("1 m", unit), unit)]
+    texts.append(_write_angle(document.at((*path, 1)), angle, grain / max(size, grain)))
     if document.at(path) is None:
         document.put(path, texts)
     else:
@@ -151,18 +151,18 @@ def _put_pair(document: SceneDocument, path: Path, size: float, angle: float, gr
 
 
 def _put(document: SceneDocument, path: Path, value: float, grain: float, si: str) -> None:
-    unit = unit_of(document.at(path), si)
+    unit = find_unit(document.at(path), si)
     factor = to_si(f"1 {si}", unit)
-    document.put(path, rounded(value * factor, grain * factor, unit))
+    document.put(path, write_rounded(value * factor, grain * factor, unit))
 
 
-def _angle(old: object, angle: float, grain: float) -> str:
-    unit = unit_of(old, "deg")
+def _write_angle(old: object, angle: float, grain: float) -> str:
+    unit = find_unit(old, "deg")
     factor = to_si("1 rad", unit)
-    return rounded(angle * factor, grain * factor, unit)
+    return write_rounded(angle * factor, grain * factor, unit)
 
 
-def unit_of(text: object, otherwise: str) -> str:
+def find_unit(text: object, otherwise: str) -> str:
     """Return the unit that a text has; another one where it has none."""
     found = FRACTION.match(str(text).strip()) or NUMBER.match(str(text).strip())
     unit = str(text).strip()[found.end() :].strip() if found else ""
@@ -170,7 +170,7 @@ def unit_of(text: object, otherwise: str) -> str:
     return unit or otherwise
 
 
-def rounded(value: float, grain: float, unit: str) -> str:
+def write_rounded(value: float, grain: float, unit: str) -> str:
     """Write a number with its unit, to the power of ten next below the grain."""
     finest = max(grain, LEAST_DIGITS * abs(value), 1e-300)
     digits = -math.floor(math.log10(finest))

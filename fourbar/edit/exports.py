@@ -6,37 +6,37 @@ from pathlib import Path
 
 from fourbar.errors import InputError
 from fourbar.scene import Scene
-from fourbar.solution import Conversion, csv_text
-from fourbar.solve import last_stage, solve
+from fourbar.solution import Conversion, write_csv
+from fourbar.solve import find_last_stage, solve
 from fourbar.writing import write_text
 
 
-def _picture(scene: Scene, path: Path, units: Conversion) -> None:
+def _export_picture(scene: Scene, path: Path, units: Conversion) -> None:
     from fourbar.show.plot import draw
 
     draw(scene, path, units=units)
 
 
-def _csv(scene: Scene, path: Path, units: Conversion) -> None:
-    write_text(path, csv_text(solve(scene, last_stage(scene)), units))
+def _export_csv(scene: Scene, path: Path, units: Conversion) -> None:
+    write_text(path, write_csv(solve(scene, find_last_stage(scene)), units))
 
 
-def _mjcf(scene: Scene, path: Path, units: Conversion) -> None:
-    from fourbar.mjcf import mjcf_for
+def _export_mjcf(scene: Scene, path: Path, units: Conversion) -> None:
+    from fourbar.mjcf import write_mjcf_for
 
     del units  # a model has its own
-    write_text(path, mjcf_for(scene, "mujoco"))
+    write_text(path, write_mjcf_for(scene, "mujoco"))
 
 
-def _page(scene: Scene, path: Path, units: Conversion) -> None:
+def _export_page(scene: Scene, path: Path, units: Conversion) -> None:
     from fourbar.show.animate import write
 
     write(scene, path, units=units)
 
 
 FORMATS: dict[str, tuple[str, Callable[[Scene, Path, Conversion], None]]] = {
-    **{kind: (kind, _picture) for kind in ("svg", "png", "pdf")},
-    **{"csv": ("csv", _csv), "mjcf": ("xml", _mjcf), "page": ("html", _page)},
+    **{kind: (kind, _export_picture) for kind in ("svg", "png", "pdf")},
+    **{"csv": ("csv", _export_csv), "mjcf": ("xml", _export_mjcf), "page": ("html", _export_page)},
 }
 """By name: the ending of the file, and what writes it."""
 
@@ -60,7 +60,7 @@ class Exports:
     @staticmethod
     def free_bodies(scene: Scene, position: float, units: Conversion) -> str:
         """Draw the free bodies at a position, as the address of a picture."""
-        from fourbar.show.plot.figures import drawn
+        from fourbar.show.plot.figures import draw_figure
 
-        text = drawn(scene, "freebody", position=position, units=units)._repr_svg_()
+        text = draw_figure(scene, "freebody", position=position, units=units)._repr_svg_()
         return "data:image/svg+xml;base64," + base64.b64encode(text.encode()).decode("ascii")

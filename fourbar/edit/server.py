@@ -18,12 +18,12 @@ from tornado.httpserver import HTTPServer
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from fourbar.edit.answer import frame
+from fourbar.edit.reply import pack_frame
 from fourbar.edit.session import Session
 from fourbar.edit.witness import HarnessRun
 from fourbar.errors import FourBarError, InputError
-from fourbar.show.animate import page
-from fourbar.show.tolerances import embedded_tolerances
+from fourbar.show.animate import write_page
+from fourbar.show.tolerances import collect_tolerances
 
 LOOPBACK = "127.0.0.1"
 LARGEST_REQUEST = 2_000_000
@@ -79,7 +79,7 @@ class Workbench:
 
     def tell(self, about: dict[str, Any], *, to: "PageLine | None" = None) -> None:
         """Send an answer to one page or to all."""
-        data = frame(about)
+        data = pack_frame(about)
         for line in [to] if to else list(self.pages):
             with suppress(WebSocketClosedError):
                 line.write_message(data, binary=True)
@@ -100,22 +100,22 @@ class Workbench:
         self.never("settle")
         self.never("sample")
         if self.working is None or self.working.done():
-            self.working = asyncio.create_task(self._work())
+            self.working = asyncio.create_task(self._run_work())
 
-    async def _work(self) -> None:
+    async def _run_work(self) -> None:
         while self.waiting:
             line, asked = self.waiting.popleft()
             about = await self.loop.run_in_executor(self.one, self.session.do, asked)
             about["for"] = asked.get("id")
             alone = not {"data", "text"} <= about.keys() or asked.get("do") == "hello"
             if about.pop("refer", False):
-                compared = await self.loop.run_in_executor(self.one, self._compared)
+                compared = await self.loop.run_in_executor(self.one, self._compare)
                 self.tell(compared, to=line if alone else None)
             self.tell(about, to=line if alone or "refused" in about or "ask" in about else None)
         self.later("settle", SETTLED, lambda: asyncio.create_task(self._settle()))
         self.later("keep", KEPT, lambda: self.one.submit(self._keep))
 
-    def _compared(self) -> dict[str, Any]:
+    def _compare(self) -> dict[str, Any]:
         try:
             return self.session.compared()
         except FourBarError as error:
@@ -143,7 +143,7 @@ class Workbench:
         scene = self.session.now.scene
         if scene.tolerances:
             found = await self.loop.run_in_executor(
-                self.aside, embedded_tolerances, scene, data["over"]["values"] or data["theta_2"]
+                self.aside, collect_tolerances, scene, data["over"]["values"] or data["theta_2"]
             )
             if scene is self.session.now.scene:
                 self.tell({"tolerances": found})
@@ -157,7 +157,7 @@ class Workbench:
         listening.setblocking(False)
         own = listening.getsockname()[1]
         server = HTTPServer(
-            application(self, own),
+            make_application(self, own),
             **{"max_body_size": LARGEST_REQUEST, "max_buffer_size": 2 * LARGEST_REQUEST, "max_header_size": 16_384},
         )
         server.add_socket(listening)
@@ -225,7 +225,7 @@ class Page(Guarded):
         session = self.bench.session
         text = await asyncio.get_running_loop().run_in_executor(
             self.bench.one,
-            lambda: page(session.now.scene, units=session.units, live=f"ws://{self.request.host}/{token}/live"),
+            lambda: write_page(session.now.scene, units=session.units, live=f"ws://{self.request.host}/{token}/live"),
         )
         self.finish(text)
 
@@ -277,7 +277,7 @@ class PageLine(WebSocketHandler, Guarded):
         self.bench.leave(self)
 
 
-def application(bench: Workbench, port: int) -> Application:
+def make_application(bench: Workbench, port: int) -> Application:
     """Make the application of a workbench that listens at a port."""
     known = {"bench": bench, "hosts": frozenset(f"{name}:{port}" for name in (LOOPBACK, "localhost"))}
     routes = {"": Page, "report": Report, "live": PageLine}

@@ -9,19 +9,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from fourbar.edit.answer import scene_data
-from fourbar.edit.document import SceneDocument, offers
+from fourbar.edit.document import SceneDocument, list_offers
 from fourbar.edit.dragging import Dragged, drag
 from fourbar.edit.exports import Exports
+from fourbar.edit.reply import evaluate_scene
 from fourbar.errors import FourBarError, InputError
 from fourbar.files import loads, read_text
-from fourbar.files.new import new_scene
+from fourbar.files.new import write_new_scene
 from fourbar.files.reading import read_bytes
 from fourbar.files.scene_file import LARGEST_FILE
 from fourbar.scene import Scene
 from fourbar.show.units import units
 from fourbar.solution import Conversion
-from fourbar.studies.keys import at_place, entries
+from fourbar.studies.keys import list_entries, read_place
 from fourbar.writing import write_bytes
 
 SCHEMA = "fourbar-edit/1"
@@ -51,8 +51,8 @@ class Session:
         self.state_file = path.with_name(path.name + ENDING)
         self.token = secrets.token_urlsafe(32)
         self.unit_names, self.units = "SI", units("SI")
-        text = read_text(path) if path.exists() else new_scene(NEW)
-        self.disk = self._on_disk()
+        text = read_text(path) if path.exists() else write_new_scene(NEW)
+        self.disk = self._read_disk()
         self.texts, self.place, self.kept = [text], 0, {"start": text}
         self.reference, self.gesture = "start", ""
         if self.state_file.exists():
@@ -96,10 +96,10 @@ class Session:
     @property
     def saved(self) -> bool:
         """Whether the file on the disk holds the present state."""
-        return self._on_disk() == _digest(self.now.text.encode())
+        return self._read_disk() == _hash_text(self.now.text.encode())
 
-    def _on_disk(self) -> str | None:
-        return _digest(read_bytes(self.path, "scene file", LARGEST_FILE)) if self.path.exists() else None
+    def _read_disk(self) -> str | None:
+        return _hash_text(read_bytes(self.path, "scene file", LARGEST_FILE)) if self.path.exists() else None
 
     def _read(self, text: str) -> SceneState:
         if len(text.encode()) > LARGEST_FILE:
@@ -110,12 +110,17 @@ class Session:
 
     def greeting(self) -> dict[str, Any]:
         """Describe what does not change with the state, to a page that has come."""
-        return {"offers": offers(), "file": self.path.name, "exports": str(self.exports.folder), "kept": [*self.kept]}
+        return {
+            "offers": list_offers(),
+            "file": self.path.name,
+            "exports": str(self.exports.folder),
+            "kept": [*self.kept],
+        }
 
     def answer(self, *, settled: bool = False) -> dict[str, Any]:
         """Describe the present state."""
         return {
-            "data": scene_data(self.now.scene, self.now.plain, self.units, settled=settled),
+            "data": evaluate_scene(self.now.scene, self.now.plain, self.units, settled=settled),
             "settled": settled,
             "plain": self.now.plain,
             "text": self.now.text,
@@ -124,14 +129,14 @@ class Session:
             "redo": self.place + 1 < len(self.texts),
             "reference": self.reference,
             "kept": [*self.kept],
-            "keys": {key: entry.unit for key, entry in entries(self.now.scene).items()},
+            "keys": {key: entry.unit for key, entry in list_entries(self.now.scene).items()},
             **({"saved": self.saved} if settled else {}),
         }
 
     def compared(self) -> dict[str, Any]:
         """Describe the state that the present one is held against."""
         kept = self._read(self.kept[self.reference])
-        return {"compared": self.reference, "data": scene_data(kept.scene, kept.plain, self.units)}
+        return {"compared": self.reference, "data": evaluate_scene(kept.scene, kept.plain, self.units)}
 
     def do(self, asked: dict[str, Any]) -> dict[str, Any]:
         """Do what a page asks for and describe the state after it; what is refused changes nothing."""
@@ -156,10 +161,10 @@ class Session:
         if not goes_on:
             self.base = self.now
         alter(self.document)
-        self._step(self._read(self.document.text()), goes_on)
+        self._step_through_history(self._read(self.document.text()), goes_on)
         self.gesture = gesture
 
-    def _step(self, now: SceneState, goes_on: bool) -> None:
+    def _step_through_history(self, now: SceneState, goes_on: bool) -> None:
         if goes_on:
             self.texts = [*self.texts[: self.place], now.text]
         elif now.text != self.now.text:
@@ -168,7 +173,7 @@ class Session:
         self.now = now
 
 
-def _digest(data: bytes) -> str:
+def _hash_text(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
@@ -177,13 +182,13 @@ def _set(session: Session, asked: dict[str, Any]) -> None:
 
 
 def _add(session: Session, asked: dict[str, Any]) -> None:
-    part, name = offers()["parts"][int(asked["part"])], str(asked.get("name", ""))
+    part, name = list_offers()["parts"][int(asked["part"])], str(asked.get("name", ""))
     path = [name if step == "" else step for step in part["at"]]
     value = part["value"]
     if path[0] == "tolerances":
-        known = entries(session.now.scene)
+        known = list_entries(session.now.scene)
         if name in known:  # a thousandth of the number, until the designer says more
-            size = abs(float(at_place(session.now.scene, known[name].place) or 1.0)) / 1000.0
+            size = abs(float(read_place(session.now.scene, known[name].place) or 1.0)) / 1000.0
             value = f"{size:.1g} {known[name].unit}"
     session.change(lambda of: of.put(path, value))
     session.document = SceneDocument(session.now.text)
@@ -202,9 +207,9 @@ def _drag(session: Session, asked: dict[str, Any]) -> None:
     session.change(lambda of: drag(of, from_state.scene, from_state.plain, given), gesture)
 
 
-def _text(session: Session, asked: dict[str, Any]) -> None:
+def _write_text(session: Session, asked: dict[str, Any]) -> None:
     now = session._read(str(asked["text"]))
-    session._step(now, False)
+    session._step_through_history(now, False)
     session.document, session.gesture = SceneDocument(now.text), ""
 
 
@@ -229,7 +234,7 @@ def _refer(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"refer": True}
 
 
-def _units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+def _list_units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     found: Conversion = units(str(asked["units"]))
     session.unit_names, session.units = str(asked["units"]), found
     return {"refer": True}
@@ -237,11 +242,11 @@ def _units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
 
 def _save(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     """Write the file; where it is another one than was read, only on demand."""
-    if session._on_disk() != session.disk and not asked.get("over"):
+    if session._read_disk() != session.disk and not asked.get("over"):
         return {"ask": f"{session.path.name} was changed on the disk meanwhile. Overwrite it?"}
     data = session.now.text.encode()
     write_bytes(session.path, data)
-    session.disk = _digest(data)
+    session.disk = _hash_text(data)
     return {"note": f"saved {session.path.name}", "saved": True}
 
 
@@ -249,7 +254,7 @@ def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"note": "wrote " + str(session.exports.write(session.now.scene, str(asked["format"]), session.units))}
 
 
-def _bodies(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+def _list_bodies(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"bodies": session.exports.free_bodies(session.now.scene, float(asked["position"]), session.units)}
 
 
@@ -258,15 +263,15 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
     "add": _add,
     "remove": _remove,
     "drag": _drag,
-    "text": _text,
+    "text": _write_text,
     "undo": lambda session, asked: _move(session, -1),
     "redo": lambda session, asked: _move(session, 1),
     "keep": _keep,
     "refer": _refer,
-    "units": _units,
+    "units": _list_units,
     "save": _save,
     "export": _export,
-    "bodies": _bodies,
+    "bodies": _list_bodies,
     "hello": lambda session, asked: session.greeting() | {"refer": True},
 }
 """What a page can ask for."""

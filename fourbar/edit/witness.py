@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fourbar.errors import DependencyError, installing
+from fourbar.errors import DependencyError, say_install
 from fourbar.writing import write_text
 
 CHECKOUT = Path(__file__).parents[2]
@@ -22,14 +22,14 @@ TICK = 0.5
 """s, between two reports of progress."""
 
 
-def harness() -> list[str]:
+def find_harness() -> list[str]:
     """Return the command of the harness: installed, or of this checkout; DependencyError where there is none."""
     engines = all(importlib.util.find_spec(name) for name in ("mujoco", "pinocchio"))
     if engines and importlib.util.find_spec(HARNESS):
         return [sys.executable, "-m", HARNESS]
     if engines and (CHECKOUT / "validation" / "__main__.py").is_file():
         return [sys.executable, "-m", "validation"]
-    raise DependencyError(f"the harness with MuJoCo and Pinocchio is not installed: {installing('validation')}")
+    raise DependencyError(f"the harness with MuJoCo and Pinocchio is not installed: {say_install('validation')}")
 
 
 class HarnessRun:
@@ -65,7 +65,7 @@ class HarnessRun:
             self.tell({"check": {"seconds": time.monotonic() - began, "lines": lines[:SHOWN], **more}})
 
         try:
-            command = harness()
+            command = find_harness()
             self.folder.mkdir(parents=True, exist_ok=True)
             self.report.unlink(missing_ok=True)
             scene = self.folder / "scene.toml"

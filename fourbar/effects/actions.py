@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, anywhere, cross, sign
+from fourbar.formulas.arithmetic import Number, cross, is_any, sign
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies, Body, Wrenches
 from fourbar.linkage import PINS, FourBar
@@ -14,7 +14,7 @@ AT_REST = 50.0 * 2.0**-52
 """A slip below this part of the input's coefficient and of those it is made of is what rounding leaves of zero."""
 
 
-def bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
+def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
     """Of bars 2, 3, 4 of a linkage, with the inertia that effects (a flywheel) add."""
     own = [Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving]
     for effect in effects:
@@ -23,7 +23,7 @@ def bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
     return own[0], own[1], own[2]
 
 
-def as_it_is(number: Number, *, turned: bool = False) -> Number:
+def keep_number(number: Number, *, turned: bool = False) -> Number:
     """Return the number itself."""
     return number
 
@@ -42,7 +42,7 @@ class Actions:
     """
 
     def __init__(
-        self, state: State, bodies: Bodies, side: Number = 0, rounded: Callable[..., Number] = as_it_is
+        self, state: State, bodies: Bodies, side: Number = 0, rounded: Callable[..., Number] = keep_number
     ) -> None:
         self.state, self.bodies, self.side, self.rounded = state, bodies, side, rounded
         self.forces: dict[int, Any] = {}
@@ -113,7 +113,7 @@ class Actions:
         moves turns in either sense.
         """
         slip, turning = self.state.slip(pin), self.turning(pin)
-        if not anywhere(self.side != 0):
+        if not is_any(self.side != 0):
             return turning * sign(slip * self.state.speed)
         moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
         return np.where(np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving)

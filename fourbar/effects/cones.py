@@ -43,7 +43,7 @@ def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
     count = np.full(n, ONE, dtype=np.uint8)
     if p == 1:
         with np.errstate(invalid="ignore", divide="ignore"):
-            x[:, 0], found = _quadratic(F[:, 0], C[:, 0, 0], k[:, 0])
+            x[:, 0], found = _solve_quadratic(F[:, 0], C[:, 0, 0], k[:, 0])
         count[known] = found[known]
     else:
         K = k[:, :, None] * np.hypot(C[..., 0], C[..., 1])
@@ -55,9 +55,9 @@ def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
             x[index], count[index] = _search(F[index], C[index], k[index])
     with np.errstate(invalid="ignore"):
         for _ in range(2):  # takes back the rounding of the search and of the quadratic
-            right, slope = _right_side(F, C, k, x)
-            x = x + newton_step(right - x, slope)
-        _, slope = _right_side(F, C, k, x)
+            right, slope = _compute_right_side(F, C, k, x)
+            x = x + compute_step(right - x, slope)
+        _, slope = _compute_right_side(F, C, k, x)
     matrix = np.eye(p) - slope
     far = np.ones(n)
     usable = np.isfinite(matrix).all(axis=(1, 2))
@@ -65,7 +65,7 @@ def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
     return Sliding(x, count, far)
 
 
-def _quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
+def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     """(k^2 |C|^2 - 1) x^2 + 2 k^2 F.C x + k^2 |F|^2 = 0."""
     c2 = k * np.hypot(C[:, 0], C[:, 1])
     a = (c2 - 1.0) * (c2 + 1.0)
@@ -87,7 +87,7 @@ def _quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
     return x, count
 
 
-def _right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, Array]:
+def _compute_right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, Array]:
     """Compute k |F + C x| and its derivative, (n, p) and (n, p, p)."""
     force = F + np.einsum("npqi,nq->npi", C, x)
     size = np.hypot(force[..., 0], force[..., 1])
@@ -95,7 +95,7 @@ def _right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, Array]:
     return k * size, k[..., None] * np.einsum("npi,npqi->npq", unit, C)
 
 
-def newton_step(gap: Array, slope: Array) -> Array:
+def compute_step(gap: Array, slope: Array) -> Array:
     """(1 - slope) step = gap, zero where that cannot be solved, (n, p)."""
     matrix = np.eye(gap.shape[1]) - slope
     usable = np.asarray(np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(gap).all(axis=1))
@@ -109,10 +109,10 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
     """Newton's step where it lessens the gap, else the plain one of the contraction."""
     done = np.zeros(len(x), dtype=bool)
     for _ in range(STEPS):
-        right, slope = _right_side(F, C, k, x)
-        newton = np.maximum(x + newton_step(right - x, slope), 0.0)
-        plain_gap = np.abs(_right_side(F, C, k, right)[0] - right).max(axis=1)
-        newton_gap = np.abs(_right_side(F, C, k, newton)[0] - newton).max(axis=1)
+        right, slope = _compute_right_side(F, C, k, x)
+        newton = np.maximum(x + compute_step(right - x, slope), 0.0)
+        plain_gap = np.abs(_compute_right_side(F, C, k, right)[0] - right).max(axis=1)
+        newton_gap = np.abs(_compute_right_side(F, C, k, newton)[0] - newton).max(axis=1)
         new = np.where((newton_gap < plain_gap)[:, None], newton, right)
         new = np.where(done[:, None], x, new)  # what others need changes no digit of this one
         done |= np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING * new.max(axis=1, initial=0.0)
@@ -133,9 +133,9 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, int]:
     x = np.vstack([np.zeros((1, p)), starts])
     all_F, all_C, all_k = (np.broadcast_to(one, (len(x), *one.shape)) for one in (F, C, k))
     for _ in range(60):
-        right, slope = _right_side(all_F, all_C, all_k, x)
-        x = np.clip(x + newton_step(right - x, slope), 0.0, 1e12 * size)
-    right, _ = _right_side(all_F, all_C, all_k, x)
+        right, slope = _compute_right_side(all_F, all_C, all_k, x)
+        x = np.clip(x + compute_step(right - x, slope), 0.0, 1e12 * size)
+    right, _ = _compute_right_side(all_F, all_C, all_k, x)
     found = x[np.abs(right - x).max(axis=1) <= 1e-9 * np.maximum(x.max(axis=1), size)]
     distinct: list[Array] = []
     for each in found[np.argsort(found.sum(axis=1))]:

@@ -5,8 +5,8 @@ from typing import ClassVar
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import checked
-from fourbar.formulas.arithmetic import anywhere
+from fourbar.effects.pins import check_rows
+from fourbar.formulas.arithmetic import is_any
 from fourbar.formulas.motion import State
 
 
@@ -23,7 +23,7 @@ class Friction(Effect):
     dry: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "torques", checked("friction", self.torques))
+        object.__setattr__(self, "torques", check_rows("friction", self.torques))
 
     @classmethod
     def at(cls, **torques: float) -> "Friction":
@@ -33,7 +33,7 @@ class Friction(Effect):
     @property
     def dry_pins(self) -> tuple[str, ...]:
         """The pins at which it acts."""
-        return tuple(pin for pin, f in self.torques if anywhere(f != 0.0))
+        return tuple(pin for pin, f in self.torques if is_any(f != 0.0))
 
     def act(self, actions: Actions, state: State) -> None:
         """M on bar j = -f sign(omega_j - omega_i), its opposite on bar i."""

@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.numbers import OF_EFFECT
-from fourbar.formulas.arithmetic import anywhere, namespace, polar, vector
+from fourbar.formulas.arithmetic import is_any, namespace, polar, vector
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, require
 
@@ -46,5 +46,5 @@ class Gravity(Effect):
         """F = m g at G."""
         field = self.field
         for number, body in zip(MOVING_BARS, actions.bodies, strict=True):
-            if anywhere(body.m != 0.0):
+            if is_any(body.m != 0.0):
                 actions.force(number, body.m * field, body.z * state.direction(number))

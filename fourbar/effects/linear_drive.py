@@ -12,10 +12,10 @@ which is of the same form, with (theta_2', theta_3', theta_4') = (sin(theta_4 - 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fourbar.effects.actions import Actions, as_it_is
+from fourbar.effects.actions import Actions, keep_number
 from fourbar.effects.spring import COINCIDE, SpringEnd, require_ends
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import Number, anywhere, dot, namespace
+from fourbar.formulas.arithmetic import Number, dot, is_any, namespace
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.linkage import ENDS, MOVING_BARS, PINS, FourBar
@@ -54,11 +54,11 @@ class LinearDrive:
 
     def require_stroke(self, linkage: FourBar) -> None:
         """InputError where no motion changes the distance of the ends: a bar holds both, or the pins that they are."""
-        if common := _bars(linkage, self.start) & _bars(linkage, self.end):
+        if common := _list_bars(linkage, self.start) & _list_bars(linkage, self.end):
             allowed = f"keeps its distance from `from` at every position: bar {min(common)} holds both"
             raise InputError("drive.to", f"bar {self.end.bar} at {self.end.distance:g} m", allowed)
 
-    def line(self, state: State, rounded: Callable[..., Number] = as_it_is) -> tuple[Number, Number]:
+    def line(self, state: State, rounded: Callable[..., Number] = keep_number) -> tuple[Number, Number]:
         """Compute the stroke, m, and the unit vector from `start` to `end`, no number where they coincide."""
         start, end = (rounded(point.place(state)) for _, point in self.ends)
         across = end - start
@@ -107,13 +107,13 @@ class LinearDrive:
         stroke, (lever, most) = self.line(state)[0], self.leverage(state, sines)
         away = sum(state.lengths[:4]) + abs(self.start.distance) + abs(self.end.distance)
         none, meet = abs(lever) * stroke <= NO_DIGIT_LEFT * most * away, stroke <= COINCIDE * away
-        if not anywhere(none | meet):
+        if not is_any(none | meet):
             return None
         xp = namespace(meet)
         return xp.where(meet, NO_DIRECTION, xp.where(none, NO_LEVER, OK))
 
 
-def _bars(linkage: FourBar, point: SpringEnd) -> set[int]:
+def _list_bars(linkage: FourBar, point: SpringEnd) -> set[int]:
     """Bars that hold a point: its own, and at one of its pins the other one too."""
     length = linkage.lengths[point.bar - 1]
     places = zip({1: ("O2", "O4"), **ENDS}[point.bar], (0.0, length), strict=True)

@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import angle, anywhere, namespace, nearest, polar, two_sum
+from fourbar.formulas.arithmetic import angle, is_any, namespace, nearest, polar, split_sum
 from fourbar.formulas.motion import State
 from fourbar.linkage import FourBar, require, require_bar, require_numbers
 
@@ -68,19 +68,19 @@ class Table:
         place = first + xp.remainder(angle(polar(1.0, theta_2)) - first, TURN)
         points, factors = np.array(self.theta_2), np.array(self.factor)
         if xp is np:
-            place = self._covered(place)
+            place = self._require_covered(place)
             k = np.searchsorted(points, place, "right") - 1
         else:  # what no library lacks, under no transformation of its own
             points, factors = (xp.asarray(row, dtype=place.dtype) for row in (self.theta_2, self.factor))
             k = xp.sum(xp.astype(place[..., None] >= points, xp.int32), axis=-1) - 1
         k = xp.clip(k, 0, len(self.theta_2) - 2)
-        away, lost = two_sum(theta_2, -points[k])
+        away, lost = split_sum(theta_2, -points[k])
         rest = xp.fmod(away, TURN)
         turns = nearest((theta_2 - place) / TURN)
         past = rest + (nearest((away - rest) / TURN) - turns) * TURN + (lost - turns * BEYOND_TURN)
         return factors[k], xp.diff(factors)[k] * (past / xp.diff(points)[k])
 
-    def _covered(self, place: Any) -> Any:
+    def _require_covered(self, place: Any) -> Any:
         """Return angles within a turn from the first, or raise an InputError for one that the table does not cover."""
         first, last = self.theta_2[0], self.theta_2[-1]
         beyond = place > last + 1e-12 * TURN
@@ -146,7 +146,7 @@ class Load(Effect):
             if self.frame == "bar":
                 force, arm = force * u, arm * u
             actions.force(self.bar, factor * force, to_G + arm)
-        if anywhere(self.moment != 0.0):
+        if is_any(self.moment != 0.0):
             actions.moment(self.bar, factor * self.moment)
 
     def greatest_force(self, linkage: FourBar) -> float:

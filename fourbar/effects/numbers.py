@@ -36,7 +36,7 @@ OF_SCENE = {
 """Unit of each other number by the last word of its key, of a pair that of its magnitude."""
 
 
-def unit_of(key: str) -> str | None:
+def find_unit(key: str) -> str | None:
     """Return the unit of the number that a key of a scene file names; None where no scene has such a number."""
     *before, name = key.split(".")
     numbers = OF_EFFECT.get(before[1], {}) if before[:1] == ["effects"] and len(before) > 1 else {}

@@ -9,9 +9,9 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.cones import NONE, ONE, solve_sliding
 from fourbar.effects.effect import Effect, SolvedFriction
-from fourbar.effects.pins import checked, rows_of
+from fourbar.effects.pins import check_rows, make_rows
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import anywhere
+from fourbar.formulas.arithmetic import is_any
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import JAMMED, OK, SEVERAL
@@ -32,7 +32,7 @@ class PinFriction(Effect):
     dry: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        rows = checked("pin_friction", self.pins)
+        rows = check_rows("pin_friction", self.pins)
         if not rows:
             raise InputError("effects.pin_friction", {}, "must name at least one pin")
         object.__setattr__(self, "pins", rows)
@@ -40,12 +40,12 @@ class PinFriction(Effect):
     @classmethod
     def at(cls, **pins: tuple[float, float]) -> "PinFriction":
         """``PinFriction.at(A=(mu, radius))``."""
-        return cls(rows_of(pins))
+        return cls(make_rows(pins))
 
     @property
     def loaded_pins(self) -> tuple[str, ...]:
         """The pins whose forces it depends on."""
-        return tuple(pin for pin, mu, r in self.pins if anywhere(mu * r != 0.0))
+        return tuple(pin for pin, mu, r in self.pins if is_any(mu * r != 0.0))
 
     @property
     def dry_pins(self) -> tuple[str, ...]:

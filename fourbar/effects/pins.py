@@ -8,7 +8,7 @@ from fourbar.errors import InputError, expect
 from fourbar.linkage import PINS, require
 
 
-def required(key: str, value: object, number: tuple[str, str]) -> float:
+def require_number(key: str, value: object, number: tuple[str, str]) -> float:
     """Return a number of an effect as a float, or raise an InputError.
 
     Parameters
@@ -19,12 +19,12 @@ def required(key: str, value: object, number: tuple[str, str]) -> float:
     return require(key, value, unit, positive=bound == POSITIVE, at_least_zero=bound == AT_LEAST_ZERO)
 
 
-def rows_of(values: Mapping[str, Any]) -> tuple[Any, ...]:
+def make_rows(values: Mapping[str, Any]) -> tuple[Any, ...]:
     """Rows from the numbers by pin, to be checked."""
     return tuple((pin, *(value if isinstance(value, (tuple, list)) else (value,))) for pin, value in values.items())
 
 
-def checked(effect: str, rows: object) -> tuple[Any, ...]:
+def check_rows(effect: str, rows: object) -> tuple[Any, ...]:
     """Return the rows of an effect in the order of the pins, each number within its bound, or raise InputError."""
     key, numbers = f"effects.{effect}", OF_EFFECT[effect]
     expect(key, rows, tuple, list)
@@ -36,5 +36,8 @@ def checked(effect: str, rows: object) -> tuple[Any, ...]:
         if pin not in PINS or pin in found:
             raise InputError(f"{key}.{pin}", row[1:], f"the pins are {', '.join(PINS)}, each once")
         given = zip(numbers.items(), values, strict=True)
-        found[pin] = (pin, *(required(f"{key}.{pin}.{name}".rstrip("."), value, of) for (name, of), value in given))
+        found[pin] = (
+            pin,
+            *(require_number(f"{key}.{pin}.{name}".rstrip("."), value, of) for (name, of), value in given),
+        )
     return tuple(found[pin] for pin in PINS if pin in found)

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING
-from fourbar.effects.pins import required
+from fourbar.effects.pins import require_number
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import anywhere, namespace, polar, select
+from fourbar.formulas.arithmetic import is_any, namespace, polar, select
 from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, FourBar, require, require_whole
 from fourbar.quantities import NO_DIRECTION, OK
@@ -84,7 +84,7 @@ class Spring:
         for name, point in zip(("start", "end"), require_ends("effects.springs", self.start, self.end), strict=True):
             object.__setattr__(self, name, point)
         for name, of in OF_EFFECT["springs"].items():
-            object.__setattr__(self, name, required(f"effects.springs.{name}", getattr(self, name), of))
+            object.__setattr__(self, name, require_number(f"effects.springs.{name}", getattr(self, name), of))
 
     @classmethod
     def gas(
@@ -109,7 +109,7 @@ class Spring:
         """
         key, last = "effects.springs.gas", extended_force if compressed_force is None else compressed_force
         given = zip(OF_GAS_SPRING.items(), (extended, stroke, extended_force, last), strict=True)
-        extended, stroke, first, last = (required(f"{key}.{name}", value, of) for (name, of), value in given)
+        extended, stroke, first, last = (require_number(f"{key}.{name}", value, of) for (name, of), value in given)
         if stroke >= extended:
             raise InputError(f"{key}.stroke", stroke, f"must be less than the extended length, {extended:.6g} m")
         if last < first:
@@ -149,7 +149,7 @@ class Springs(Effect):
         for spring in self.springs:
             start, end = (actions.rounded(point.place(state)) for point in (spring.start, spring.end))
             across = end - start
-            force = _per_distance(spring, across, actions) * across
+            force = _divide_by_distance(spring, across, actions) * across
             for point, sign in ((spring.start, 1.0), (spring.end, -1.0)):
                 actions.force(point.bar, sign * force, point.arm(state))
 
@@ -157,7 +157,7 @@ class Springs(Effect):
         """NO_DIRECTION where the two points of a spring with slack coincide."""
         codes = None
         for spring in self.springs:
-            if not anywhere(spring.slack != 0.0):
+            if not is_any(spring.slack != 0.0):
                 continue
             across = spring.end.place(state) - spring.start.place(state)
             away = sum(state.lengths[:4]) + abs(spring.start.distance) + abs(spring.end.distance)
@@ -166,9 +166,9 @@ class Springs(Effect):
         return codes
 
 
-def _per_distance(spring: Spring, across: Any, actions: Actions) -> Any:
+def _divide_by_distance(spring: Spring, across: Any, actions: Actions) -> Any:
     """Tension over distance, N/m."""
-    if not anywhere(spring.slack != 0.0):
+    if not is_any(spring.slack != 0.0):
         return spring.stiffness
     distance = actions.rounded(namespace(across).abs(across))
     slack = spring.preload - actions.rounded(spring.stiffness * spring.length)

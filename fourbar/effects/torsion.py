@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import checked, rows_of
+from fourbar.effects.pins import check_rows, make_rows
 from fourbar.errors import expect
 from fourbar.formulas.arithmetic import Number, conjugate, namespace, nearest
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES
-from fourbar.formulas.position import lengths_read_from
+from fourbar.formulas.position import reorder_lengths
 from fourbar.linkage import PINS
 from fourbar.quantities import OK, WOUND
 from fourbar.solution import Array
@@ -42,12 +42,12 @@ class Torsion(Effect):
 
     def __post_init__(self) -> None:
         expect("effects.torsion.turns", self.turns, type(None))
-        object.__setattr__(self, "springs", checked("torsion", self.springs))
+        object.__setattr__(self, "springs", check_rows("torsion", self.springs))
 
     @classmethod
     def at(cls, **springs: tuple[float, float, float]) -> "Torsion":
         """``Torsion.at(B=(stiffness, rest, preload))``."""
-        return cls(rows_of(springs))
+        return cls(make_rows(springs))
 
     @property
     def greatest_couple(self) -> float:
@@ -60,11 +60,14 @@ class Torsion(Effect):
             i, j = PINS[pin]
             turned = state.direction(j) * conjugate(state.direction(i))
             angle = actions.rounded(namespace(turned).atan2(turned.imag, turned.real))
-            actions.couple(pin, -(preload + k * _wound(actions.rounded(angle - rest))))
+            actions.couple(pin, -(preload + k * _wrap_angle(actions.rounded(angle - rest))))
 
     def counted_from(self, start: State, branch: Number) -> "Torsion":
         """Whole turns counted where the motion begins."""
-        away = [angle - rest for angle, (_, _, rest, _) in zip(self._along(start, branch), self.springs, strict=True)]
+        away = [
+            angle - rest
+            for angle, (_, _, rest, _) in zip(self._follow_angles(start, branch), self.springs, strict=True)
+        ]
         counted = copy(self)  # a constructor checks what a user gives, one number at a time
         turns = tuple(math.tau * np.floor(angle / math.tau + 0.5) for angle in away)
         object.__setattr__(counted, "turns", turns)
@@ -75,35 +78,37 @@ class Torsion(Effect):
         if self.turns is None or branch is None:
             return None
         wound = np.zeros(np.shape(state.theta_2), dtype=bool)
-        for angle, turns, (_, _, rest, _) in zip(self._along(state, branch), self.turns, self.springs, strict=True):
+        for angle, turns, (_, _, rest, _) in zip(
+            self._follow_angles(state, branch), self.turns, self.springs, strict=True
+        ):
             wound |= np.abs(angle - rest - turns) > HALF_TURN
         return np.where(wound, WOUND, OK).astype(np.uint8)
 
-    def _along(self, state: State, branch: Number) -> list[Array]:
+    def _follow_angles(self, state: State, branch: Number) -> list[Array]:
         """theta_j - theta_i of each sprung pin, continuous in the commanded angle on one branch."""
-        angles = _continuous(state, branch)
+        angles = _remove_jumps(state, branch)
         return [angles[PINS[pin][1]] - angles[PINS[pin][0]] for pin, *_ in self.springs]
 
 
-def _continuous(state: State, branch: Number) -> dict[int, Number]:
+def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     """theta_1 .. theta_4 without jumps at a whole turn, on one branch, as the loop is read from the commanded bar.
 
     The diagonal from A to O4 swings about the ground's line where a < d, and otherwise about the input's, never by
     more than a quarter turn; bars 3 and 4 make angles with it that stay between 0 and half a turn.
     """
     bar, theta_1, theta_2 = state.bar, state.theta_1, state.theta_2 if state.q is None else state.q
-    d, a, *_ = lengths_read_from(bar, state.lengths[:4])
+    d, a, *_ = reorder_lengths(bar, state.lengths[:4])
     turned = math.pi if bar == 4 else 0.0  # of the ground, and with it of the coupler
     u2, u3, u4 = (state.direction(each) for each in ROLES[bar])
     theta_3, theta_4 = np.angle(u3) + turned, np.angle(u4)
     theta_1 = theta_1 + turned
     phi = np.angle(state.at.diagonal if bar == 2 else d * np.exp(1j * theta_1) - a * u2)
     line = np.where(a < d, theta_1, theta_2 + math.pi)
-    phi = line + _wound(phi - line)
+    phi = line + _wrap_angle(phi - line)
 
     def beyond(angle: Number) -> Number:
         """Wrap the angle into half a turn, or as far outside as rounding puts it."""
-        return _wound(angle - 0.5 * math.pi) + 0.5 * math.pi
+        return _wrap_angle(angle - 0.5 * math.pi) + 0.5 * math.pi
 
     own = (
         theta_2,
@@ -113,6 +118,6 @@ def _continuous(state: State, branch: Number) -> dict[int, Number]:
     return {1: np.full_like(theta_2, theta_1 - turned), **dict(zip(ROLES[bar], own, strict=True))}
 
 
-def _wound(angle: Number) -> Number:
+def _wrap_angle(angle: Number) -> Number:
     """Wrap the angle into [-pi, pi]; an angle that lies there stays as it is."""
     return angle - math.tau * nearest(angle / math.tau)

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.pins import checked
+from fourbar.effects.pins import check_rows
 from fourbar.formulas.motion import State
 
 
@@ -17,7 +17,7 @@ class Viscous(Effect):
     key: ClassVar[str] = "viscous"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", checked("viscous", self.coefficients))
+        object.__setattr__(self, "coefficients", check_rows("viscous", self.coefficients))
 
     @classmethod
     def at(cls, **coefficients: float) -> "Viscous":

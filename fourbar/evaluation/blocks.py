@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, installing
+from fourbar.errors import DependencyError, say_install
 from fourbar.evaluation.case import BLOCK, Case, Evaluated
-from fourbar.evaluation.stages import ERROR, FORCE, Part, commanded
-from fourbar.evaluation.withheld import withheld
+from fourbar.evaluation.stages import ERROR, FORCE, Part, evaluate_command
+from fourbar.evaluation.withheld import withhold_in_place
 from fourbar.quantities import is_scalar
 from fourbar.solution import Array
 
@@ -22,7 +22,7 @@ WORTH_COMPILING = 2_000_000
 PARTS_FOR_THREADS = 4
 
 
-def positions_at_once(wanted: int) -> int:
+def choose_block_size(wanted: int) -> int:
     """Of a stage: for the error bars each position is evaluated many times."""
     if wanted < ERROR:
         return BLOCK
@@ -32,37 +32,37 @@ def positions_at_once(wanted: int) -> int:
 
 
 def is_compiled(case: Case, wanted: int, count: int, compiled: bool | None) -> bool:
-    """Whether some positions go through the compiled loop; for the parameters see `solve` and `commanded`."""
+    """Whether some positions go through the compiled loop; for the parameters see `solve` and `evaluate_command`."""
     if compiled is False or wanted < FORCE:
         return False
-    if compiled is None and count * (BLOCK // positions_at_once(wanted)) < WORTH_COMPILING:
+    if compiled is None and count * (BLOCK // choose_block_size(wanted)) < WORTH_COMPILING:
         return False
     if not find_spec("numba"):
         if compiled is None:
             return False
-        raise DependencyError(f"compiled=True needs numba, which is not installed: {installing('fast')}")
-    from fourbar.evaluation.compiled_case import carries
+        raise DependencyError(f"compiled=True needs numba, which is not installed: {say_install('fast')}")
+    from fourbar.evaluation.compiled_case import can_carry
 
-    return carries(case)
+    return can_carry(case)
 
 
-def evaluation(quick: bool) -> Callable[..., Evaluated]:
+def choose_evaluation(quick: bool) -> Callable[..., Evaluated]:
     """Of some positions, by the compiled loop or by NumPy."""
     if not quick:
-        return commanded
-    from fourbar.evaluation.compiled_case import evaluated
+        return evaluate_command
+    from fourbar.evaluation.compiled_case import evaluate_compiled
 
-    return evaluated
+    return evaluate_compiled
 
 
-def threads() -> int:
+def count_threads() -> int:
     """As many as this process may use cores, or as OMP_NUM_THREADS states."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     stated = os.environ.get("OMP_NUM_THREADS", "")
     return min(cores, int(stated)) if stated.isdecimal() and int(stated) else cores
 
 
-def each(evaluate: Callable[[Any], Any], parts: Iterable[Any], *, at_once: bool) -> None:
+def evaluate_parts(evaluate: Callable[[Any], Any], parts: Iterable[Any], *, at_once: bool) -> None:
     """Evaluate the parts, one after the other or on all cores: compiled code holds no lock of the interpreter."""
 
     def quietly(part: Any) -> Any:
@@ -77,7 +77,7 @@ def each(evaluate: Callable[[Any], Any], parts: Iterable[Any], *, at_once: bool)
             break
     del found
     rest = list(parts)
-    if len(rest) < PARTS_FOR_THREADS or (cores := threads()) == 1:
+    if len(rest) < PARTS_FOR_THREADS or (cores := count_threads()) == 1:
         for part in rest:
             quietly(part)
         return
@@ -105,7 +105,7 @@ def keep(
     """
     codes, values, _ = found
     if not seen:
-        withheld(case, found)
+        withhold_in_place(case, found)
     code[part] = codes if shape is None else codes.reshape(shape)
     for name, value in values.items():
         if shape is not None and np.ndim(value):

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, as_it_is, bodies
+from fourbar.effects.actions import Actions, keep_number, list_bodies
 from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import LimitError
-from fourbar.formulas.arithmetic import angle, anywhere, polar, select, vector
+from fourbar.formulas.arithmetic import angle, is_any, polar, select, vector
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import Path, path
+from fourbar.formulas.path import Path, prepare_path
 from fourbar.formulas.pin_forces import (
     Bodies,
     PinForces,
@@ -53,28 +53,28 @@ Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
 """Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
 
 
-def changed(value: Any, change: Callable[[Any], Any]) -> Any:
+def change_numbers(value: Any, change: Callable[[Any], Any]) -> Any:
     """Change each float and array of a value, in tuples and dataclasses too; all else stays."""
     if isinstance(value, (float, np.ndarray)):
         return change(value)
     if isinstance(value, tuple):
-        parts = [changed(part, change) for part in value]
+        parts = [change_numbers(part, change) for part in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-    if not (names := _fields(value.__class__)):
+    if not (names := _list_fields(value.__class__)):
         return value
     other = object.__new__(type(value))  # a constructor checks what a user gives, one number at a time
     for name in names:
-        object.__setattr__(other, name, changed(getattr(value, name), change))
+        object.__setattr__(other, name, change_numbers(getattr(value, name), change))
     return other
 
 
 @cache
-def _fields(of: type) -> tuple[str, ...]:
+def _list_fields(of: type) -> tuple[str, ...]:
     """Of a dataclass whose numbers may be changed."""
     return tuple(field.name for field in fields(of)) if is_dataclass(of) and not getattr(of, "as_given", False) else ()
 
 
-def undecided(factor: Any, constant: Any, size: Any, part: float = UNDECIDED) -> Any:
+def find_undecided(factor: Any, constant: Any, size: Any, part: float = UNDECIDED) -> Any:
     """Where doubles cannot decide the sign of a factor of Heron's formula, the constant and 4 a d times a square."""
     return (constant < 0.0) & (abs(factor) < part * (abs(constant) + size))
 
@@ -110,11 +110,13 @@ class Case(NamedTuple):
     def of(cls, scene: Scene, bar: int = 2) -> "Case":
         """Collect the numbers that stay the same over the positions, for a command of bar 2, 3 or 4."""
         terms, linkage = (*scene.loads, *scene.effects), scene.linkage
-        own = path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
+        own = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
         square = own.unit * own.unit
         lengths = Loop(*linkage.lengths, own.lengths.E1 * square, own.lengths.E2 * square)
         points = tuple((point.name, point.bar, polar(*point.from_pin)) for point in scene.points)
-        return cls(linkage, lengths, bodies(linkage, terms), terms, scene.drive_bar, own, points, drive=scene.drive)
+        return cls(
+            linkage, lengths, list_bodies(linkage, terms), terms, scene.drive_bar, own, points, drive=scene.drive
+        )
 
     @property
     def names(self) -> DriveNames:
@@ -192,21 +194,21 @@ class Case(NamedTuple):
         close: Any = remainder is not None
         if remainder is None:
             for factor, constant in ((half.outer, lengths.E1), (half.inner, lengths.E2)):
-                if anywhere(constant < 0.0):  # else it is a sum of two positive terms
-                    close = close | undecided(factor, constant, 4.0 * lengths.a * lengths.d)
-        if not anywhere(close):
+                if is_any(constant < 0.0):  # else it is a sum of two positive terms
+                    close = close | find_undecided(factor, constant, 4.0 * lengths.a * lengths.d)
+        if not is_any(close):
             return half, NOWHERE
-        from fourbar.formulas.many_digits import decided
+        from fourbar.formulas.many_digits import decide_half_angles
 
         index = np.flatnonzero(np.broadcast_to(close, np.shape(q)))
-        half = decided(self.linkage, self.path.unit, half, index, q, remainder, self.path.bar)
+        half = decide_half_angles(self.linkage, self.path.unit, half, index, q, remainder, self.path.bar)
         return half, index
 
-    def _inertial(self, state: State, acceleration: Any) -> tuple[Any, Any]:
+    def _compute_inertial(self, state: State, acceleration: Any) -> tuple[Any, Any]:
         """J q'' + J'/2 q'^2 of all bars, and of bars 3 and 4."""
         a, at, k, square = self.lengths.a, state.at, state.k, state.speed * state.speed
         inertial = others = half_slope(a, self.bodies, at, k) * square
-        if anywhere(acceleration != 0.0):
+        if is_any(acceleration != 0.0):
             of_input, of_others = inertia(a, self.bodies, at, k)
             others = others + of_others * acceleration
             inertial = others + of_input * acceleration
@@ -215,7 +217,7 @@ class Case(NamedTuple):
         return inertial, others
 
     def dynamics(
-        self, state: State, acceleration: Any, side: Any = 0, rounded: Callable[..., Any] = as_it_is
+        self, state: State, acceleration: Any, side: Any = 0, rounded: Callable[..., Any] = keep_number
     ) -> Dynamics:
         """Compute pin forces and the drive under everything that acts; for the parameters see `Actions`.
 
@@ -228,13 +230,13 @@ class Case(NamedTuple):
         for term in self.terms:
             term.act(actions, state)
         own, mass_at_A = inertia_wrenches(a, self.bodies, at, state.moving)
-        inertial, others = self._inertial(state, acceleration)
-        if rounded is not as_it_is:
+        inertial, others = self._compute_inertial(state, acceleration)
+        if rounded is not keep_number:
             own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))
             inertial, others = rounded(inertial), rounded(others)
         driven = (self.drive_bar,) if self.drive is None else self.drive.apart
         sines = {bar: rounded(self.path.drive_sine(at, bar)) for bar in driven}
-        about_B, short = 0.0, anywhere(self.lengths.d < self.lengths.a)
+        about_B, short = 0.0, is_any(self.lengths.d < self.lengths.a)
         if 4 in sines:
             about_B = rounded(coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sines[4]))
         unit = None if self.drive is None else self.drive.per_newton(actions)
@@ -255,7 +257,7 @@ class Case(NamedTuple):
                 return apart(self.drive_bar, acting, with_inertia)
             pushed = acting.plus(unit, driving_torque(by, inertial if with_inertia else 0.0, acting.work()[0]))
             found = {bar: apart(bar, pushed, with_inertia) for bar in driven}
-            return found[driven[0]] if len(driven) == 1 else steadiest(sines, found)
+            return found[driven[0]] if len(driven) == 1 else take_steadiest(sines, found)
 
         solved = SolvedFriction(eliminate(actions))
         for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
@@ -280,7 +282,7 @@ class Case(NamedTuple):
         return low, high, np.any(jammed, axis=0) if jammed else None
 
 
-def steadiest(sines: dict[int, Any], of: dict[int, PinForces]) -> PinForces:
+def take_steadiest(sines: dict[int, Any], of: dict[int, PinForces]) -> PinForces:
     """Of pin forces solved by the moments of two bars those of the pair with the greatest sine."""
     s2, s3, s4 = (abs(sines[bar]) for bar in MOVING_BARS)
     first, second = (s2 >= s3) & (s2 >= s4), s3 >= s4
@@ -288,7 +290,7 @@ def steadiest(sines: dict[int, Any], of: dict[int, PinForces]) -> PinForces:
     return PinForces(*(select(first, x, select(second, y, z)) for x, y, z in rows))
 
 
-def state_at(scene: Scene, at: Command) -> State:
+def compute_state(scene: Scene, at: Command) -> State:
     """Compute the positions of a command and their motion, for what shows them."""
     with np.errstate(all="ignore"):
         return Case.of(scene, at.bar).at(at)

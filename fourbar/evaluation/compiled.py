@@ -16,17 +16,17 @@ import numpy as np
 
 from fourbar.evaluation import case as cases
 from fourbar.evaluation import error_bars as bars
-from fourbar.evaluation.case import BLOCK, undecided
+from fourbar.evaluation.case import BLOCK, find_undecided
 from fourbar.evaluation.error_bars import (
     EVALUATIONS,
-    bar,
-    rounded_coefficients,
-    rounded_half_angle,
-    rounded_real,
+    compute_bar,
+    round_coefficients,
+    round_half_angle,
+    round_real,
 )
 from fourbar.formulas import arithmetic, motion, path, pin_forces, position, torque
-from fourbar.formulas.arithmetic import anywhere, conjugate, cross, divisor, select, square_root, vector
-from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates, with_sines_of_rates
+from fourbar.formulas.arithmetic import conjugate, cross, divisor, is_any, select, square_root, vector
+from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates, take_sines_of_rates
 from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine_of_triangle
 from fourbar.formulas.pin_forces import Body, PinForces, Wrenches, coupler_about_B, inertia_wrenches
 from fourbar.formulas.pin_forces import pin_forces as pin_forces_of
@@ -56,7 +56,7 @@ def number(rows: Any, row: int, i: int) -> Any:
     return rows[row * BLOCK + i] if isinstance(rows, np.ndarray) else rows[row]
 
 
-def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
+def change_complex(z: Any, turned: Any, signs: Any, first: int) -> Any:
     """Change each part of a complex number by one of two signs; without signs nothing changes.
 
     A ground at an angle mixes the parts of every direction, and each carries the larger's.
@@ -67,20 +67,20 @@ def complex_rounded(z: Any, turned: Any, signs: Any, first: int) -> Any:
     if turned:
         size = np.maximum(np.abs(z.real), np.abs(z.imag))
         return z + vector(size * of_x, size * of_y)
-    return vector(rounded_real(z.real, of_x), rounded_real(z.imag, of_y))
+    return vector(round_real(z.real, of_x), round_real(z.imag, of_y))
 
 
-def real_rounded(x: Any, signs: Any, first: int) -> Any:
+def change_real(x: Any, signs: Any, first: int) -> Any:
     """Change a real number likewise."""
-    return x if signs is None else rounded_real(x, signs[first])
+    return x if signs is None else round_real(x, signs[first])
 
 
-def by_terms(x: Any, size: Any, signs: Any, first: int) -> Any:
+def change_by_terms(x: Any, size: Any, signs: Any, first: int) -> Any:
     """Change a sum by the last digit of its terms."""
     return x if signs is None else x + size * signs[first]
 
 
-def body_of(rows: Any, i: int, bar: int) -> Body:
+def find_body(rows: Any, i: int, bar: int) -> Body:
     """Bar 2, 3 or 4."""
     row = BODIES + OF_BODY * (bar - 2)
     z = vector(number(rows, row + 2, i), number(rows, row + 3, i))
@@ -91,54 +91,54 @@ def push_of(rows: Any, i: int, bar: int, z: Any, u: Any, turned: Any, signs: Any
     """Force of the loads on a bar (complex, N) and their moment about its first pin (N m)."""
     row, sign = LOADS + OF_LOADS * (bar - 2), 64 + 7 * (bar - 2)
     of_world, of_turning = number(rows, row + 5, i), number(rows, row + 6, i)
-    x = by_terms(number(rows, row, i), of_world, signs, sign)
-    y = by_terms(number(rows, row + 1, i), of_world, signs, sign + 1)
-    along = by_terms(number(rows, row + 2, i), of_turning, signs, sign + 2)
-    across = by_terms(number(rows, row + 3, i), of_turning, signs, sign + 3)
-    couple = by_terms(number(rows, row + 4, i), number(rows, row + 7, i), signs, sign + 4)
+    x = change_by_terms(number(rows, row, i), of_world, signs, sign)
+    y = change_by_terms(number(rows, row + 1, i), of_world, signs, sign + 1)
+    along = change_by_terms(number(rows, row + 2, i), of_turning, signs, sign + 2)
+    across = change_by_terms(number(rows, row + 3, i), of_turning, signs, sign + 3)
+    couple = change_by_terms(number(rows, row + 4, i), number(rows, row + 7, i), signs, sign + 4)
     force = vector(x, y) + vector(along, across) * u
-    return force, real_rounded(cross(z * u, force), signs, sign + 5) + couple
+    return force, change_real(cross(z * u, force), signs, sign + 5) + couple
 
 
-def viscous_of(rows: Any, i: int, pin: int, slip: Any, signs: Any) -> Any:
+def compute_viscous_couple(rows: Any, i: int, pin: int, slip: Any, signs: Any) -> Any:
     """Couple of a viscous pin."""
-    return real_rounded(-number(rows, VISCOUS + pin, i) * (slip * number(rows, 12, i)), signs, 60 + pin)
+    return change_real(-number(rows, VISCOUS + pin, i) * (slip * number(rows, 12, i)), signs, 60 + pin)
 
 
-def forces(
+def compute_forces(
     at: Position, k: Coefficients, moving: Rates, rows: Any, i: int, drive_bar: int, signs: Any
 ) -> tuple[PinForces, Any, Any]:
     """Compute pin forces, torque, and the sine of the drive, as `Case.dynamics` has them."""
-    (lengths, in_unit), turned = lengths_of(rows, i), at.u1.imag != 0.0
+    (lengths, in_unit), turned = read_lengths(rows, i), at.u1.imag != 0.0
     a, speed, acceleration = lengths.a, number(rows, 12, i), number(rows, 13, i)
-    two, three, four = body_of(rows, i, 2), body_of(rows, i, 3), body_of(rows, i, 4)
+    two, three, four = find_body(rows, i, 2), find_body(rows, i, 3), find_body(rows, i, 4)
     bodies = (two, three, four)
     w, mass_at_A = inertia_wrenches(a, bodies, at, moving)
     of_input, of_others = inertia(a, bodies, at, k)
     slope = half_slope(a, bodies, at, k) * (speed * speed)
     others = slope + of_others * acceleration
-    inertial = real_rounded(others + of_input * acceleration, signs, 53)
-    others = real_rounded(others, signs, 54)
-    sine = real_rounded(drive_sine_of_triangle(in_unit, at, drive_bar), signs, 55)
+    inertial = change_real(others + of_input * acceleration, signs, 53)
+    others = change_real(others, signs, 54)
+    sine = change_real(drive_sine_of_triangle(in_unit, at, drive_bar), signs, 55)
     P2, N2 = push_of(rows, i, 2, two.z, at.u2, turned, signs)
     P3, N3 = push_of(rows, i, 3, three.z, at.u3, turned, signs)
     P4, N4 = push_of(rows, i, 4, four.z, at.u4, turned, signs)
     slip_A = -k.h23
-    of_O2, of_A = viscous_of(rows, i, 0, k.h2, signs), viscous_of(rows, i, 1, slip_A, signs)
-    of_B, of_O4 = viscous_of(rows, i, 2, k.h43, signs), viscous_of(rows, i, 3, k.h4, signs)
+    of_O2, of_A = compute_viscous_couple(rows, i, 0, k.h2, signs), compute_viscous_couple(rows, i, 1, slip_A, signs)
+    of_B, of_O4 = compute_viscous_couple(rows, i, 2, k.h43, signs), compute_viscous_couple(rows, i, 3, k.h4, signs)
     Q = N3 * k.h3 + N4 * k.h4 + k.h2 * cross(a * at.u2, P3) + of_B * k.h43 + of_O4 * k.h4
     w = Wrenches(
-        complex_rounded(w.R2, turned, signs, 42) + P2,
-        complex_rounded(w.R3, turned, signs, 44) + P3,
-        complex_rounded(w.R4, turned, signs, 46) + P4,
-        real_rounded(w.M2, signs, 48) + N2 + of_O2 - of_A,
-        real_rounded(w.M3, signs, 49) + N3 + of_A,
-        real_rounded(w.M4, signs, 50) + N4 + of_O4,
+        change_complex(w.R2, turned, signs, 42) + P2,
+        change_complex(w.R3, turned, signs, 44) + P3,
+        change_complex(w.R4, turned, signs, 46) + P4,
+        change_real(w.M2, signs, 48) + N2 + of_O2 - of_A,
+        change_real(w.M3, signs, 49) + N3 + of_A,
+        change_real(w.M4, signs, 50) + N4 + of_O4,
         of_B,
     )
-    mass_at_A = vector(real_rounded(mass_at_A.real, signs, 51), real_rounded(mass_at_A.imag, signs, 52))
+    mass_at_A = vector(change_real(mass_at_A.real, signs, 51), change_real(mass_at_A.imag, signs, 52))
     if drive_bar == 4:
-        about_B = real_rounded(coupler_about_B(lengths, three, at, moving, sine), signs, 86)
+        about_B = change_real(coupler_about_B(lengths, three, at, moving, sine), signs, 86)
         moment = -(about_B + N3 - lengths.b * cross(at.u3, P3) + of_A - of_B)
     else:
         moment = Q + of_A * k.h3 - others
@@ -147,7 +147,7 @@ def forces(
     return pins, driving_torque(by, inertial, Q + of_A * slip_A + (N2 + of_O2) * k.h2), sine
 
 
-def thirteen(signs: Any, first: int) -> Any:
+def take_thirteen(signs: Any, first: int) -> Any:
     """Thirteen of the signs; with a slice of them the positions are evaluated one at a time, in thrice the time."""
     s, k = signs, first
     return (
@@ -156,7 +156,7 @@ def thirteen(signs: Any, first: int) -> Any:
     )
 
 
-def lengths_of(rows: Any, i: int) -> tuple[Loop, Loop]:
+def read_lengths(rows: Any, i: int) -> tuple[Loop, Loop]:
     """Read the lengths in m, and in their unit with E1 and E2."""
     in_unit = Loop(
         *(number(rows, 0, i), number(rows, 1, i), number(rows, 2, i), number(rows, 3, i)),
@@ -165,7 +165,9 @@ def lengths_of(rows: Any, i: int) -> tuple[Loop, Loop]:
     return Loop(number(rows, 6, i), number(rows, 7, i), number(rows, 8, i), number(rows, 9, i), 0.0, 0.0), in_unit
 
 
-def directions_of(in_unit: Loop, rows: Any, i: int, tangent: Any, of_theta_2: Any) -> tuple[Any, Any, Any, HalfAngle]:
+def compute_directions(
+    in_unit: Loop, rows: Any, i: int, tangent: Any, of_theta_2: Any
+) -> tuple[Any, Any, Any, HalfAngle]:
     """u1, u2, whether the ground is turned, and the half angle, from the tangents as of `run`."""
     u1, half = vector(number(rows, 10, i), number(rows, 11, i)), half_angle_of_tangent(in_unit, tangent)
     turned = u1.imag != 0.0
@@ -175,29 +177,31 @@ def directions_of(in_unit: Loop, rows: Any, i: int, tangent: Any, of_theta_2: An
     return u1, u2, turned, half
 
 
-def nearby(rows: Any, i: int, tangent: Any, of_theta_2: Any, drive_bar: int, signs: Any) -> tuple[PinForces, Any]:
+def change_position(
+    rows: Any, i: int, tangent: Any, of_theta_2: Any, drive_bar: int, signs: Any
+) -> tuple[PinForces, Any]:
     """Change every number of position i in its last digit, as `error_bars` does; compute pin forces and torque."""
-    lengths, in_unit = lengths_of(rows, i)
-    u1, u2, turned, half = directions_of(in_unit, rows, i, tangent, of_theta_2)
-    half = rounded_half_angle(in_unit, half, number(rows, 15, i), False, thirteen(signs, 2))
+    lengths, in_unit = read_lengths(rows, i)
+    u1, u2, turned, half = compute_directions(in_unit, rows, i, tangent, of_theta_2)
+    half = round_half_angle(in_unit, half, number(rows, 15, i), False, take_thirteen(signs, 2))
     u2 = select(turned, u2, vector(half.kk - half.ss, 2.0 * half.sk))
     near = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / in_unit.d)
     k = coefficients(in_unit, near)
-    near = with_sines_of_rates(in_unit, near, k)
+    near = take_sines_of_rates(in_unit, near, k)
     near = Position(
         u1,
-        complex_rounded(u2, turned, signs, 19),
-        complex_rounded(near.u3, turned, signs, 21),
-        complex_rounded(near.u4, turned, signs, 23),
-        rounded_real(near.sin_mu, signs[17]),
-        complex_rounded(near.diagonal, turned, signs, 0),
+        change_complex(u2, turned, signs, 19),
+        change_complex(near.u3, turned, signs, 21),
+        change_complex(near.u4, turned, signs, 23),
+        round_real(near.sin_mu, signs[17]),
+        change_complex(near.diagonal, turned, signs, 0),
         near.e2,
         near.root,
         half,
     )
-    k = rounded_coefficients(in_unit, near, k, thirteen(signs, 25))
+    k = round_coefficients(in_unit, near, k, take_thirteen(signs, 25))
     moving = rates(k, number(rows, 12, i), number(rows, 13, i))
-    pins, torque, _ = forces(near, k, moving, rows, i, drive_bar, signs)
+    pins, torque, _ = compute_forces(near, k, moving, rows, i, drive_bar, signs)
     return pins, torque
 
 
@@ -220,15 +224,15 @@ def run(tangents: Array, of_theta_2: Array, rows: Any, drive_bar: int, vectors: 
     """
     turns = len(of_theta_2) > 0
     for i in range(len(tangents)):
-        lengths, in_unit = lengths_of(rows, i)
-        u1, u2, _, half = directions_of(in_unit, rows, i, tangents[i], of_theta_2[i] if turns else np.nan)
+        lengths, in_unit = read_lengths(rows, i)
+        u1, u2, _, half = compute_directions(in_unit, rows, i, tangents[i], of_theta_2[i] if turns else np.nan)
         size = 4.0 * in_unit.a * in_unit.d
-        close = undecided(half.outer, in_unit.E1, size) or undecided(half.inner, in_unit.E2, size)
+        close = find_undecided(half.outer, in_unit.E1, size) or find_undecided(half.inner, in_unit.E2, size)
         at = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / in_unit.d)
         k = coefficients(in_unit, at)
-        at = with_sines_of_rates(in_unit, at, k)
+        at = take_sines_of_rates(in_unit, at, k)
         v = rates(k, number(rows, 12, i), number(rows, 13, i))
-        pins, torque, sine = forces(at, k, v, rows, i, drive_bar, None)
+        pins, torque, sine = compute_forces(at, k, v, rows, i, drive_bar, None)
         whole = at.sin_mu + v.omega_3 + v.omega_4 + v.alpha_3 + v.alpha_4 + torque + sine
         total = pins.F12 + pins.F32 + pins.F43 + pins.F14
         left = close or not np.abs(at.sin_mu) > NO_DIGIT_LEFT or not np.isfinite(whole + total.real + total.imag)
@@ -253,7 +257,7 @@ def scatter(
     scalars[10 * BLOCK :] = 0.0
     for each in range(EVALUATIONS):
         for i in range(n):
-            other, T = nearby(rows, i, tangents[i], of_theta_2[i] if turns else np.nan, drive_bar, signs[each])
+            other, T = change_position(rows, i, tangents[i], of_theta_2[i] if turns else np.nan, drive_bar, signs[each])
             scalars[10 * BLOCK + i] += square(T - scalars[5 * BLOCK + i])
             scalars[11 * BLOCK + i] += square(other.F12 - vectors[3 * BLOCK + i])
             scalars[12 * BLOCK + i] += square(other.F32 - vectors[4 * BLOCK + i])
@@ -265,35 +269,35 @@ def scatter(
             of_forces = max(of_forces, scalars[(11 + pin) * BLOCK + i])
             largest = max(largest, square(vectors[(3 + pin) * BLOCK + i]))
         largest = np.sqrt(largest)
-        scalars[8 * BLOCK + i] = bar(np.sqrt(scalars[10 * BLOCK + i] / EVALUATIONS), torque)
-        scalars[9 * BLOCK + i] = bar(np.sqrt(of_forces / EVALUATIONS), largest)
+        scalars[8 * BLOCK + i] = compute_bar(np.sqrt(scalars[10 * BLOCK + i] / EVALUATIONS), torque)
+        scalars[9 * BLOCK + i] = compute_bar(np.sqrt(of_forces / EVALUATIONS), largest)
         if not min(torque, largest) > SMALL or not max(torque, largest) < LARGE:
             scalars[7 * BLOCK + i] = 1.0
 
 
 LEAVES: tuple[tuple[Any, str], ...] = (
-    (arithmetic, "two_sum cross dot"),
-    (position, "direction_of_tangent half_angle_of_tangent with_factors close_loop"),
-    (motion, "side_may_turn_fast side_turns_fast coefficients with_sines_of_rates rates"),
-    (pin_forces, "about_first_pin inertia_wrenches coupler_about_B between pin_forces"),
+    (arithmetic, "split_sum cross dot"),
+    (position, "direction_of_tangent half_angle_of_tangent compute_factors close_loop"),
+    (motion, "may_turn_fast find_fast_turns coefficients take_sines_of_rates rates"),
+    (pin_forces, "about_first_pin inertia_wrenches coupler_about_B solve_between pin_forces"),
     (torque, "inertia half_slope driving_torque"),
     (path, "drive_sine_of_triangle"),
-    (cases, "undecided"),
-    (bars, "rounded_real rounded_half_angle rounded_coefficients bar"),
+    (cases, "find_undecided"),
+    (bars, "round_real round_half_angle round_coefficients compute_bar"),
 )
 """What is compiled as it stands."""
 OWN = (
-    complex_rounded,
-    real_rounded,
-    by_terms,
-    body_of,
+    change_complex,
+    change_real,
+    change_by_terms,
+    find_body,
     push_of,
-    viscous_of,
-    forces,
-    thirteen,
-    lengths_of,
-    directions_of,
-    nearby,
+    compute_viscous_couple,
+    compute_forces,
+    take_thirteen,
+    read_lengths,
+    compute_directions,
+    change_position,
     square,
 )
 
@@ -304,7 +308,7 @@ def make_known() -> None:
     from numba import types
     from numba.extending import overload, register_jitable
 
-    overload(anywhere)(lambda mask: lambda mask: bool(mask))  # noqa: PLW0108 - numba reads the names
+    overload(is_any)(lambda mask: lambda mask: bool(mask))  # noqa: PLW0108 - numba reads the names
     overload(select)(lambda mask, x, y: lambda mask, x, y: x if mask else y)
     overload(square_root)(lambda x: lambda x: np.sqrt(x))  # noqa: PLW0108
     overload(vector)(lambda x, y: lambda x, y: complex(x, y))  # noqa: PLW0108
@@ -321,7 +325,7 @@ def make_known() -> None:
 
 
 @cache
-def loop(function: Any, on_disk: bool = True) -> Any:
+def compile_loop(function: Any, on_disk: bool = True) -> Any:
     """Compile `run` or `scatter`; on the disk, where it can be written, for later processes until a source changes."""
     from numba import njit
 
@@ -336,4 +340,4 @@ def loop(function: Any, on_disk: bool = True) -> Any:
     try:
         return njit(compiled, nogil=True, error_model="numpy", cache=on_disk)
     except RuntimeError:  # no place to write to
-        return loop(function, False)
+        return compile_loop(function, False)

@@ -8,12 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Flywheel, Gravity, Load, Viscous
-from fourbar.evaluation.case import BLOCK, NO_MOTION, Case, Evaluated, changed
-from fourbar.evaluation.compiled import ROWS, loop, run, scatter
-from fourbar.evaluation.error_bars import signs
-from fourbar.evaluation.stages import ERROR, NO_HALF_ANGLE, Part, commanded, kinematics, piece, sign_of
-from fourbar.evaluation.withheld import all_finite, withheld
-from fourbar.formulas.arithmetic import anywhere, cross, polar, two_sum
+from fourbar.evaluation.case import BLOCK, NO_MOTION, Case, Evaluated, change_numbers
+from fourbar.evaluation.compiled import ROWS, compile_loop, run, scatter
+from fourbar.evaluation.error_bars import draw_signs
+from fourbar.evaluation.stages import (
+    ERROR,
+    NO_HALF_ANGLE,
+    Part,
+    evaluate_command,
+    find_sign,
+    list_kinematics,
+    take_piece,
+)
+from fourbar.evaluation.withheld import is_finite, withhold_in_place
+from fourbar.formulas.arithmetic import cross, is_any, polar, split_sum
 from fourbar.formulas.motion import Rates, State
 from fourbar.formulas.position import Position
 from fourbar.linkage import MOVING_BARS, PINS
@@ -60,13 +68,13 @@ class Loads(NamedTuple):
         return self._replace(couple=self.couple + factor * couple, of_couple=self.of_couple + size * np.abs(couple))
 
 
-def carries(case: Case) -> bool:
+def can_carry(case: Case) -> bool:
     """Whether the loop can evaluate a case."""
     plain = case.path.bar == 2 and case.drive is None and not case.path.may_stay_parallel
     return plain and all(type(term) in CARRIED for term in case.terms)
 
 
-def numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any) -> Any:
+def pack_numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any) -> Any:
     """Pack what `run` reads of a case and the motion of some positions: (ROWS,) numbers, or an array (ROWS BLOCK,).
 
     Lengths in their unit with E1 and E2; lengths, m; u1; omega_2, alpha_2, branch, what theta_2 - theta_1 loses;
@@ -95,7 +103,7 @@ def numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any)
     ]
     theta_1 = case.path.theta_1
     u1 = polar(1.0, theta_1)
-    lost = two_sum(theta_2, -theta_1)[1] if anywhere(theta_1 != 0.0) else 0.0
+    lost = split_sum(theta_2, -theta_1)[1] if is_any(theta_1 != 0.0) else 0.0
     found = [*case.path.lengths, *case.lengths[:4], u1.real, u1.imag, omega_2, alpha_2, branch, lost]
     found += [*of_bodies, *of_pins.values(), *of_loads]
     if not any(isinstance(number, np.ndarray) and number.size > 1 for number in found):
@@ -117,39 +125,39 @@ class LoopResult(NamedTuple):
     scalars: Array
 
 
-def looped(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any, *, error_bars: bool) -> LoopResult:
+def run_loop(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2: Any, *, error_bars: bool) -> LoopResult:
     """Up to BLOCK positions of a case that the loop carries; for the parameters see `run`."""
     n, theta_1 = len(theta_2), case.path.theta_1
-    of_theta_2 = np.tan(0.5 * theta_2) if anywhere(theta_1 != 0.0) else np.empty(0)
-    rows = numbers(case, theta_2, branch, omega_2, alpha_2)
+    of_theta_2 = np.tan(0.5 * theta_2) if is_any(theta_1 != 0.0) else np.empty(0)
+    rows = pack_numbers(case, theta_2, branch, omega_2, alpha_2)
     if not hasattr(SPACE, "found"):
         SPACE.found = LoopResult(np.empty((7, BLOCK), dtype=complex), np.empty((15, BLOCK)))
     vectors, scalars = SPACE.found
     given = np.tan(0.5 * (theta_2 - theta_1)), of_theta_2, rows, case.drive_bar, vectors.ravel(), scalars.ravel()
-    _called(run, *given)
+    _call_loop(run, *given)
     if error_bars:
-        _called(scatter, *given, signs())
+        _call_loop(scatter, *given, draw_signs())
     return LoopResult(vectors[:, :n], scalars[:, :n])
 
 
-def _called(function: Any, *given: Any) -> None:
+def _call_loop(function: Any, *given: Any) -> None:
     try:
-        loop(function)(*given)
+        compile_loop(function)(*given)
     except OSError:  # the disk is full
-        loop(function, False)(*given)
+        compile_loop(function, False)(*given)
 
 
-def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
-    """Evaluate some positions of a command by the compiled loop, and through `commanded` what it leaves open."""
-    theta_2, branch = where.theta_2[part], sign_of(where.branch[part])
-    omega_2, alpha_2 = piece(where.omega_2, part), piece(where.alpha_2, part)
-    found = looped(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)
+def evaluate_compiled(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
+    """Evaluate some positions of a command by the compiled loop, and through `evaluate_command` what it leaves open."""
+    theta_2, branch = where.theta_2[part], find_sign(where.branch[part])
+    omega_2, alpha_2 = take_piece(where.omega_2, part), take_piece(where.alpha_2, part)
+    found = run_loop(case, theta_2, branch, omega_2, alpha_2, error_bars=wanted == ERROR)
     u2, u3, u4, *pins = found.vectors
     sin_mu, omega_3, omega_4, alpha_3, alpha_4, torque, sine, left, *errors = found.scalars[:10]
     at = Position(polar(1.0, case.path.theta_1), u2, u3, u4, sin_mu, np.nan, np.nan, np.nan, NO_HALF_ANGLE)
     moving = Rates(omega_2, omega_3, omega_4, alpha_2, alpha_3, alpha_4)
     state = State(case.lengths, case.path.theta_1, theta_2, at, NO_MOTION, omega_2, moving)
-    values = kinematics(case, state, names)
+    values = list_kinematics(case, state, names)
     others = dict(zip((*PIN_FORCES, "torque", "torque_error", "force_error"), (*pins, torque, *errors), strict=True))
     others["drive_condition"] = np.abs(sine)
     others["power"] = torque * moving[case.drive_bar - 2]
@@ -161,16 +169,16 @@ def evaluated(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
         def own(number: Any) -> Any:
             return number[index] if np.ndim(number) else number
 
-        alone = changed(case, own)
+        alone = change_numbers(case, own)
         where = Command(theta_2[index], own(where.branch[part]), own(omega_2), own(alpha_2))
-        rest = commanded(alone, where, (...,), wanted, names)
-        withheld(alone, rest)
+        rest = evaluate_command(alone, where, (...,), wanted, names)
+        withhold_in_place(alone, rest)
         codes[index] = rest[0]
         for name, value in rest[1].items():
             whole = np.array(np.broadcast_to(values[name], theta_2.shape))
             whole[index] = value
             values[name] = whole
-    elif all_finite({name: value for name, value in values.items() if name not in UNKNOWNS}):  # the loop saw to these
+    elif is_finite({name: value for name, value in values.items() if name not in UNKNOWNS}):  # the loop saw to these
         return codes, values, None
-    withheld(case, (codes, values, None))
+    withhold_in_place(case, (codes, values, None))
     return codes, values, None

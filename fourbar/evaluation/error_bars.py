@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.evaluation.case import Case, Dynamics
-from fourbar.formulas.arithmetic import angle, anywhere, select, two_sum
-from fourbar.formulas.motion import Coefficients, State, rates, side_may_turn_fast, side_turns_fast
+from fourbar.formulas.arithmetic import angle, is_any, select, split_sum
+from fourbar.formulas.motion import Coefficients, State, find_fast_turns, may_turn_fast, rates
 from fourbar.formulas.path import read_from
 from fourbar.formulas.position import HalfAngle, Loop, Position
 
@@ -41,7 +41,7 @@ class Roundings:
     """Changes of numbers in their last digit, up or down, EVALUATIONS times at once."""
 
     def __init__(self, u1: Any) -> None:
-        of_reals, of_parts = in_turn()
+        of_reals, of_parts = take_signs()
         self.of_reals, self.of_parts = cycle(of_reals), cycle(of_parts)
         turned = (np.real(u1) != 0.0) & (np.imag(u1) != 0.0)
         self.turned = turned[..., None] if np.ndim(turned) else turned
@@ -57,10 +57,10 @@ class Roundings:
         if type(number) is float and number == 0.0:  # exact, and quicker alone than as many zeros
             return number
         if not isinstance(number, complex) and not (isinstance(number, np.ndarray) and number.dtype.kind == "c"):
-            return rounded_real(number, next(self.of_reals))
+            return round_real(number, next(self.of_reals))
         size = parts = np.asarray(number)[..., None].view(float)
         mixed = turned or self.turned
-        if anywhere(mixed):
+        if is_any(mixed):
             size = select(mixed, np.maximum(np.abs(parts[..., :1]), np.abs(parts[..., 1:])), parts)
         return (parts + size * next(self.of_parts)).view(complex)[..., 0]
 
@@ -70,14 +70,14 @@ class Roundings:
 
 
 @cache
-def in_turn() -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+def take_signs() -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
     """Return signs for real numbers, each (EVALUATIONS, 1), and for both parts of complex ones, (EVALUATIONS, 1, 2)."""
-    of_reals, of_parts = np.split(signs().T, 2)
+    of_reals, of_parts = np.split(draw_signs().T, 2)
     pairs = of_parts.reshape(-1, 2, EVALUATIONS).transpose(0, 2, 1)
     return list(of_reals[:, :, None]), list(np.ascontiguousarray(pairs)[:, :, None])
 
 
-def error_bars(
+def compute_error_bars(
     case: Case, state: State, acceleration: Any, sign: Any, found: Dynamics, exact: NDArray[np.intp]
 ) -> dict[str, Any]:
     """Compute that of the drive (N m or N) and `force_error` (N, worst of the four pin forces), by name, each (n,).
@@ -89,33 +89,33 @@ def error_bars(
     """
     rounded, path = Roundings(state.at.u1), case.path
     q = state.theta_2 if state.q is None else state.q
-    lost = two_sum(q, -path.theta_1)[1]
+    lost = split_sum(q, -path.theta_1)[1]
     known = exact.size > 0 and np.isin(np.arange(np.size(state.at.half.ss)), exact)
-    half = rounded_half_angle(path.lengths, state.at.half, lost, known, rounded.next(6))
+    half = round_half_angle(path.lengths, state.at.half, lost, known, rounded.next(6))
     near, k = path.motion(path.position(q, half, sign), sign)
     near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
-    k = read_from(path.bar, rounded_coefficients(path.lengths, near, read_from(path.bar, k), rounded.next(13)))
+    k = read_from(path.bar, round_coefficients(path.lengths, near, read_from(path.bar, k), rounded.next(13)))
     nearby = state._replace(at=near, k=k, moving=rates(k, state.speed, acceleration))
     if path.bar != 2:  # there both are found from the directions
         to_O4, to_A = rounded(case.lengths.d * near.u1), case.lengths.a * near.u2
         nearby = nearby._replace(at=near._replace(diagonal=rounded(to_O4 - to_A)), theta_2=rounded(angle(near.u2)))
     other = case.dynamics(nearby, acceleration, case.side, rounded)
     values, others = (*found.pins, found.drive), (*other.pins, other.drive)
-    spread = root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))
+    spread = compute_root_mean_square(np.array([after - before for before, after in zip(values, others, strict=True)]))
     size = np.array([np.abs(value) for value in values]).reshape(spread.shape)
-    force_error, drive_error = bar(
+    force_error, drive_error = compute_bar(
         np.array([spread[:4].max(axis=0), spread[4]]), np.array([size[:4].max(axis=0), size[4]])
     ).reshape(2, *np.shape(found.drive))
     return {case.names.error: drive_error, "force_error": force_error}
 
 
-def rounded_real(x: Any, sign: Any) -> Any:
+def round_real(x: Any, sign: Any) -> Any:
     """Return the next double up or down."""
     return x + x * sign
 
 
-def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, signs: Any) -> HalfAngle:
+def round_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, signs: Any) -> HalfAngle:
     """Compute the five numbers with their own roundings, that of theta_2 - theta_1, and those of the two sums.
 
     Parameters
@@ -132,15 +132,15 @@ def rounded_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, si
     of_outer, of_inner = select(known, outer, of_outer), select(known, inner, of_inner)
     turned = select(known, 0.0, lost) * np.sign(signs[0])
     return HalfAngle(
-        rounded_real(ss, signs[1]) + sk * turned,
-        rounded_real(kk, signs[2]) - sk * turned,
-        rounded_real(sk, signs[3]) + (0.5 * (kk - ss)) * turned,
+        round_real(ss, signs[1]) + sk * turned,
+        round_real(kk, signs[2]) - sk * turned,
+        round_real(sk, signs[3]) + (0.5 * (kk - ss)) * turned,
         outer - (four_ad * sk) * turned + of_outer * signs[4],
         inner + (four_ad * sk) * turned + of_inner * signs[5],
     )
 
 
-def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: Any) -> Coefficients:
+def round_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: Any) -> Coefficients:
     """Compute the coefficients from parts rounded each: h3 = n - g, h4 = n + g, n = t + x g/e^2, and so their slopes.
 
     Parameters
@@ -153,8 +153,8 @@ def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: An
     n, x = k.h3 + g, ((b - c) * (b + c)) / at.e2
     of_g, w = x * g, x * g - 0.5 * ((d - a) * (d + a)) / at.e2
     of_t = n - of_g
-    if anywhere(side_may_turn_fast(lengths)):
-        fast = side_turns_fast(lengths, at)
+    if is_any(may_turn_fast(lengths)):
+        fast = find_fast_turns(lengths, at)
         of_t, of_g, w = select(fast, n, of_t), select(fast, 0.5, of_g), select(fast, n - 0.5, w)
     of_slope, of_side = x * dg, (4.0 * a * d * at.half.sk) * w / at.e2
     g_moved, dg_moved, of_g_moved = g * signs[0], dg * signs[1], of_g * signs[2]
@@ -162,17 +162,17 @@ def rounded_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: An
     slope_moved = of_slope * signs[4] + of_side * signs[5]
     return Coefficients(
         k.h2,
-        rounded_real(k.h3, signs[6]) + n_moved - g_moved,
-        rounded_real(k.h4, signs[7]) + n_moved + g_moved,
-        rounded_real(k.h23, signs[8]) + (1.0 - of_t) * signs[9] - of_g_moved + g_moved,
-        rounded_real(k.h43, signs[10]) + 2.0 * g_moved,
+        round_real(k.h3, signs[6]) + n_moved - g_moved,
+        round_real(k.h4, signs[7]) + n_moved + g_moved,
+        round_real(k.h23, signs[8]) + (1.0 - of_t) * signs[9] - of_g_moved + g_moved,
+        round_real(k.h43, signs[10]) + 2.0 * g_moved,
         k.dh2,
-        rounded_real(k.dh3, signs[11]) + slope_moved - dg_moved,
-        rounded_real(k.dh4, signs[12]) + slope_moved + dg_moved,
+        round_real(k.dh3, signs[11]) + slope_moved - dg_moved,
+        round_real(k.dh4, signs[12]) + slope_moved + dg_moved,
     )
 
 
-def root_mean_square(changes: Any) -> Any:
+def compute_root_mean_square(changes: Any) -> Any:
     """Of the sizes of the changes, (..., EVALUATIONS, n), whose squares may be beyond the range of a double."""
     size = np.abs(changes)
     largest = size.max(axis=-2, keepdims=True)
@@ -180,7 +180,7 @@ def root_mean_square(changes: Any) -> Any:
     return largest[..., 0, :] * np.sqrt(np.square(size).sum(axis=-2) / EVALUATIONS)
 
 
-def bar(spread: Any, value: Any) -> Any:
+def compute_bar(spread: Any, value: Any) -> Any:
     """Compute the error bar from the root mean square of the changes and the size of the value.
 
     A change that leaves no value, or none in the range of a double: of the value itself no digit is left.
@@ -191,7 +191,7 @@ def bar(spread: Any, value: Any) -> Any:
 
 
 @cache
-def signs() -> NDArray[np.float64]:
+def draw_signs() -> NDArray[np.float64]:
     """+- one last digit, (EVALUATIONS, NUMBERS): of number 1, 2, ... in each evaluation, by a fixed seed."""
     rng, others = np.random.default_rng(0), range(1, EVALUATIONS)
     up = np.array([[0, *rest] for rest in combinations(others, EVALUATIONS // 2 - 1)])

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, bodies
-from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, installing
+from fourbar.effects.actions import Actions, list_bodies
+from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, say_install
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import Path, drive_sine, path, smooth_branch
+from fourbar.formulas.path import Path, drive_sine, find_smooth_branch, prepare_path
 from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Loop, Position, loop
 from fourbar.formulas.torque import half_slope, inertia
@@ -68,7 +68,7 @@ class FreeMotion:
     """Time at which a limit position or change point was reached, s; None: the whole duration was run."""
 
 
-def _meeting(lengths: Loop) -> Loop:
+def _meet_change_points(lengths: Loop) -> Loop:
     """E1 and E2 zero where the lengths miss a change point by rounding."""
     d, a, b, c, E1, E2 = lengths
     total = d + a + b + c
@@ -83,7 +83,7 @@ def _meeting(lengths: Loop) -> Loop:
     )
 
 
-def _plain(numbers: Any) -> Any:
+def _make_plain(numbers: Any) -> Any:
     """Convert numbers to Python's own, with which a formula of one position is several times quicker."""
     return type(numbers)(*(x.item() if isinstance(x, np.generic | np.ndarray) else x for x in numbers))
 
@@ -92,8 +92,12 @@ class _Reading:
     """The linkage read in the angle of bar 2 or of bar 4, with the sign of its path."""
 
     def __init__(self, linkage: FourBar, bar: int, sign: float = 1.0) -> None:
-        found = path(loop(*linkage.lengths), linkage.ground_angle, bar)
-        own = {"lengths": _plain(_meeting(found.lengths)), "u1": complex(found.u1), "unit": float(found.unit)}
+        found = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
+        own = {
+            "lengths": _make_plain(_meet_change_points(found.lengths)),
+            "u1": complex(found.u1),
+            "unit": float(found.unit),
+        }
         self.path = found._replace(**own)
         self.bar, self.sign = bar, sign
         self.changes = 0.0 in (self.path.lengths.E1, self.path.lengths.E2)
@@ -104,7 +108,7 @@ class _Reading:
         if not self.changes:
             return self.sign
         psi = q - self.path.theta_1 - (math.pi if self.bar == 4 else 0.0)
-        return float(smooth_branch(self.path.lengths, psi, self.sign))
+        return float(find_smooth_branch(self.path.lengths, psi, self.sign))
 
     def at(self, q: float) -> tuple[Position, Coefficients]:
         """Compute the position and its coefficients by q; what is wanted again is kept."""
@@ -116,16 +120,16 @@ class _Reading:
         branch = self.branch(q)
         half = self.path.half_angle(q)
         try:
-            return self._by(q, _plain(half), branch)
+            return self._by(q, _make_plain(half), branch)
         except ZeroDivisionError:  # numpy's numbers have a value there, infinite or none
             return self._by(q, half, branch)
 
     def _by(self, q: float, half: HalfAngle, branch: float) -> tuple[Position, Coefficients]:
         at, k = self.path.motion(self.path.position(q, half, branch), branch)
-        return (_plain(at), _plain(k)) if self.path.may_stay_parallel else (at, k)
+        return (_make_plain(at), _make_plain(k)) if self.path.may_stay_parallel else (at, k)
 
 
-def _sines(at: Position) -> dict[int, float]:
+def _compute_sines(at: Position) -> dict[int, float]:
     """sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2): zero at the limits of bars 2, 3, 4."""
     return {bar: float(drive_sine(at, bar)) for bar in MOVING_BARS}
 
@@ -181,15 +185,15 @@ class _Run:
         bar: int,
     ) -> None:
         self.linkage, self.terms, self.follow, self.branch, self.bar = linkage, terms, follow, branch, bar
-        self.lengths = _plain(loop(*linkage.lengths))
-        two, three, four = (_plain(body) for body in bodies(linkage, terms))
+        self.lengths = _make_plain(loop(*linkage.lengths))
+        two, three, four = (_make_plain(body) for body in list_bodies(linkage, terms))
         self.bodies: tuple[Body, Body, Body] = two, three, four
         self.readings = {each: _Reading(linkage, each) for each in (2, 4)}
         self.reading = self.readings[bar] if bar != 3 else _Reading(linkage, 3)
         # the sign of the path is that of the branch just after the start, should that be a change point
         ahead = theta + math.copysign(1e-8, omega)
         for near in (theta, ahead, 2.0 * theta - ahead):
-            sine = _sines(self.reading.at(near)[0])[bar]
+            sine = _compute_sines(self.reading.at(near)[0])[bar]
             if sine != 0.0 and math.isfinite(sine):
                 self.reading.sign = branch * math.copysign(1.0, sine)
                 break
@@ -198,24 +202,24 @@ class _Run:
             raise InputError(f"motion.theta_{bar}", theta, "the linkage does not assemble there")
         self.theta = {2: float(np.angle(at.u2)), 4: float(np.angle(at.u4)), bar: theta}
         self.y = np.array([theta, omega, 0.0])
-        if not float(self._inertia(at, k)) > 0.0:
+        if not float(self._compute_inertia(at, k)) > 0.0:
             raise FourBarError("nothing that moves has inertia: the free motion is undetermined")
         self._change_over()
         self.side = 0.0  # the sense of motion, where dry friction tells the two apart
         self.holding = 0.0  # at a standstill, the part of its torque that dry friction takes at every pin
         self.dry = self._is_dry()
-        self.start_energy = self._kinetic_energy()
+        self.start_energy = self._compute_kinetic_energy()
 
-    def _inertia(self, at: Position, k: Coefficients) -> Any:
+    def _compute_inertia(self, at: Position, k: Coefficients) -> Any:
         return sum(inertia(self.lengths.a, self.bodies, at, k))
 
-    def _kinetic_energy(self) -> float:
-        return 0.5 * float(self._inertia(*self._at())) * float(self.y[1]) ** 2
+    def _compute_kinetic_energy(self) -> float:
+        return 0.5 * float(self._compute_inertia(*self._at())) * float(self.y[1]) ** 2
 
     def _at(self) -> tuple[Position, Coefficients]:
         return self.reading.at(float(self.y[0]))
 
-    def _generalised_force(self, q: float, at: Position, k: Coefficients, rate: float) -> float:
+    def _compute_generalised_force(self, q: float, at: Position, k: Coefficients, rate: float) -> float:
         """Q under everything that acts, at a speed that is not zero where friction has to have a sense."""
         theta_2 = q if self.reading.bar == 2 else cmath.phase(at.u2)
         state = State(self.lengths, self.linkage.ground_angle, theta_2, at, k, rate, rates(k, rate, 0.0))
@@ -224,34 +228,34 @@ class _Run:
             term.act(actions, state)
         return float(actions.work()[0])
 
-    def _both_senses(self) -> list[float]:
+    def _try_both_senses(self) -> list[float]:
         q = float(self.y[0])
-        return [self._generalised_force(q, *self._at(), rate) for rate in (VANISHING, -VANISHING)]
+        return [self._compute_generalised_force(q, *self._at(), rate) for rate in (VANISHING, -VANISHING)]
 
     def _is_dry(self) -> bool:
-        ahead, back = self._both_senses()
+        ahead, back = self._try_both_senses()
         return ahead != back
 
-    def _rates(self, _: float, y: Array) -> list[float]:
+    def _compute_rates(self, _: float, y: Array) -> list[float]:
         q, rate = float(y[0]), float(y[1])
         at, k = self.reading.at(q)
         # beyond a standstill friction keeps its sense, until the step is cut there
         moving = self.side * max(self.side * rate, VANISHING) if self.side else rate
-        Q = self._generalised_force(q, at, k, moving)
+        Q = self._compute_generalised_force(q, at, k, moving)
         slope = half_slope(self.lengths.a, self.bodies, at, k)
         # numpy's division: no error where the inertia vanishes
-        return [rate, float(np.float64(Q - slope * rate * rate) / self._inertia(at, k)), Q * rate]
+        return [rate, float(np.float64(Q - slope * rate * rate) / self._compute_inertia(at, k)), Q * rate]
 
     def _change_over(self) -> bool:
         """Take the other angle where it is further from its limit; keeps position, velocity and work."""
         at, k = self._at()
-        sines, bar = _sines(at), 6 - self.reading.bar
+        sines, bar = _compute_sines(at), 6 - self.reading.bar
         if self.reading.bar == 3:  # of the start alone
             bar = max((2, 4), key=lambda each: abs(sines[each]))
         elif abs(sines[self.reading.bar]) >= CHANGE_OVER * abs(sines[bar]):
             return False
         q, reading = self.theta[bar], self.readings[bar]
-        reading.sign *= math.copysign(1.0, _sines(reading.at(q)[0])[bar] * sines[bar])
+        reading.sign *= math.copysign(1.0, _compute_sines(reading.at(q)[0])[bar] * sines[bar])
         rate = float(self.y[1] * (k.h2 if bar == 2 else k.h4)) if self.y[1] else 0.0
         self.reading, self.y = reading, np.array([q, rate, self.y[2]])
         return True
@@ -269,7 +273,7 @@ class _Run:
         if not self.dry:
             return True
         if rate == 0.0:
-            ahead, back = self._both_senses()
+            ahead, back = self._try_both_senses()
             if ahead <= 0.0 <= back:
                 self.holding = (ahead + back) / (back - ahead) if ahead < back else 0.0
                 return False
@@ -279,14 +283,14 @@ class _Run:
 
     def through(self, times: Array) -> FreeMotion:
         """Integrate over the times and report."""
-        DOP853, brentq = _scipy()
+        DOP853, brentq = _import_scipy()
         rows: list[tuple[float, ...]] = []
         t, end, steps, stopped = 0.0, float(times[-1]), 0, None
         worst, largest = 0.0, self.start_energy
 
         def report(upto: float, at: Callable[[float], Array]) -> None:
             while len(rows) < len(times) and times[len(rows)] <= upto:
-                rows.append(self._row(at(float(times[len(rows)]))))
+                rows.append(self._make_row(at(float(times[len(rows)]))))
 
         moves = self._starts()
         report(0.0, lambda _: self.y)
@@ -294,7 +298,7 @@ class _Run:
             if not moves:
                 report(end, lambda _: self.y)
                 break
-            solver = DOP853(self._rates, t, self.y, end, rtol=SCIPY_LEAST, atol=ABSOLUTE)
+            solver = DOP853(self._compute_rates, t, self.y, end, rtol=SCIPY_LEAST, atol=ABSOLUTE)
             solver.rtol = RELATIVE
             while solver.status == "running" and stopped is None:
                 steps += 1
@@ -307,15 +311,15 @@ class _Run:
                 dense, t_new, new = _Within(solver), solver.t, solver.y
                 rested = bool(self.side and self.side * new[1] < 0.0)
                 if rested:
-                    t_new = self._root(brentq, dense, self._rate, solver.t_old, t_new)
+                    t_new = self._find_root(brentq, dense, self._compute_rate, solver.t_old, t_new)
                     new = np.array([dense(t_new)[0], 0.0, dense(t_new)[2]])
-                if not self.follow and self._past(new):
-                    stopped = t_new = self._root(brentq, dense, self._sine, solver.t_old, t_new)
+                if not self.follow and self._is_past(new):
+                    stopped = t_new = self._find_root(brentq, dense, self._compute_sine, solver.t_old, t_new)
                     new = dense(t_new)
                 report(t_new, dense)
                 t, self.y = t_new, np.array(new)
                 self._turn(self._at()[0])
-                energy = self._kinetic_energy() - self.start_energy
+                energy = self._compute_kinetic_energy() - self.start_energy
                 worst = max(worst, abs(energy - float(self.y[2])))
                 largest = max(largest, abs(energy + self.start_energy), abs(float(self.y[2])))
                 if rested or self._change_over():
@@ -336,7 +340,7 @@ class _Run:
         )
 
     @staticmethod
-    def _root(
+    def _find_root(
         brentq: Any, dense: Callable[[float], Array], f: Callable[[Array], float], low: float, high: float
     ) -> float:
         """Find the time at which f of the state is zero; the start of the step where it is zero there already."""
@@ -344,18 +348,18 @@ class _Run:
             return low
         return float(brentq(lambda t: f(dense(t)), low, high, xtol=1e-15, rtol=1e-15))
 
-    def _rate(self, y: Array) -> float:
+    def _compute_rate(self, y: Array) -> float:
         return float(y[1])
 
-    def _sine(self, y: Array) -> float:
+    def _compute_sine(self, y: Array) -> float:
         """sin(theta_4 - theta_3), or that of the bar that was released: zero at its limits."""
-        return _sines(self.reading.at(float(y[0]))[0])[self.bar]
+        return _compute_sines(self.reading.at(float(y[0]))[0])[self.bar]
 
-    def _past(self, y: Array) -> bool:
+    def _is_past(self, y: Array) -> bool:
         """Whether the two other moving bars have gone through their common line."""
-        return self.branch * self._sine(y) < 0.0
+        return self.branch * self._compute_sine(y) < 0.0
 
-    def _row(self, y: Array) -> tuple[float, ...]:
+    def _make_row(self, y: Array) -> tuple[float, ...]:
         """theta_2, omega_2, alpha_2, branch, and the independent angle with all that belongs to it, of one instant."""
         q, rate = float(y[0]), float(y[1])
         at, k = self.reading.at(q)
@@ -364,9 +368,9 @@ class _Run:
         if self.reading.bar == 2:
             theta_2 = q
         still = self.dry and rate == 0.0 and not self.side
-        growth = 0.0 if still else self._rates(0.0, y)[1]
+        growth = 0.0 if still else self._compute_rates(0.0, y)[1]
         moving = rates(k, rate, growth)
-        sine = _sines(at)[2]
+        sine = _compute_sines(at)[2]
         branch = math.copysign(1.0, sine) if sine else float(self.branch)
         side = (self.side or self.holding) if self.dry and rate == 0.0 else 0.0
         independent = (float(self.reading.bar), q, rate, growth, self.reading.branch(q), side)
@@ -386,10 +390,10 @@ class _Within:
         return self.known(t)
 
 
-def _scipy() -> tuple[Any, Any]:
+def _import_scipy() -> tuple[Any, Any]:
     try:
         from scipy.integrate import DOP853
         from scipy.optimize import brentq
     except ModuleNotFoundError:
-        raise DependencyError(f"SciPy is needed for free motion: {installing('dynamics')}") from None
+        raise DependencyError(f"SciPy is needed for free motion: {say_install('dynamics')}") from None
     return DOP853, brentq

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.evaluation.case import NOWHERE, Case, Evaluated
-from fourbar.evaluation.withheld import no_value
-from fourbar.formulas.arithmetic import angle, anywhere
+from fourbar.evaluation.withheld import make_no_value
+from fourbar.formulas.arithmetic import angle, is_any
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.formulas.position import HalfAngle, Position
@@ -46,7 +46,7 @@ WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 """Statuses of positions at which an effect or the drive has no value, and so the forces have none."""
 
 
-def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
+def evaluate_command(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
     """Evaluate some positions of a command.
 
     Parameters
@@ -56,32 +56,32 @@ def commanded(case: Case, where: Command, part: Part, wanted: int, names: KeysVi
     q: Any = where.angle[part]
     if q.ndim == 0:
         q = q.item()  # with Python's own numbers a formula takes half the time
-    branch = sign_of(where.branch[part])
+    branch = find_sign(where.branch[part])
     half, exact = case.half_angle(q, where.remainder)
     of_angles = where.bar == 2 and len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
     if of_angles and where.remainder is None and not case.path.may_stay_parallel:
-        return _angles(case, half, branch, names)
+        return _evaluate_angles(case, half, branch, names)
     at = case.path.position(q, half, branch)
-    codes = _codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
+    codes = _compute_codes(at.sin_mu, half, NO_DIGIT_LEFT if where.remainder is None else 0.0)
     if where.lever is not None:
         codes = np.where(codes == OK, np.where(where.lever[part] <= NO_DIGIT_LEFT, SINGULAR, OK), codes)
-    if anywhere(codes):  # velocities are 0/0
+    if is_any(codes):  # velocities are 0/0
         at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
-    speed, acceleration = piece(where.speed, part), piece(where.acceleration, part)
+    speed, acceleration = take_piece(where.speed, part), take_piece(where.acceleration, part)
     state = case.state(case.path, q, at, branch, speed, acceleration, moving=wanted > 0)
-    values = kinematics(case, state, names)
+    values = list_kinematics(case, state, names)
     if where.bar != 2:
-        values |= {name: value for name, value in of_command(case, at, state, q).items() if name in names}
+        values |= {name: value for name, value in name_of_command(case, at, state, q).items() if name in names}
     if where.lever is not None and "condition" in values:
         values["condition"] = values["condition"] * where.lever[part]
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
-        codes, forces = _forces(case, state, acceleration, branch, branch, codes, names, known)
+        codes, forces = _evaluate_forces(case, state, acceleration, branch, branch, codes, names, known)
         values |= forces
     return codes, values, state.at
 
 
-def of_command(case: Case, at: Position, state: State, q: Any) -> dict[str, Any]:
+def name_of_command(case: Case, at: Position, state: State, q: Any) -> dict[str, Any]:
     """Quantities that a command of bar 3 or 4 has in the place of others: its angle as commanded, theta_2, its sine.
 
     Parameters
@@ -93,7 +93,7 @@ def of_command(case: Case, at: Position, state: State, q: Any) -> dict[str, Any]
     return {f"theta_{case.path.bar}": q, "theta_2": state.theta_2, "condition": abs(at.sin_mu)}
 
 
-def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:
+def _compute_codes(sine: Any, half: HalfAngle, margin: float) -> Any:
     """Statuses of positions from the sine of the transmission angle, or a multiple of it."""
     size = abs(sine)
     if type(size) is float and size > margin:
@@ -106,22 +106,22 @@ def _codes(sine: Any, half: HalfAngle, margin: float) -> Any:
     return codes
 
 
-def sign_of(branch: NDArray[np.int8]) -> Any:
+def find_sign(branch: NDArray[np.int8]) -> Any:
     """Return the branch of each position, or one number where all have the same."""
     if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
         return float(branch.flat[0]) if branch.ndim else float(branch)
     return branch
 
 
-def _angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> Evaluated:
+def _evaluate_angles(case: Case, half: HalfAngle, branch: Any, names: Iterable[str]) -> Evaluated:
     """Evaluate the two angles only: without vectors and the rest of the triangle."""
     theta_3, theta_4, root = case.path.angles(half, branch)
-    codes = _codes(root, half, NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c)
+    codes = _compute_codes(root, half, NO_DIGIT_LEFT * 2.0 * case.path.lengths.b * case.path.lengths.c)
     found = {"theta_3": theta_3, "theta_4": theta_4}
     return codes, {name: found[name] for name in names}, None
 
 
-def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
+def evaluate_freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
     """Evaluate instants of a free motion that have one independent angle; the drive does nothing."""
     codes = np.zeros(len(part[0]), dtype=np.uint8)
     if not codes.size:
@@ -131,16 +131,16 @@ def freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, names: Keys
     q, speed, growth, branch = (x[part] for x in (moved.q, moved.speed, moved.acceleration, moved.sign))
     at = free.path.position(q, free.path.half_angle(q), branch)
     state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.angle[part])
-    values = kinematics(case, state, names)
+    values = list_kinematics(case, state, names)
     if wanted >= FORCE:
         exact = NOWHERE if wanted == ERROR else None
-        codes, forces = _forces(free, state, growth, None, branch, codes, names, exact)
+        codes, forces = _evaluate_forces(free, state, growth, None, branch, codes, names, exact)
         values |= forces
         values |= {name: np.zeros(codes.shape) for name in (*case.names, "power") if name in names}
     return codes, values, None
 
 
-def _forces(
+def _evaluate_forces(
     case: Case,
     state: State,
     acceleration: Any,
@@ -173,9 +173,9 @@ def _forces(
         if held is not None and found.status is not None:
             found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
     if exact is not None:
-        from fourbar.evaluation.error_bars import error_bars
+        from fourbar.evaluation.error_bars import compute_error_bars
 
-        values |= error_bars(case, state, acceleration, sign, found, exact)
+        values |= compute_error_bars(case, state, acceleration, sign, found, exact)
     without: list[Any] = [status for term in case.terms if (status := term.status(state, branch)) is not None]
     if found.status is not None:
         without.append(found.status)
@@ -183,15 +183,17 @@ def _forces(
         without.append(status)
     if without:
         codes = np.where(codes == OK, np.max(without, axis=0), codes).astype(np.uint8)
-    if anywhere(codes > SINGULAR):
+    if is_any(codes > SINGULAR):
         gone = np.isin(codes, WITHOUT_FORCES)
         values |= {
-            name: np.where(gone, no_value(value), value) for name, value in values.items() if name != "drive_condition"
+            name: np.where(gone, make_no_value(value), value)
+            for name, value in values.items()
+            if name != "drive_condition"
         }
     return codes, {name: value for name, value in values.items() if name in names}
 
 
-def piece(value: float | Array | None, part: Part) -> float | Array:
+def take_piece(value: float | Array | None, part: Part) -> float | Array:
     """Return a number for all positions, or the part of an array that belongs to a block."""
     return value[part] if isinstance(value, np.ndarray) and value.ndim else value or 0.0
 
@@ -213,7 +215,7 @@ PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G
 """The vectors before the forces, of the linkage's own points."""
 
 
-def kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
+def list_kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
     """Those of the quantities that come before the forces, a scene's own points among them."""
     values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
     if case.drive is not None and not wanted.isdisjoint(OF_LINE):

@@ -13,16 +13,16 @@ from fourbar.quantities import NO_TORQUE, NOT_ASSEMBLED, OK, OVERFLOW, SEVERAL, 
 from fourbar.scene.point import OF_POINTS
 
 
-def all_finite(values: Mapping[str, Any]) -> bool:
+def is_finite(values: Mapping[str, Any]) -> bool:
     """Whether every entry is a number, from their squares; False also where a square leaves the range of doubles."""
     squares = (np.vdot(value, value) if isinstance(value, np.ndarray) else value for value in values.values())
     return all(cmath.isfinite(square) for square in squares)
 
 
-def withheld(case: Case, found: Evaluated) -> None:
+def withhold_in_place(case: Case, found: Evaluated) -> None:
     """Write `withhold` in place wherever a result is no number."""
     codes, values, driven = found
-    if not all_finite(values):
+    if not is_finite(values):
         in_line: Any = False
         if driven is not None and case.drive is None:
             in_line = np.abs(case.path.drive_sine(driven, case.drive_bar)) <= NO_DIGIT_LEFT
@@ -45,7 +45,7 @@ def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[n
         found = np.zeros_like(gone)
         for name in names:
             found |= ~np.isfinite(values[name])
-            values[name] = np.where(np.isfinite(values[name]), values[name], no_value(values[name]))
+            values[name] = np.where(np.isfinite(values[name]), values[name], make_no_value(values[name]))
         found &= promised & ~gone
         code[found] = OVERFLOW
         if of_forces:
@@ -53,9 +53,9 @@ def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[n
         gone |= found
         for name in names:
             if name != "drive_condition":
-                values[name] = np.where(gone, no_value(values[name]), values[name])
+                values[name] = np.where(gone, make_no_value(values[name]), values[name])
 
 
-def no_value(quantity: Any) -> complex:
+def make_no_value(quantity: Any) -> complex:
     """NaN; of a vector in both components."""
     return complex(np.nan, np.nan) if np.iscomplexobj(quantity) else np.nan

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from fourbar import effects as kinds
 from fourbar.effects.numbers import AT_LEAST_ZERO, OF_EFFECT, OF_GAS_SPRING, POSITIVE, ROWS
 from fourbar.errors import InputError
-from fourbar.files.fields import Reader, polar, quantity
+from fourbar.files.fields import Reader, write_polar, write_quantity
 from fourbar.linkage import PINS
 
 if TYPE_CHECKING:
@@ -33,9 +33,9 @@ def _read_springs(value: object, read: Reader) -> "Springs":
             read.table(own, entry, ("from", "to", "gas"))
             words = read.table(f"{own}.gas", given["gas"], OF_GAS_SPRING)
             words = {"compressed_force": words.get("extended_force"), **words}
-            stated = _stated(read, f"{own}.gas", words, OF_GAS_SPRING)
+            stated = _read_numbers(read, f"{own}.gas", words, OF_GAS_SPRING)
         else:
-            stated = _stated(read, own, {"preload": "0 N", **given}, numbers)
+            stated = _read_numbers(read, own, {"preload": "0 N", **given}, numbers)
         try:
             springs.append(kinds.Spring.gas(start, end, *stated) if gas else kinds.Spring(start, end, *stated))
         except InputError as error:  # which knows of one spring alone
@@ -43,7 +43,9 @@ def _read_springs(value: object, read: Reader) -> "Springs":
     return kinds.Springs(tuple(springs))
 
 
-def _stated(read: Reader, key: str, given: Mapping[str, object], numbers: Mapping[str, tuple[str, str]]) -> list[float]:
+def _read_numbers(
+    read: Reader, key: str, given: Mapping[str, object], numbers: Mapping[str, tuple[str, str]]
+) -> list[float]:
     """Read each of some numbers within its bound."""
     return [
         read.quantity(
@@ -71,14 +73,14 @@ def read_ends(read: Reader, key: str, given: dict[str, Any]) -> "tuple[SpringEnd
 def write_ends(line: Any) -> dict[str, Any]:
     """Write them back."""
     ends = {"from": line.start, "to": line.end}
-    return {name: {"bar": end.bar, "at": polar(end[1], end[2], "m")} for name, end in ends.items()}
+    return {name: {"bar": end.bar, "at": write_polar(end[1], end[2], "m")} for name, end in ends.items()}
 
 
 def _write_springs(effect: "Springs") -> Any:
     return [
         {
             **write_ends(s),
-            **{name: quantity(getattr(s, name), unit) for name, (unit, _) in OF_EFFECT["springs"].items()},
+            **{name: write_quantity(getattr(s, name), unit) for name, (unit, _) in OF_EFFECT["springs"].items()},
         }
         for s in effect.springs
     ]
@@ -103,7 +105,7 @@ class EffectFormat(NamedTuple):
     """One line of a scene file."""
 
 
-def _per_pin(key: str, kind: str, example: str, **left_out: str) -> EffectFormat:
+def _describe_per_pin(key: str, kind: str, example: str, **left_out: str) -> EffectFormat:
     """Describe an effect that holds rows (pin, number, ...); where a pin has one number, that stands without a list."""
     numbers = OF_EFFECT[key]
 
@@ -112,14 +114,14 @@ def _per_pin(key: str, kind: str, example: str, **left_out: str) -> EffectFormat
         for pin, entry in read.table(f"effects.{key}", value, PINS).items():
             own = f"effects.{key}.{pin}"
             texts = {"": entry} if "" in numbers else {**left_out, **read.table(own, entry, numbers)}
-            rows.append((pin, *_stated(read, own, texts, numbers)))
+            rows.append((pin, *_read_numbers(read, own, texts, numbers)))
         effect: Effect = getattr(kinds, kind)(tuple(rows))
         return effect
 
     def write_rows(effect: Any) -> Any:
         rows = {}
         for pin, *own in getattr(effect, ROWS[key]):
-            texts = {name: quantity(x, unit) for (name, (unit, _)), x in zip(numbers.items(), own, strict=True)}
+            texts = {name: write_quantity(x, unit) for (name, (unit, _)), x in zip(numbers.items(), own, strict=True)}
             rows[pin] = texts.get("", texts)
         return rows
 
@@ -129,15 +131,15 @@ def _per_pin(key: str, kind: str, example: str, **left_out: str) -> EffectFormat
 REGISTRY: dict[str, EffectFormat] = {
     "gravity": EffectFormat(
         lambda value, read: kinds.Gravity(*read.polar("effects.gravity", value, FIELD)),
-        lambda effect: polar(effect.magnitude, effect.angle, FIELD),
+        lambda effect: write_polar(effect.magnitude, effect.angle, FIELD),
         'gravity = ["9.81 m/s^2", "-90 deg"]',
     ),
-    "viscous": _per_pin("viscous", "Viscous", 'viscous = { O2 = "0.01 N m s/rad" }'),
-    "friction": _per_pin("friction", "Friction", 'friction = { A = "0.05 N m" }'),
-    "pin_friction": _per_pin(
+    "viscous": _describe_per_pin("viscous", "Viscous", 'viscous = { O2 = "0.01 N m s/rad" }'),
+    "friction": _describe_per_pin("friction", "Friction", 'friction = { A = "0.05 N m" }'),
+    "pin_friction": _describe_per_pin(
         "pin_friction", "PinFriction", 'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
     ),
-    "torsion": _per_pin(
+    "torsion": _describe_per_pin(
         "torsion",
         "Torsion",
         'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }',
@@ -151,14 +153,14 @@ REGISTRY: dict[str, EffectFormat] = {
     ),
     "flywheel": EffectFormat(
         _read_flywheel,
-        lambda effect: {"bar": effect.bar, "inertia": quantity(effect.inertia, INERTIA)},
+        lambda effect: {"bar": effect.bar, "inertia": write_quantity(effect.inertia, INERTIA)},
         'flywheel = { bar = 2, inertia = "0.02 kg m^2" }',
     ),
 }
 """By the key under ``[effects]``, in the order in which they are listed; a new one is added here."""
 
 
-def written(effect: "Effect") -> Any:
+def write_effect(effect: "Effect") -> Any:
     """Write the value of an effect under its key; InputError where a scene file has no form of it."""
     if effect.key not in REGISTRY:
         raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file has no form of this effect")

@@ -21,7 +21,7 @@ class Reader:
 
     def refuse(self, key: str, value: object, allowed: str) -> InputError:
         """Make the error for an entry, with the file's name."""
-        return InputError(key, _shown(value), allowed, self.file)
+        return InputError(key, _shorten(value), allowed, self.file)
 
     def table(self, key: str, value: object, allowed: Iterable[str]) -> dict[str, Any]:
         """Read a table that holds no other keys than those allowed; `key` is "" for the top of the file."""
@@ -30,8 +30,8 @@ class Reader:
             raise self.refuse(key, value, "must be a table with the keys " + ", ".join(names))
         for name, entry in value.items():
             if name not in names:
-                allowed = f"unknown key; {_hint(name, names)}allowed: {', '.join(names)}"
-                raise self.refuse(_joined(key, name), entry, allowed)
+                allowed = f"unknown key; {_suggest(name, names)}allowed: {', '.join(names)}"
+                raise self.refuse(_join_key(key, name), entry, allowed)
         return value
 
     def text(self, key: str, value: object) -> str:
@@ -44,7 +44,9 @@ class Reader:
         """One of a few words."""
         words = list(allowed)
         if not isinstance(value, str) or value not in words:
-            raise self.refuse(key, value, f"{_hint(value, words)}must be " + " or ".join(f'"{word}"' for word in words))
+            raise self.refuse(
+                key, value, f"{_suggest(value, words)}must be " + " or ".join(f'"{word}"' for word in words)
+            )
         return value
 
     def whole(self, key: str, value: object, least: int, most: int) -> int:
@@ -95,30 +97,30 @@ class Reader:
         return (self.quantity(f"{key}[0]", value[0], unit), self.quantity(f"{key}[1]", value[1], "rad"))
 
 
-def quantity(value: float, unit: str) -> Any:
+def write_quantity(value: float, unit: str) -> Any:
     """Write a number in SI with its unit, every digit kept."""
     return value if unit == "1" else f"{float(value)!r} {unit}"
 
 
-def polar(magnitude: float, angle: float, unit: str) -> list[str]:
+def write_polar(magnitude: float, angle: float, unit: str) -> list[str]:
     """Write a pair [magnitude, angle] likewise."""
-    return [quantity(magnitude, unit), quantity(angle, "rad")]
+    return [write_quantity(magnitude, unit), write_quantity(angle, "rad")]
 
 
-def _hint(word: object, known: list[str]) -> str:
+def _suggest(word: object, known: list[str]) -> str:
     """Suggest the valid word that is nearest to one that is not."""
     close = difflib.get_close_matches(word[:LONGEST_SHOWN], known, 1) if isinstance(word, str) else []
     return f'did you mean "{close[0]}"? ' if close else ""
 
 
-def _joined(key: str, name: str) -> str:
+def _join_key(key: str, name: str) -> str:
     """Join the dotted key; a name that is not a plain word is quoted, so that it stays on one line."""
     if not BARE_KEY.fullmatch(name):
         name = repr(name if len(name) <= LONGEST_SHOWN else name[:LONGEST_SHOWN] + "...")
     return f"{key}.{name}" if key else name
 
 
-def _shown(value: object) -> object:
+def _shorten(value: object) -> object:
     """Shorten a value to what an error line shows: never long or deep."""
     if isinstance(value, str):
         return value[: 2 * LONGEST_SHOWN]
@@ -126,7 +128,7 @@ def _shown(value: object) -> object:
         return _Words(f"a table of {len(value)} entries")
     if isinstance(value, list):
         if len(value) <= 3 and all(isinstance(entry, (str, float, bool)) for entry in value):
-            return [_shown(entry) for entry in value]
+            return [_shorten(entry) for entry in value]
         return _Words(f"a list of {len(value)} entries")
     if isinstance(value, int) and value.bit_length() > 64:
         return _Words("a huge whole number")

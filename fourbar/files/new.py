@@ -7,7 +7,7 @@ from fourbar.files.fields import Reader
 from fourbar.linkage import BAR_NAMES, Bar, FourBar
 
 
-def new_scene(lengths: tuple[str, ...] | list[str]) -> str:
+def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
     """Write a scene file for four lengths (ground, input, coupler, output), each with its unit, as it was given.
 
     Raises InputError for what is no length, and for bars that cannot close.

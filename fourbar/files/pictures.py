@@ -54,13 +54,13 @@ class Picture:
     def data_uri(self) -> str:
         """Encode the picture as it is embedded in a page.
 
-        Raises InputError where a link leads out of the folder, and as `data_uri` does.
+        Raises InputError where a link leads out of the folder, and as `encode_picture` does.
         """
         folder = Path(self.folder).resolve()
         file = (folder / self.name).resolve()
         if not file.is_relative_to(folder):
             raise InputError(self.key, self.name, f"leads out of the scene's folder; {ALLOWED}")
-        return data_uri(self.key, file, self.name)
+        return encode_picture(self.key, file, self.name)
 
     def moved(self, folder: Path) -> "Picture":
         """Return the same file as a scene file in another folder names it.
@@ -73,7 +73,7 @@ class Picture:
         return Picture(self.bar, PurePosixPath(file.relative_to(target)).as_posix(), os.fspath(folder))
 
 
-def data_uri(key: str, path: str | Path, shown: str | None = None) -> str:
+def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:
     """Encode a PNG or JPEG file as a data URI.
 
     Raises InputError, in one line, as `read_bytes` does, and for a file that begins as neither.

@@ -67,9 +67,9 @@ def loads(text: str, name: str = "scene") -> Scene:
     except RecursionError:
         raise InputError("TOML", "...", "is nested too deeply", shown) from None
     except ValueError as error:  # TOMLDecodeError, and numbers that Python refuses
-        raise _unreadable(text, str(error), shown) from None
+        raise _explain_unreadable(text, str(error), shown) from None
     try:
-        return _scene(Reader(shown), document, str(Path(name).parent))
+        return _read_scene(Reader(shown), document, str(Path(name).parent))
     except InputError as error:
         raise (error if error.file else error.in_file(shown)) from None
 
@@ -79,7 +79,7 @@ UNQUOTED = re.compile(r"[=,\[{]\s*([+-]?\.?[0-9][0-9.]*\s*[A-Za-z°µ][^\",#\]}]
 PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
-def _unreadable(text: str, reason: str, shown: str) -> InputError:
+def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     """Make the error for what the TOML reader stumbles over, with its line."""
     found = PLACE.search(reason)
     lines = text.split("\n")
@@ -95,7 +95,7 @@ def _unreadable(text: str, reason: str, shown: str) -> InputError:
     return InputError(f"line {line}, column {column}", value, f"cannot be read as TOML: {why}", shown)
 
 
-def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
+def _read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     top = read.table("", document, TABLES)
     drive = read.table("drive", top.get("drive", {}), ("bar", "from", "to"))
     line = None
@@ -108,21 +108,21 @@ def _scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         raise read.refuse("loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}")
     effects = read.table("effects", top.get("effects", {}), REGISTRY)
     scene = Scene(
-        _linkage(read, top),
-        _motion(read, top.get("motion", {})),
+        _read_linkage(read, top),
+        _read_motion(read, top.get("motion", {})),
         None if line else read.whole("drive.bar", drive.get("bar", 2), 2, 4),  # type: ignore[arg-type]
         tuple(_load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)),
         tuple(REGISTRY[key].read(value, read) for key, value in effects.items()),
         read.text("title", top.get("title", "")),
         read.text("source", top.get("source", "")),
-        _pictures(read, top.get("bars", {}), folder),
-        _points(read, top.get("points", {})),
+        _read_pictures(read, top.get("bars", {}), folder),
+        _read_points(read, top.get("points", {})),
         drive=line,
     )
     return replace(scene, tolerances=read_tolerances(read, scene, top.get("tolerances", {})))
 
 
-def _points(read: Reader, value: object) -> tuple[Point, ...]:
+def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     if not isinstance(value, dict) or len(value) > MOST_POINTS:
         raise read.refuse("points", value, f"must be a table of points, at most {MOST_POINTS}")
     found = []
@@ -134,7 +134,7 @@ def _points(read: Reader, value: object) -> tuple[Point, ...]:
     return tuple(found)
 
 
-def _pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Picture, ...]:
+def _read_pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Picture, ...]:
     """Read the names of the bars' pictures; the files themselves are read when they are shown."""
     return tuple(
         Picture(number, read.text(f"bars.{name}.picture", bars[name]["picture"]), folder)
@@ -143,18 +143,18 @@ def _pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Picture,
     )
 
 
-def _linkage(read: Reader, top: dict[str, Any]) -> FourBar:
+def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     lengths = read.table("lengths", top.get("lengths", {}), (*BAR_NAMES.values(), "ground_angle"))
     length = {
         name: read.quantity(f"lengths.{name}", lengths.get(name), "m", positive=True) for name in BAR_NAMES.values()
     }
     tables = read.table("bars", top.get("bars", {}), BARS)
-    bars = {name: _bar(read, f"bars.{name}", tables.get(name, {}), length[name]) for name in BARS}
+    bars = {name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name]) for name in BARS}
     angle = read.quantity("lengths.ground_angle", lengths.get("ground_angle", "0 rad"), "rad")
     return FourBar(length["ground"], bars["input"], bars["coupler"], bars["output"], angle)
 
 
-def _bar(read: Reader, key: str, value: object, length: float) -> Bar:
+def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
     entry = read.table(key, value, ("mass", "inertia", "centre", "picture"))
     mass = read.quantity(f"{key}.mass", entry.get("mass", "0 kg"), "kg", at_least_zero=True)
     inertia = centre = None
@@ -167,7 +167,7 @@ def _bar(read: Reader, key: str, value: object, length: float) -> Bar:
     return Bar(length, mass, inertia, centre)
 
 
-def _motion(read: Reader, value: object) -> Motion:
+def _read_motion(read: Reader, value: object) -> Motion:
     numbers = [name for names in COMMANDS.values() for name in names]
     entry = read.table("motion", value, (*numbers, *OF_STROKE, "side", "branch", "through", "free", "law"))
     stated = [name for name in numbers if name in entry]
@@ -178,7 +178,7 @@ def _motion(read: Reader, value: object) -> Motion:
     if given := [name for name in (*OF_STROKE, "side") if name in entry]:
         for name in (*stated, *(name for name in ("free", "law") if name in entry)):
             raise read.refuse(f"motion.{name}", entry[name], f"{given[0]} commands a cylinder, and nothing else is")
-        return _stroke_motion(read, entry, words)
+        return _read_stroke_motion(read, entry, words)
     bar = int(stated[0][-1]) if stated else 2
     for name in stated:
         if int(name[-1]) != bar:
@@ -191,18 +191,18 @@ def _motion(read: Reader, value: object) -> Motion:
         free = Free(duration, read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS))
     commanded: dict[str, Any] = {alpha: read.quantity(f"motion.{alpha}", entry.get(alpha, "0 rad/s^2"), "rad/s^2")}
     if theta in entry:
-        commanded[theta] = _angle(read, f"motion.{theta}", entry[theta])
+        commanded[theta] = _read_angle(read, f"motion.{theta}", entry[theta])
     if omega in entry:
         commanded[omega] = read.quantity(f"motion.{omega}", entry[omega], "rad/s")
     return Motion(
         free=free,
-        law=_law(read, entry["law"]) if "law" in entry else None,
+        law=_read_law(read, entry["law"]) if "law" in entry else None,
         **words,
         **commanded,
     )
 
 
-def _stroke_motion(read: Reader, entry: dict[str, Any], words: dict[str, Any]) -> Motion:
+def _read_stroke_motion(read: Reader, entry: dict[str, Any], words: dict[str, Any]) -> Motion:
     key, value = "motion.stroke", entry.get("stroke")
     stroke: Any = None
     if isinstance(value, dict):
@@ -225,7 +225,7 @@ def _stroke_motion(read: Reader, entry: dict[str, Any], words: dict[str, Any]) -
     )
 
 
-def _law(read: Reader, value: object) -> Law:
+def _read_law(read: Reader, value: object) -> Law:
     key = "motion.law"
     angles = [names[0] for names in COMMANDS.values()]
     entry = read.table(key, value, ("time", *angles, "steps", "ends"))
@@ -238,7 +238,7 @@ def _law(read: Reader, value: object) -> Law:
     )
 
 
-def _angle(read: Reader, key: str, value: object) -> float | Array | Sweep | FromLimit:
+def _read_angle(read: Reader, key: str, value: object) -> float | Array | Sweep | FromLimit:
     if isinstance(value, str):
         return read.quantity(key, value, "rad")
     if isinstance(value, list) and value:

@@ -9,9 +9,9 @@ import numpy as np
 
 from fourbar.effects import Load
 from fourbar.errors import InputError, expect
-from fourbar.files.effects import write_ends, written
-from fourbar.files.fields import polar, quantity
-from fourbar.files.tolerances import written_tolerances
+from fourbar.files.effects import write_effect, write_ends
+from fourbar.files.fields import write_polar, write_quantity
+from fourbar.files.tolerances import write_tolerances
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
@@ -42,99 +42,100 @@ def dump(scene: Scene) -> str:
     expect("scene", scene, Scene)
     top = {"title": scene.title, "source": scene.source}
     lengths = {
-        name: quantity(length, "m") for name, length in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
+        name: write_quantity(length, "m")
+        for name, length in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     }
-    angle = quantity(scene.linkage.ground_angle, "rad")
-    points = {point.name: {"bar": point.bar, "from_pin": polar(*point.from_pin, "m")} for point in scene.points}
-    effects = {effect.key: written(effect) for effect in scene.effects}
+    angle = write_quantity(scene.linkage.ground_angle, "rad")
+    points = {point.name: {"bar": point.bar, "from_pin": write_polar(*point.from_pin, "m")} for point in scene.points}
+    effects = {effect.key: write_effect(effect) for effect in scene.effects}
     if len(effects) != len(scene.effects):
         raise InputError("effects", [effect.key for effect in scene.effects], "a file holds one of each kind")
     tables: list[tuple[str, dict[str, Any]]] = [
         ("", {key: value for key, value in top.items() if value}),
         ("lengths", {**lengths, "ground_angle": angle}),
-        *((f"bars.{name}", _bar_entry(scene, number)) for name, number in BARS.items()),
-        ("motion", _motion_entry(scene.motion)),
+        *((f"bars.{name}", _write_bar(scene, number)) for name, number in BARS.items()),
+        ("motion", _write_motion(scene.motion)),
         ("drive", {"bar": scene.drive_bar} if scene.drive is None else write_ends(scene.drive)),
         ("points", points),
         *(("[loads]", _load_entry(load)) for load in scene.loads),
         ("effects", effects),
-        ("tolerances", written_tolerances(scene)),
+        ("tolerances", write_tolerances(scene)),
     ]
-    return "\n".join(_table(name, entries) for name, entries in tables if entries)
+    return "\n".join(_write_table(name, entries) for name, entries in tables if entries)
 
 
-def _bar_entry(scene: Scene, number: int) -> dict[str, Any]:
+def _write_bar(scene: Scene, number: int) -> dict[str, Any]:
     bar, entry = scene.linkage.bar(number), dict[str, Any]()
     if bar != Bar(bar.length):
-        entry = {"mass": quantity(bar.mass, "kg")}
+        entry = {"mass": write_quantity(bar.mass, "kg")}
         if bar.inertia is not None:
-            entry["inertia"] = quantity(bar.inertia, "kg m^2")
+            entry["inertia"] = write_quantity(bar.inertia, "kg m^2")
         if bar.centre is not None:
-            entry["centre"] = polar(*bar.centre, "m")
+            entry["centre"] = write_polar(*bar.centre, "m")
     for picture in scene.pictures:
         if picture.bar == number:
             entry["picture"] = picture.name
     return entry
 
 
-def _motion_entry(motion: Motion) -> dict[str, Any]:
+def _write_motion(motion: Motion) -> dict[str, Any]:
     law, free, wanted = motion.law, motion.free, motion.angle
     theta, omega, alpha = motion.names
     unit = "rad" if motion.stroke is None else "m"
     angles: Any = wanted
     if isinstance(wanted, Sweep):
-        ends = {"from": quantity(wanted.start, unit), "to": quantity(wanted.stop, unit)}
+        ends = {"from": write_quantity(wanted.start, unit), "to": write_quantity(wanted.stop, unit)}
         angles = {**ends, "steps": wanted.steps}
     elif isinstance(wanted, FromLimit):
-        angles = {"limit": wanted.limit, "offset": quantity(wanted.offset, "rad")}
+        angles = {"limit": wanted.limit, "offset": write_quantity(wanted.offset, "rad")}
     elif isinstance(wanted, np.ndarray):
-        angles = [quantity(angle, unit) for angle in wanted.tolist()]
+        angles = [write_quantity(angle, unit) for angle in wanted.tolist()]
     elif wanted is not None:
-        angles = quantity(wanted, unit)
+        angles = write_quantity(wanted, unit)
     entry = {
         theta: angles,
-        omega: None if motion.speed is None else quantity(motion.speed, f"{unit}/s"),
-        alpha: quantity(motion.acceleration, f"{unit}/s^2") if law is None else None,
-        "law": None if law is None else _law_entry(law),
+        omega: None if motion.speed is None else write_quantity(motion.speed, f"{unit}/s"),
+        alpha: write_quantity(motion.acceleration, f"{unit}/s^2") if law is None else None,
+        "law": None if law is None else _write_law(law),
         "branch": BRANCH_NAMES[motion.branch],
         "side": motion.side,
         "through": motion.through,
-        "free": None if free is None else {"duration": quantity(free.duration, "s"), "steps": free.steps},
+        "free": None if free is None else {"duration": write_quantity(free.duration, "s"), "steps": free.steps},
     }
     return {key: value for key, value in entry.items() if value is not None}
 
 
-def _law_entry(law: Law) -> dict[str, Any]:
-    times, angles = ([quantity(x, unit) for x in of] for of, unit in ((law.time, "s"), (law.angle, "rad")))
+def _write_law(law: Law) -> dict[str, Any]:
+    times, angles = ([write_quantity(x, unit) for x in of] for of, unit in ((law.time, "s"), (law.angle, "rad")))
     return {"time": times, f"theta_{law.bar}": angles, "steps": law.steps, "ends": law.ends}
 
 
 def _load_entry(load: Load) -> dict[str, Any]:
     entry: dict[str, Any] = {"bar": load.bar}
     if load.force is not None:
-        entry["force"] = polar(*load.force, "N")
-        entry["at"] = polar(*load.at, "m")
-    entry |= {"moment": quantity(load.moment, "N m"), "frame": load.frame}
+        entry["force"] = write_polar(*load.force, "N")
+        entry["at"] = write_polar(*load.at, "m")
+    entry |= {"moment": write_quantity(load.moment, "N m"), "frame": load.frame}
     if load.table is not None:
-        angles = [quantity(angle, "rad") for angle in load.table.theta_2]
+        angles = [write_quantity(angle, "rad") for angle in load.table.theta_2]
         entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}
     return entry
 
 
-def _table(name: str, entries: dict[str, Any]) -> str:
+def _write_table(name: str, entries: dict[str, Any]) -> str:
     """One TOML table."""
     heading = f"[{name}]\n" if name else ""
-    return heading + "".join(f"{key} = {_value(key, value)}\n" for key, value in entries.items())
+    return heading + "".join(f"{key} = {_write_value(key, value)}\n" for key, value in entries.items())
 
 
-def _value(key: str, value: object) -> str:
+def _write_value(key: str, value: object) -> str:
     """Write a TOML value; strings escape as in JSON, and DEL too."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{name} = {_value(key, entry)}" for name, entry in value.items()) + " }"
+        return "{ " + ", ".join(f"{name} = {_write_value(key, entry)}" for name, entry in value.items()) + " }"
     if isinstance(value, list):
         # one line each where there are many, so that no line holds more than MOST_DOTS
         between = ", " if len(value) <= 3 else ",\n  "
-        return "[" + between.join(_value(key, entry) for entry in value) + "]"
+        return "[" + between.join(_write_value(key, entry) for entry in value) + "]"
     if not isinstance(value, str):
         return repr(value)
     try:

@@ -20,14 +20,14 @@ def namespace(*numbers: Number) -> Any:
     """
     found: Any = np
     for number in numbers:
-        own = _OF_TYPE.get(type(number)) or _namespace_of(number)
+        own = _OF_TYPE.get(type(number)) or _find_namespace(number)
         if own is not np and found not in (np, own):
             raise TypeError("arrays of two libraries")
         found = found if own is np else own
     return found
 
 
-def _namespace_of(number: Number) -> Any:
+def _find_namespace(number: Number) -> Any:
     """Of a type seen for the first time: what takes part in NumPy's functions, and what is no array, is NumPy's."""
     found: Any = np
     array = hasattr(number, "__array_namespace__") or hasattr(number, "__dlpack__")
@@ -39,7 +39,7 @@ def _namespace_of(number: Number) -> Any:
     return found
 
 
-def anywhere(mask: Number) -> bool:
+def is_any(mask: Number) -> bool:
     """Whether a mask may hold at any entry; `np.any` costs a plain number fifty times as much."""
     if isinstance(mask, PLAIN):
         return bool(mask)
@@ -70,7 +70,7 @@ def divisor(x: Number, where: Number) -> Number:
     return x if (xp := namespace(x, where)) is np else xp.where(where, x, 1.0)
 
 
-def two_sum(x: Number, y: Number) -> tuple[Number, Number]:
+def split_sum(x: Number, y: Number) -> tuple[Number, Number]:
     """Split x + y = s + r exactly, s the rounded sum.
 
     Source: D. E. Knuth, The Art of Computer Programming, vol. 2, 4.2.2, theorem B.
@@ -82,10 +82,10 @@ def two_sum(x: Number, y: Number) -> tuple[Number, Number]:
 
 def exact_difference(p: Number, q: Number, r: Number, s: Number) -> Number:
     """(p + q) - (r + s), zero only where it is zero."""
-    one, lost_1 = two_sum(p, q)
-    other, lost_2 = two_sum(r, s)
-    gap, lost = two_sum(one, -other)
-    both, rest = two_sum(lost_1, -lost_2)
+    one, lost_1 = split_sum(p, q)
+    other, lost_2 = split_sum(r, s)
+    gap, lost = split_sum(one, -other)
+    both, rest = split_sum(lost_1, -lost_2)
     return (gap + (lost + both)) + rest
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import NotAssembledError
-from fourbar.formulas.mobility import TURN, Array, change_points, intervals, turns_fully
-from fourbar.formulas.path import path
+from fourbar.formulas.mobility import TURN, Array, change_points, find_intervals, turns_fully
+from fourbar.formulas.path import prepare_path
 from fourbar.formulas.position import loop
 from fourbar.linkage import FourBar
 
@@ -32,13 +32,13 @@ def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
     Source: T. R. Chase, J. A. Mirth, Circuits and branches of single-degree-of-freedom planar linkages,
     J. Mechanical Design 115 (1993) 223-230.
     """
-    ranges = intervals(linkage)
+    ranges = find_intervals(linkage)
     if turns_fully(linkage) and not change_points(linkage):
         return tuple(Circuit(ranges[0], (branch,)) for branch in BOTH)
     return tuple(Circuit(interval, BOTH) for interval in ranges)
 
 
-def circuit_of(linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8]) -> NDArray[np.int8]:
+def find_circuit(linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8]) -> NDArray[np.int8]:
     """Find the circuit (index into `circuits`) of each position, -1 where it does not assemble, (n,).
 
     Parameters
@@ -54,17 +54,17 @@ def circuit_of(linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8])
         number = np.where(np.broadcast_to(branch, theta_2.shape) == found[0].branches[0], 0, 1)
     else:  # the two ranges are mirror images in the ground's line
         number = np.where((theta_2 - linkage.ground_angle) % TURN < 0.5 * TURN, 0, 1)
-    half = path(loop(*linkage.lengths), linkage.ground_angle).half_angle(theta_2)
+    half = prepare_path(loop(*linkage.lengths), linkage.ground_angle).half_angle(theta_2)
     return np.where((half.outer >= 0.0) & (half.inner >= 0.0), number, -1).astype(np.int8)
 
 
-def same_circuit(linkage: FourBar, one: tuple[float, int], other: tuple[float, int]) -> bool:
+def is_same_circuit(linkage: FourBar, one: tuple[float, int], other: tuple[float, int]) -> bool:
     """Whether the linkage moves from one (theta_2, branch) to another without being taken apart.
 
     Raises NotAssembledError where one of the two positions does not exist.
     """
     theta_2, branch = np.array([one[0], other[0]]), np.array([one[1], other[1]], dtype=np.int8)
-    numbers = circuit_of(linkage, theta_2, branch)
+    numbers = find_circuit(linkage, theta_2, branch)
     if (numbers < 0).any():
         missing = float(theta_2[np.argmin(numbers)])
         raise NotAssembledError(f"theta_2 = {missing!r} rad: the linkage does not assemble there")

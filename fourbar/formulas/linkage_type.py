@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from fourbar.formulas.mobility import TOUCHING, turns_fully, unit_of
+from fourbar.formulas.mobility import TOUCHING, choose_unit, turns_fully
 from fourbar.linkage import BAR_NAMES, FourBar
 
 GRASHOF = {
@@ -46,7 +46,7 @@ def classify(linkage: FourBar) -> LinkageType:
     Source: C. R. Barker, A complete classification of planar four-bar linkages, Mechanism and
     Machine Theory 20 (1985).
     """
-    unit = unit_of(linkage)
+    unit = choose_unit(linkage)
     lengths = dict(zip(BAR_NAMES, (length / unit for length in linkage.lengths), strict=True))
     shortest, longest = min(lengths, key=lengths.__getitem__), max(lengths, key=lengths.__getitem__)
     whole = math.fsum(lengths.values())

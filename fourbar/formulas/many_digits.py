@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.formulas.position import HalfAngle, lengths_read_from
+from fourbar.formulas.position import HalfAngle, reorder_lengths
 from fourbar.linkage import FourBar
 
 DIGITS = 120
@@ -36,7 +36,7 @@ def half_angle(
         return mpf(float(number[member] if np.ndim(number) else number))
 
     with mp.workdps(DIGITS):
-        d, a, b, c = (own(length) / own(unit) for length in lengths_read_from(bar, linkage.lengths))
+        d, a, b, c = (own(length) / own(unit) for length in reorder_lengths(bar, linkage.lengths))
         h = (mpf(theta_2) - own(linkage.ground_angle) + (0 if offset is None else offset)) / 2
         if bar == 4:
             h -= mp.pi / 2
@@ -49,7 +49,7 @@ def half_angle(
         return HalfAngle(float(s * s), float(k * k), float(s * k), outer, inner)
 
 
-def decided(
+def decide_half_angles(
     linkage: FourBar, unit: float, half: HalfAngle, index: Any, theta_2: Any, offset: Any = None, bar: int = 2
 ) -> HalfAngle:
     """Replace the half angles of some positions (an index)."""
@@ -70,7 +70,7 @@ def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: floa
     from mpmath import mp, mpf
 
     with mp.workdps(DIGITS):
-        d, a, b, c = map(mpf, lengths_read_from(bar, linkage.lengths))
+        d, a, b, c = map(mpf, reorder_lengths(bar, linkage.lengths))
         theta_1 = mpf(linkage.ground_angle) + (mp.pi if bar == 4 else 0)
         exact = []
         for side in (b + c, b - c):

@@ -24,7 +24,7 @@ TOUCHING = U
 """Bars that miss each other by up to this times the sum of the lengths count as touching: each length was
 itself rounded by up to that, so the linkage meant touches as well as not."""
 MARGIN = math.radians(1.0)
-"""What `default_range` leaves out at each end of an interval: at a limit itself no speeds exist."""
+"""What `choose_range` leaves out at each end of an interval: at a limit itself no speeds exist."""
 NARROW = 4.0
 """An interval shorter than NARROW * MARGIN gives up this part of its width at each end instead."""
 AT_CHANGE_POINT = 4.0 * U
@@ -48,7 +48,7 @@ class LimitPosition(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """Bar k against the rest of the loop, in the unit of `unit_of`; sums within rounding of 0 are 0."""
+    """Bar k against the rest of the loop, in the unit of `choose_unit`; sums within rounding of 0 are 0."""
 
     d: float
     own: float
@@ -84,7 +84,7 @@ class Reach(NamedTuple):
         return 2.0 * at_near, 2.0 * at_far
 
 
-def unit_of(linkage: FourBar) -> float:
+def choose_unit(linkage: FourBar) -> float:
     """Return a power of two near the longest bar, m."""
     expect("linkage", linkage, FourBar)
     return math.ldexp(1.0, math.frexp(max(linkage.lengths))[1])
@@ -93,13 +93,13 @@ def unit_of(linkage: FourBar) -> float:
 def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
     """Bar 2, 3 or 4 against the rest of the loop; InputError for another bar."""
     bar = require_bar("bar", bar)
-    unit = unit_of(linkage)  # exact, and no product of lengths leaves the range of doubles
+    unit = choose_unit(linkage)  # exact, and no product of lengths leaves the range of doubles
     d, *moving = (length / unit for length in linkage.lengths)
     own = moving.pop(bar - 2)
     return Reach(d, own, *moving)
 
 
-def _wrapped(angle: float) -> float:
+def _wrap(angle: float) -> float:
     """Wrap the angle into (-pi, pi]."""
     rest = math.remainder(angle, TURN)
     return math.pi if rest <= -math.pi else rest
@@ -136,11 +136,11 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
             psi_2, theta_3 = vectors[2] % TURN, theta_1 + vectors[3]
             theta_4 = theta_1 + vectors[4] + math.pi
             branch = 0 if bar == 2 or straight else int(math.copysign(1.0, math.sin(theta_4 - theta_3)))
-            found.append(LimitPosition(theta_1 + psi_2, _wrapped(theta_3), _wrapped(theta_4), branch, stretched))
+            found.append(LimitPosition(theta_1 + psi_2, _wrap(theta_3), _wrap(theta_4), branch, stretched))
     return tuple(sorted(found))
 
 
-def intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float], ...]:
+def find_intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float], ...]:
     """Find the ranges [from, to] of a bar's angle in which the linkage assembles, rad; `to` may exceed 2 pi.
 
     One range where the bar turns fully (a whole turn from the ground's line) or has one pair of
@@ -164,22 +164,22 @@ def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
     return reach.beyond_folded <= 0.0 and reach.beyond_stretched <= 0.0
 
 
-def default_range(linkage: FourBar, bar: int = 2, holding: float | None = None) -> tuple[float, float]:
+def choose_range(linkage: FourBar, bar: int = 2, holding: float | None = None) -> tuple[float, float]:
     """Choose the range of a commanded bar's angle that is swept where a scene names none, rad.
 
-    0..2 pi where the bar turns fully; otherwise the first of `intervals`, or the one that holds an angle, shrunk by
-    MARGIN at each end.
+    0..2 pi where the bar turns fully; otherwise the first of `find_intervals`, or the one that holds an angle,
+    shrunk by MARGIN at each end.
     """
     if turns_fully(linkage, bar):
         return 0.0, TURN
-    every = intervals(linkage, bar)
+    every = find_intervals(linkage, bar)
     held = (own for own in every if holding is not None and (holding - own[0]) % TURN <= own[1] - own[0])
     start, stop = next(held, every[0])
     margin = min(MARGIN, (stop - start) / NARROW)
     return start + margin, stop - margin
 
 
-def limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
+def find_limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
     """Find the angles at which a bar reverses, rad, counter-clockwise from theta_1."""
     theta_1 = linkage.ground_angle
     if bar == 2:
@@ -202,7 +202,7 @@ def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
 
 def swing(linkage: FourBar, bar: int = 4) -> float:
     """Angle through which a bar swings between its limits, rad; 2 pi where it turns fully."""
-    start, stop = intervals(linkage, bar)[0]
+    start, stop = find_intervals(linkage, bar)[0]
     return stop - start
 
 
@@ -223,7 +223,7 @@ def time_ratio(linkage: FourBar) -> float | None:
     return (TURN - delta) / delta
 
 
-def on_smooth_path(linkage: FourBar, theta_2: Array, branch: int, bar: int = 2) -> NDArray[np.int8]:
+def follow_smooth_path(linkage: FourBar, theta_2: Array, branch: int, bar: int = 2) -> NDArray[np.int8]:
     """Choose the branch of each position of a sweep that runs smoothly through the change points, (n,).
 
     At a change point sin(theta_4 - theta_3) passes through zero with its slope, so the smooth path

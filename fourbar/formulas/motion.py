@@ -9,7 +9,7 @@ Source: R. L. Norton, Design of Machinery, ch. 6 and 7; B. Paul, Kinematics and 
 
 from typing import NamedTuple
 
-from fourbar.formulas.arithmetic import Number, anywhere, conjugate, divisor, namespace, select, vector
+from fourbar.formulas.arithmetic import Number, conjugate, divisor, is_any, namespace, select, vector
 from fourbar.formulas.position import Loop, Position
 
 FAST = 4.0
@@ -60,8 +60,8 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     leaning = xg * per_e2
     n, rest = (grown + a * (a - d)) * per_e2 + leaning, (grown + d * (d - a)) * per_e2 - leaning
     w = (xg - 0.5 * y) * per_e2
-    if anywhere(side_may_turn_fast(lengths)):
-        fast = side_turns_fast(lengths, at)
+    if is_any(may_turn_fast(lengths)):
+        fast = find_fast_turns(lengths, at)
         heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
         w = select(fast, -heron * per_root / divisor(x * S + y * at.root, fast), w)
         n, rest = select(fast, 0.5 + w, n), select(fast, 0.5 - w, rest)
@@ -70,35 +70,35 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     return Coefficients(1.0, n - g, n + g, rest + g, 2.0 * g, 0.0, dn - dg, dn + dg)
 
 
-def side_may_turn_fast(lengths: Loop) -> Number:
+def may_turn_fast(lengths: Loop) -> Number:
     """Whether |d^2 - a^2| > FAST e^2 where e is shortest."""
     return lengths.d + lengths.a > FAST * abs(lengths.d - lengths.a)
 
 
-def side_turns_fast(lengths: Loop, at: Position) -> Number:
+def find_fast_turns(lengths: Loop, at: Position) -> Number:
     """Where t and x g/e^2 are large and cancel: |d^2 - a^2| > FAST e^2, and x S, y root of one sign."""
     d, a, b, c, _, _ = lengths
     y = (d - a) * (d + a)
     return (abs(y) > FAST * at.e2) & ((y * at.root) * ((b - c) * at.half.sk) > 0.0)
 
 
-def with_sines_of_rates(lengths: Loop, at: Position, k: Coefficients) -> Position:
+def take_sines_of_rates(lengths: Loop, at: Position, k: Coefficients) -> Position:
     """Take u3 and u4 from the instant centres where the side turns fast, so that small sines keep their digits.
 
     d sin(theta_4 - theta_1) = b sin(theta_4 - theta_3) (1 - h3),
     d sin(theta_3 - theta_1) = c sin(theta_4 - theta_3) (1 - h4).
     """
     d, _, b, c, _, _ = lengths
-    if not anywhere(side_may_turn_fast(lengths)):
+    if not is_any(may_turn_fast(lengths)):
         return at
-    fast, scale = side_turns_fast(lengths, at), at.sin_mu / d
+    fast, scale = find_fast_turns(lengths, at), at.sin_mu / d
     u3, u4 = at.u3 * conjugate(at.u1), at.u4 * conjugate(at.u1)
     u3 = select(fast, vector(u3.real, c * scale * (k.h23 - k.h43)) * at.u1, at.u3)
     u4 = select(fast, vector(u4.real, b * scale * k.h23) * at.u1, at.u4)
     return Position(at.u1, at.u2, u3, u4, at.sin_mu, at.diagonal, at.e2, at.root, at.half)
 
 
-def with_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coefficients:
+def put_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coefficients:
     """Put in the exact coefficients of bars that stay parallel: h3, h4 = 0, 1 where `first`, 1, 0 where `second`."""
     either, xp = first | second, namespace(first)
     h3, h4 = xp.where(either, 1.0 * second, k.h3), xp.where(either, 1.0 * first, k.h4)
@@ -126,7 +126,7 @@ def rates(k: Coefficients, speed: Number, acceleration: Number) -> Rates:
     """
     square = speed * speed
     alpha_2, alpha_3, alpha_4 = k.dh2 * square, k.dh3 * square, k.dh4 * square
-    if anywhere(acceleration != 0.0):
+    if is_any(acceleration != 0.0):
         alpha_2 = alpha_2 + k.h2 * acceleration
         alpha_3 = alpha_3 + k.h3 * acceleration
         alpha_4 = alpha_4 + k.h4 * acceleration

@@ -15,7 +15,7 @@ import numpy as np
 
 from fourbar.formulas.arithmetic import (
     Number,
-    anywhere,
+    is_any,
     is_zero,
     namespace,
     polar,
@@ -25,20 +25,20 @@ from fourbar.formulas.arithmetic import (
     sine,
     vector,
 )
-from fourbar.formulas.motion import Coefficients, State, coefficients, rates, with_sines_of_rates
-from fourbar.formulas.motion import with_parallel_pairs as parallel_motion
+from fourbar.formulas.motion import Coefficients, State, coefficients, rates, take_sines_of_rates
+from fourbar.formulas.motion import put_parallel_pairs as parallel_motion
 from fourbar.formulas.position import (
     HalfAngle,
     Loop,
     Position,
     close_loop,
     direction,
+    find_parallel_pairs,
     half_angle,
-    lengths_read_from,
     loop,
-    parallel_pairs,
+    reorder_lengths,
 )
-from fourbar.formulas.position import with_parallel_pairs as parallel_position
+from fourbar.formulas.position import put_parallel_pairs as parallel_position
 from fourbar.linkage import FourBar
 
 NO_DIGIT_LEFT = 16.0 * 2.0**-53
@@ -76,15 +76,15 @@ class Path(NamedTuple):
         half : of q.
         branch : sign of the root in that order, which is that of `drive_sine` for a drive on the bar itself.
         """
-        turned, along = self.theta_1 != 0.0, anywhere(is_zero(self.theta_1))
+        turned, along = self.theta_1 != 0.0, is_any(is_zero(self.theta_1))
         u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
         if along and self.bar == 4:
             u2 = -u2
-        if along and anywhere(turned):  # of linkages
+        if along and is_any(turned):  # of linkages
             u2 = select(turned, direction(q), u2)
         at = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
-            at = parallel_position(at, *parallel_pairs(self.lengths, half, branch))
+            at = parallel_position(at, *find_parallel_pairs(self.lengths, half, branch))
         return at
 
     def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
@@ -108,9 +108,9 @@ class Path(NamedTuple):
     def motion(self, at: Position, branch: Number) -> tuple[Position, Coefficients]:
         """Positions and kinematic coefficients by q with the bars in their usual order, from `position`."""
         k = coefficients(self.lengths, at)
-        at = with_sines_of_rates(self.lengths, at, k)
+        at = take_sines_of_rates(self.lengths, at, k)
         if self.may_stay_parallel:
-            first, second = parallel_pairs(self.lengths, at.half, branch)
+            first, second = find_parallel_pairs(self.lengths, at.half, branch)
             known = ~namespace(at.root).isnan(at.root)
             k = parallel_motion(k, first & known, second & known)
         return (at, k) if self.bar == 2 else (self.in_order(at), read_from(self.bar, k))
@@ -138,27 +138,29 @@ class Path(NamedTuple):
             return at.sin_mu if self.bar == 2 else at.root * (0.5 / (self.lengths.b * self.lengths.c))
         found = drive_sine_of_triangle(self.lengths, at, role)
         if self.may_stay_parallel:  # with the sine of the angle that all of them make
-            first, second = parallel_pairs(self.lengths, at.half, sign(at.root))
+            first, second = find_parallel_pairs(self.lengths, at.half, sign(at.root))
             with_first, with_second = (0.0, 2.0 * at.half.sk) if role == 3 else (-2.0 * at.half.sk, 0.0)
             found = select(first, with_first, select(second, with_second, found))
         return -found if self.bar + drive_bar == 7 else found  # there the two bars have changed places
 
 
-def path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
+def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     """Prepare the path in the angle of bar 2, 3 or 4."""
     d, a, b, c, _, _ = lengths
     unit = power_of_two(0.25 * (d + a + b + c))
-    own, u1 = loop(*lengths_read_from(bar, (d / unit, a / unit, b / unit, c / unit))), polar(1.0, theta_1)
-    meets = anywhere(is_zero(own.E1) & is_zero(own.E2))
+    own, u1 = loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit))), polar(1.0, theta_1)
+    meets = is_any(is_zero(own.E1) & is_zero(own.E2))
     return Path(bar, own, theta_1, -u1 if bar == 4 else u1, unit, meets)
 
 
-def singular(at: Position, margin: float = NO_DIGIT_LEFT) -> Number:
+def find_singular(at: Position, margin: float = NO_DIGIT_LEFT) -> Number:
     """Where velocities are 0/0: bars 3 and 4 lie in one line."""
     return np.abs(at.sin_mu) <= margin
 
 
-def state(linkage: FourBar, theta_2: Number, branch: Number, omega_2: Number = 1.0, alpha_2: Number = 0.0) -> State:
+def compute_state(
+    linkage: FourBar, theta_2: Number, branch: Number, omega_2: Number = 1.0, alpha_2: Number = 0.0
+) -> State:
     """Positions and motion for a motion of the input; NaN where the loop does not close, or speeds are 0/0.
 
     Parameters
@@ -169,9 +171,9 @@ def state(linkage: FourBar, theta_2: Number, branch: Number, omega_2: Number = 1
     """
     with np.errstate(all="ignore"):
         lengths = loop(*linkage.lengths)
-        reading = path(lengths, linkage.ground_angle)
+        reading = prepare_path(lengths, linkage.ground_angle)
         at = reading.position(theta_2, reading.half_angle(theta_2), branch)
-        at, k = reading.motion(at._replace(root=np.where(singular(at), np.nan, at.root)), branch)
+        at, k = reading.motion(at._replace(root=np.where(find_singular(at), np.nan, at.root)), branch)
         return State(lengths, linkage.ground_angle, theta_2, at, k, omega_2, rates(k, omega_2, alpha_2))
 
 
@@ -202,7 +204,7 @@ def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Numbe
     return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (2.0 * b * at.e2)
 
 
-def smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
+def find_smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
     """Return the root's sign on a path that runs smoothly through change points: there cos h or sin h changes its sign.
 
     Parameters

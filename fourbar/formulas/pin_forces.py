@@ -12,7 +12,7 @@ Source: Linares Mendoza, section 5.7 (the thirteen equations); R. L. Norton, Des
 
 from typing import NamedTuple
 
-from fourbar.formulas.arithmetic import Number, anywhere, cross, dot, select, vector
+from fourbar.formulas.arithmetic import Number, cross, dot, is_any, select, vector
 from fourbar.formulas.motion import Rates
 from fourbar.formulas.position import Loop, Position
 
@@ -101,7 +101,7 @@ def coupler_about_B(lengths: Loop, three: Body, at: Position, moving: Rates, sin
     return -three.m * (of_A + of_G) - three.I * alpha_3
 
 
-def between(M_u: Number, M_v: Number, u: Number, v: Number, sine: Number) -> Number:
+def solve_between(M_u: Number, M_v: Number, u: Number, v: Number, sine: Number) -> Number:
     """Solve u x F = M_u and v x F = M_v for F, unit vectors with u x v = sine: F = (M_u v - M_v u)/sine."""
     return (M_u * v - M_v * u) * (1.0 / sine)
 
@@ -124,10 +124,10 @@ def pin_forces(
         b u3 x F32, the opposite of the coupler's moment about B.
 
     >>> from math import pi
-    >>> from fourbar.formulas.path import state
+    >>> from fourbar.formulas.path import compute_state
     >>> from fourbar.formulas.arithmetic import polar
     >>> from fourbar.linkage import uniform  # below, Norton, example 11-3: in, lbf, s
-    >>> s, deg = state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
+    >>> s, deg = compute_state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)  # a force on the coupler
     >>> bars = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.020, 1.5, G3), Body(0.015, 0.8, 5 + 0j)
     >>> w, mass_at_A = inertia_wrenches(5, bars, s.at, s.moving)
@@ -141,18 +141,18 @@ def pin_forces(
     of_3 = M3 - C
     along, across = mass_at_A.real, mass_at_A.imag  # bar 2: apart, for each would cancel in a sum that it is no part of
     if drive_bar == 4:
-        F32 = between(-M2 / a, moment_of_F32 / b, at.u2, at.u3, sine)
-        F43 = between(-of_3 / b, -M2 / a - cross(at.u2, R3) - across, at.u3, at.u2, -sine)
+        F32 = solve_between(-M2 / a, moment_of_F32 / b, at.u2, at.u3, sine)
+        F43 = solve_between(-of_3 / b, -M2 / a - cross(at.u2, R3) - across, at.u3, at.u2, -sine)
     elif drive_bar == 3:
         of_4 = M4 + C
-        F43 = between(-M2 / a - cross(at.u2, R3) - across, of_4 / c, at.u2, at.u4, sine)
-        F32 = between(-M2 / a - across, of_4 / c + cross(at.u4, R3), at.u2, at.u4, sine)
+        F43 = solve_between(-M2 / a - cross(at.u2, R3) - across, of_4 / c, at.u2, at.u4, sine)
+        F32 = solve_between(-M2 / a - across, of_4 / c + cross(at.u4, R3), at.u2, at.u4, sine)
         F32 = (dot(at.u2, F32) + along - 1j * (M2 / a)) * at.u2  # across bar 2 its own moment knows it best
     else:
         k = 1.0 / (c * sine)
         F43 = (of_3 * k * (1.0 / b)) * at.diagonal - ((M3 + M4) * k) * at.u3
         F32 = R3 + F43 + mass_at_A * at.u2
         short = d < a
-        if anywhere(short):  # all bars turn as one, and the sum loses the small component across bar 2
+        if is_any(short):  # all bars turn as one, and the sum loses the small component across bar 2
             F32 = F32 + select(short, moment_of_F32 / a - cross(at.u2, F32), 0.0) * 1j * at.u2
     return PinForces(-1.0 * (R2 + F32), F32, F43, F43 - R4)  # NumPy negates complex numbers slowly

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import Number, cross, sine
 from fourbar.formulas.circuits import circuits
-from fourbar.formulas.mobility import TURN, Array, change_points, on_smooth_path, turns_fully
+from fourbar.formulas.mobility import TURN, Array, change_points, follow_smooth_path, turns_fully
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import state
+from fourbar.formulas.path import compute_state
 from fourbar.linkage import A_BRANCH, MOST_STEPS, FourBar, require, require_bar, require_numbers, require_whole
 
 
@@ -43,7 +43,7 @@ def point_coefficients(linkage: FourBar, theta_2: Array, branch: Number, bar: in
     expect("z", z, complex, float, int, np.number)
     require("z", z.real)
     require("z", z.imag)
-    moving = _state(linkage, theta_2, branch)
+    moving = _compute_state(linkage, theta_2, branch)
     return PointCoefficients(moving.velocity(bar, z), moving.acceleration(bar, z))
 
 
@@ -74,7 +74,7 @@ def instant_centres(linkage: FourBar, theta_2: Array, branch: Number) -> dict[tu
 
     Source: R. L. Norton, Design of Machinery, ch. 6.
     """
-    here = _state(linkage, theta_2, branch)
+    here = _compute_state(linkage, theta_2, branch)
     at, one = here.at, np.ones_like(here.theta_2)
     O4, A, B = linkage.ground * at.u1 + 0.0 * at.u2, here.foot(3), here.point(4, linkage.output.length)
     centres = {
@@ -127,21 +127,21 @@ def coupler_curve(
         turns = 2 if len(change_points(linkage)) == 1 else 1
         # odd halves of a multiple of 4 never meet theta_1 or theta_1 + pi
         theta_2: Array = start + half * (turns * TURN / steps)
-        signs = on_smooth_path(linkage, theta_2, branch)
+        signs = follow_smooth_path(linkage, theta_2, branch)
     else:
         out = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(half[: steps // 2] * (TURN / steps))
-        there = on_smooth_path(linkage, out, branch)
+        there = follow_smooth_path(linkage, out, branch)
         theta_2, signs = np.concatenate((out, out[::-1])), np.concatenate((there, -there[::-1]))
-    curve = state(linkage, theta_2, signs).point(3, point)
+    curve = compute_state(linkage, theta_2, signs).point(3, point)
     x, y = curve.real, curve.imag
     theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)
     return CouplerCurve(theta_2, np.append(signs, signs[0]), np.append(x, x[0]), np.append(y, y[0]))
 
 
-def _state(linkage: FourBar, theta_2: object, branch: object) -> State:
+def _compute_state(linkage: FourBar, theta_2: object, branch: object) -> State:
     """Of positions as a user gives them."""
     expect("linkage", linkage, FourBar)
     angles, signs = require_numbers("theta_2", theta_2), require_numbers("branch", branch, A_BRANCH)
     if not (np.abs(signs) == 1.0).all() or signs.shape not in ((), angles.shape):
         raise InputError("branch", branch, f"{A_BRANCH}, or one of them for each angle")
-    return state(linkage, angles, signs)
+    return compute_state(linkage, angles, signs)

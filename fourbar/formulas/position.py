@@ -18,8 +18,8 @@ import numpy as np
 
 from fourbar.formulas.arithmetic import (
     Number,
-    anywhere,
     exact_difference,
+    is_any,
     namespace,
     polar,
     select,
@@ -72,7 +72,7 @@ class Position(NamedTuple):
     half: HalfAngle
 
 
-def lengths_read_from(bar: int, lengths: tuple[Number, Number, Number, Number]) -> tuple[Any, Any, Any, Any]:
+def reorder_lengths(bar: int, lengths: tuple[Number, Number, Number, Number]) -> tuple[Any, Any, Any, Any]:
     """Return the lengths of ground, the bar itself, coupler and output, as the loop is read from bar 2, 3 or 4."""
     d, a, b, c = lengths
     return (d, b, a, c) if bar == 3 else (d, c, b, a) if bar == 4 else (d, a, b, c)
@@ -112,34 +112,38 @@ def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAng
     ) is not np:  # near 180 deg the tangent is large, and the library's derivative is a difference
         s, k = xp.sin(0.5 * psi), xp.cos(0.5 * psi)
         s = select((lengths.E1 if opposite else lengths.E2) == 0.0, s + hair(s), s)
-        return with_factors(lengths, k * k, s * s, -s * k) if opposite else with_factors(lengths, s * s, k * k, s * k)
+        return (
+            compute_factors(lengths, k * k, s * s, -s * k)
+            if opposite
+            else compute_factors(lengths, s * s, k * k, s * k)
+        )
     if not opposite:
         return half_angle_of_tangent(lengths, tangent(0.5 * psi))
     t = tangent(0.5 * psi)
     meets = lengths.E1 == 0.0
-    if anywhere(meets):
+    if is_any(meets):
         t = select(meets, t + hair(t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
-    return with_factors(lengths, kk, t * sk, -sk)
+    return compute_factors(lengths, kk, t * sk, -sk)
 
 
 def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
     """Compute the same from t = tan h."""
     meets = lengths.E2 == 0.0
-    if anywhere(meets):
+    if is_any(meets):
         t = select(meets, t + hair(t), t)
     kk = 1.0 / (1.0 + t * t)
     sk = t * kk
-    return with_factors(lengths, t * sk, kk, sk)
+    return compute_factors(lengths, t * sk, kk, sk)
 
 
-def with_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAngle:
+def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAngle:
     """Compute the factors of Heron's formula from sin^2 h, cos^2 h and sin h cos h."""
     four_ad, four_bc = 4.0 * lengths.a * lengths.d, 4.0 * lengths.b * lengths.c
     outer, inner = lengths.E1 + four_ad * kk, lengths.E2 + four_ad * ss
     short = four_ad > four_bc
-    if anywhere(short):  # outer + inner = 4 b c: of the two, the one that changes less over psi has the digits
+    if is_any(short):  # outer + inner = 4 b c: of the two, the one that changes less over psi has the digits
         outer, inner = (
             select(short & (ss < kk), four_bc - inner, outer),
             select(short & (kk <= ss), four_bc - outer, inner),
@@ -186,7 +190,7 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     return Position(u1, u2, u3, u4, root * (0.5 / (b * c)), diagonal, e2, root, half)
 
 
-def parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Number, Number]:
+def find_parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Number, Number]:
     """Where two pairs of bars stay parallel: E1 = E2 = 0, and the root is 4 a d sin h cos h or its opposite.
 
     First: the coupler keeps the ground's direction and bars 2, 4 turn together (a = c, b = d).
@@ -197,7 +201,7 @@ def parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Numb
     return (a == c) & (b == d) & (side > 0), (a == b) & (c == d) & (side < 0)
 
 
-def with_parallel_pairs(at: Position, first: Number, second: Number) -> Position:
+def put_parallel_pairs(at: Position, first: Number, second: Number) -> Position:
     """Put in the exact directions u3 = u1, u4 = u2 where `first`, u3 = -u2, u4 = -u1 where `second`."""
     xp = namespace(first, at.u2)
     u3 = xp.where(first, at.u1, xp.where(second, -at.u2, at.u3))

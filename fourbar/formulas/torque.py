@@ -10,7 +10,7 @@ h3 = 0, T4 where h4 = 0.
 Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); M. Eksergian, Dynamical analysis of machines (1930).
 """
 
-from fourbar.formulas.arithmetic import Number, anywhere, conjugate, dot
+from fourbar.formulas.arithmetic import Number, conjugate, dot, is_any
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.pin_forces import Bodies, about_first_pin
 from fourbar.formulas.position import Position
@@ -40,7 +40,7 @@ def half_slope(a: Number, bodies: Bodies, at: Position, k: Coefficients) -> Numb
     AR = ((a * k.h2 * three.m * three.z) * at.u3) * conjugate(at.u2)  # m h2 (A.R + i A x R)
     half = about_first_pin(three) * (k.h3 * k.dh3) + about_first_pin(four) * (k.h4 * k.dh4)
     half = half + k.dh3 * AR.real + (k.h3 * k.h23) * AR.imag
-    if anywhere(k.dh2 != 0.0):  # q is not theta_2
+    if is_any(k.dh2 != 0.0):  # q is not theta_2
         half = half + (k.h3 * k.dh2) * dot((a * three.m) * at.u2, three.z * at.u3)
         half = half + (about_first_pin(two) + three.m * a * a) * (k.h2 * k.dh2)
     return half
@@ -56,11 +56,11 @@ def driving_torque(by: Number, inertial: Number, Q: Number) -> Number:
     Q : generalised force of loads and effects, N m.
 
     >>> from math import pi
-    >>> from fourbar.formulas.path import state
+    >>> from fourbar.formulas.path import compute_state
     >>> from fourbar.formulas.pin_forces import Body
     >>> from fourbar.formulas.arithmetic import polar
     >>> from fourbar.linkage import uniform  # below, Norton, example 11-3: in, lbf, s
-    >>> s, deg = state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
+    >>> s, deg = compute_state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)
     >>> bars = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.020, 1.5, G3), Body(0.015, 0.8, 5 + 0j)
     >>> inertial = sum(inertia(5, bars, s.at, s.k)) * -40 + half_slope(5, bars, s.at, s.k) * 25**2

@@ -14,7 +14,7 @@ MARGIN = 1.15
 """Width and height of the picture over those of the linkage."""
 
 
-def rounded(*numbers: float) -> str:
+def write_rounded(*numbers: float) -> str:
     """Numbers that nothing is computed from, in six digits."""
     return " ".join(f"{number:.6g}" for number in numbers)
 
@@ -33,7 +33,7 @@ class CameraView(NamedTuple):
         return self.half_height / math.tan(math.radians(0.5 * FOVY))
 
 
-def frame(linkage: FourBar) -> CameraView:
+def compute_frame(linkage: FourBar) -> CameraView:
     """Compute the box around the circle of A about O2 and of B about O4: no position leaves it."""
     d, a, _, c = linkage.lengths
     x, y = d * math.cos(linkage.ground_angle), d * math.sin(linkage.ground_angle)
@@ -45,8 +45,8 @@ def frame(linkage: FourBar) -> CameraView:
 
 def add_appearance(root: ET.Element, linkage: FourBar) -> None:
     """Extent and free camera of the viewer, light, background."""
-    seen = frame(linkage)
-    ET.SubElement(root, "statistic", extent=rounded(seen.distance / 1.5), center=rounded(seen.x, seen.y, 0))
+    seen = compute_frame(linkage)
+    ET.SubElement(root, "statistic", extent=write_rounded(seen.distance / 1.5), center=write_rounded(seen.x, seen.y, 0))
     visual = ET.SubElement(root, "visual")
     # the viewer's free camera starts at 1.5 extents from the centre; -90 deg looks straight down on the plane
     ET.SubElement(visual, "global", azimuth="90", elevation="-90", fovy=f"{FOVY:g}", offwidth="1280", offheight="960")
@@ -58,8 +58,8 @@ def add_appearance(root: ET.Element, linkage: FourBar) -> None:
 
 def add_camera(world: ET.Element, linkage: FourBar) -> None:
     """Add the camera `plane`, and a light at the same place."""
-    seen = frame(linkage)
-    place = rounded(seen.x, seen.y, seen.distance)
+    seen = compute_frame(linkage)
+    place = write_rounded(seen.x, seen.y, seen.distance)
     shining = {"diffuse": ".2 .2 .2", "specular": ".1 .1 .1"}  # with the headlight 1
     shining |= {"directional": "true", "castshadow": "false"}
     ET.SubElement(world, "light", shining, name="light", pos=place, dir="0 0 -1")

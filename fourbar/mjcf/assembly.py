@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from fourbar.errors import LimitError
 from fourbar.linkage import FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.document import Start, at_start
-from fourbar.mjcf.model import carriable
+from fourbar.mjcf.document import Start, find_start
+from fourbar.mjcf.model import require_carriable
 from fourbar.mjcf.notes import NOTES
 from fourbar.scene import Scene, require_input
 
@@ -35,7 +35,7 @@ class Assembly(NamedTuple):
 def assemble(
     scene: Scene, start: Start | None, form: str, at_pins: Mapping[str, tuple[str, str]], *, without_loads: bool = False
 ) -> Assembly:
-    """Evaluate the linkage in the state given, or in that of `at_start`.
+    """Evaluate the linkage in the state given, or in that of `find_start`.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def assemble(
     if scene.drive is not None:
         raise LimitError(f"a linear drive (drive.from, drive.to) has no counterpart in {form}")
     linkage = scene.linkage
-    carriable(linkage)
+    require_carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
     gravity, dynamics = (0.0, 0.0), dict[str, dict[str, float]]()
     of: Any
@@ -70,7 +70,7 @@ def assemble(
                 dynamics.setdefault(pin, {})[name] = value
         else:
             raise LimitError(f"the effect {of.key!r} has no counterpart in {form}")
-    (theta_2, of_3_to_2, theta_4), speeds = (start or at_start(scene))[:2]
+    (theta_2, of_3_to_2, theta_4), speeds = (start or find_start(scene))[:2]
     theta_3 = theta_2 + of_3_to_2
     foot = {1: 0j, 2: 0j, 3: cmath.rect(linkage.input.length, theta_2)}
     foot[4] = cmath.rect(linkage.ground, linkage.ground_angle)
@@ -78,7 +78,7 @@ def assemble(
     return Assembly(turn, foot, numbers, inertia, gravity, dynamics)
 
 
-def comment(scene: Scene, form: str, reader: str, assembly: Assembly, at_B: str = "") -> str:
+def write_comment(scene: Scene, form: str, reader: str, assembly: Assembly, at_B: str = "") -> str:
     """Say in what state the file stands, and where its reader's numbers are."""
     notes, bar = NOTES["assembled"], scene.drive_bar
     joint = f", joint {FIRST_PIN[bar]}" if bar != 3 else ""

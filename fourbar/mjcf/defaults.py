@@ -2,7 +2,7 @@
 
 import math
 
-from fourbar.formulas.mobility import default_range
+from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import BAR_NAMES, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
@@ -13,15 +13,15 @@ OMEGA = 1.0
 """rad/s of the input."""
 
 
-def scene_from_lengths(ground: float, input: float, coupler: float, output: float, omega: float = OMEGA) -> Scene:
+def make_scene(ground: float, input: float, coupler: float, output: float, omega: float = OMEGA) -> Scene:
     """Uniform slender bars of 1 kg/m on the open branch, the input at omega (rad/s) from mid-range; lengths in m."""
     linkage = uniform(ground, input, coupler, output, per_metre=PER_METRE)
     title = f"four-bar {ground!r} {input!r} {coupler!r} {output!r}"
-    return Scene(linkage, Motion(_mid_range(linkage), omega), title=title)
+    return Scene(linkage, Motion(_find_mid_range(linkage), omega), title=title)
 
 
-def defaults_used(scene: Scene) -> list[str]:
-    """List the lengths that `scene_from_lengths` was given and its defaults, one line each."""
+def list_defaults(scene: Scene) -> list[str]:
+    """List the lengths that `make_scene` was given and its defaults, one line each."""
     theta_2 = scene.motion.theta_2
     assert isinstance(theta_2, float)
     return [
@@ -35,12 +35,12 @@ def defaults_used(scene: Scene) -> list[str]:
     ]
 
 
-def _mid_range(linkage: FourBar) -> float:
+def _find_mid_range(linkage: FourBar) -> float:
     """Return the middle of the input's range; a quarter turn from the ground bar where it turns fully.
 
     Half a turn would start a parallelogram in its change point.
     """
-    least, most = default_range(linkage)
+    least, most = choose_range(linkage)
     if most - least >= 2.0 * math.pi * (1.0 - 1e-12):
         return linkage.ground_angle + math.pi / 2.0
     return 0.5 * (least + most)

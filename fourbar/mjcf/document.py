@@ -9,13 +9,13 @@ import numpy as np
 
 from fourbar.effects.numbers import ROWS
 from fourbar.errors import InputError, LimitError, NotAssembledError
-from fourbar.formulas.mobility import change_points, default_range
+from fourbar.formulas.mobility import change_points, choose_range
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.appearance import add_appearance
-from fourbar.mjcf.effects import row, unwound
-from fourbar.mjcf.model import Model, carriable, constant, motor, servo, text
+from fourbar.mjcf.effects import find_row, unwind
+from fourbar.mjcf.model import Model, join, make_constant_motor, make_motor, make_servo, require_carriable
 from fourbar.mjcf.notes import NOTES
-from fourbar.mjcf.settings import FULL_TURN, RECIPE, Settings, WindowMotion, fitted_pad
+from fourbar.mjcf.settings import FULL_TURN, RECIPE, Settings, WindowMotion, fit_pad
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command, require_input
 from fourbar.solution import Array
@@ -34,7 +34,7 @@ Drive = Literal["flywheel", "motor", "none"]
 couple; nothing. A free motion has none."""
 
 
-def mjcf(
+def write_mjcf(
     scene: Scene,
     settings: Settings = RECIPE,
     reader: str = "mujoco",
@@ -51,7 +51,7 @@ def mjcf(
     reader : one of `SIMULATORS`: the comments say where torque and pin force are read there.
     keyframe : False leaves it out, and with it the assembled pose and the servo that starts it from rest; then
         `settings.timestep` must be given and no position is computed.
-    start : the assembled state to open with; None: that of `at_start`.
+    start : the assembled state to open with; None: that of `find_start`.
     drive : "flywheel" keeps the input at omega_2; "motor" leaves the driven bar to a controller, "none" likewise
         without an actuator: then nothing is added to the linkage's inertia.
 
@@ -66,8 +66,8 @@ def mjcf(
     if scene.motion.free is not None:
         drive, cylinder = "none", None
     if drive != "flywheel":
-        settings = _without_flywheel(scene, settings)
-    start = (start or at_start(scene)) if keyframe else None
+        settings = _leave_out_flywheel(scene, settings)
+    start = (start or find_start(scene)) if keyframe else None
     if start is not None:
         timestep = start.run.timestep(settings)
     elif settings.timestep is not None:
@@ -75,24 +75,24 @@ def mjcf(
     else:
         raise InputError("timestep", None, "is needed where no keyframe is requested")
     if settings.pad == "fitted":
-        settings = replace(settings, pad=_pad(scene))
+        settings = replace(settings, pad=_fit_pad(scene))
     model = Model(scene.linkage, settings, timestep)
     model.cylinder = cylinder
     for term in (*scene.effects, *scene.loads):
-        row(term).add(term, model)
-    armature = flywheel(scene, settings)
-    root = ET.Element("mujoco", model=plain(scene.title) or "four-bar")
-    for line in _comments(scene, drive, reader):
+        find_row(term).add(term, model)
+    armature = size_flywheel(scene, settings)
+    root = ET.Element("mujoco", model=make_plain(scene.title) or "four-bar")
+    for line in _write_comments(scene, drive, reader):
         root.append(ET.Comment(f" {line} "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     model.add_option(root)
     add_appearance(root, scene.linkage)
-    actuator = motor(scene.drive_bar) if drive == "motor" else constant(armature * scene.motion.alpha_2)
+    actuator = make_motor(scene.drive_bar) if drive == "motor" else make_constant_motor(armature * scene.motion.alpha_2)
     if start is not None:
-        start = start._replace(qpos=unwound(scene, start.qpos))
+        start = start._replace(qpos=unwind(scene, start.qpos))
         model.rest = start.qpos
         if scene.motion.alpha_2 == 0.0 and drive == "flywheel":
-            actuator = servo(armature / (SETTLING * timestep), start.qvel[0])
+            actuator = make_servo(armature / (SETTLING * timestep), start.qvel[0])
     model.add_bodies(root, armature)
     model.add_load_sites(root)
     model.add_closure(root)
@@ -100,7 +100,7 @@ def mjcf(
     model.add_actuators(root, actuator, cylinder=cylinder is not None and drive != "none")
     if start is not None:
         frame = ET.SubElement(root, "keyframe")
-        ET.SubElement(frame, "key", name="start", qpos=text(*start.qpos), qvel=text(*start.qvel))
+        ET.SubElement(frame, "key", name="start", qpos=join(*start.qpos), qvel=join(*start.qvel))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
@@ -110,10 +110,10 @@ def _require_carried(scene: Scene) -> None:
     require_input(scene, "the drive of an MJCF")
     if scene.motion.law is not None:
         raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
-    carriable(scene.linkage)
+    require_carriable(scene.linkage)
 
 
-def _comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
+def _write_comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
     """Say how the file starts and where its numbers stand, a line each."""
     notes, numbers, bar = NOTES["mjcf"], NOTES["numbers"][reader], scene.drive_bar
     kinds: list[str] = [drive if scene.drive is None else f"cylinder_{drive}"]
@@ -121,17 +121,17 @@ def _comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
         kinds = ["released"]
     elif drive == "flywheel":
         kinds = ["accelerated" if scene.motion.alpha_2 else "driven"]
-        kinds += [] if _span(scene.linkage) >= FULL_TURN and not change_points(scene.linkage) else ["limits"]
+        kinds += [] if _compute_span(scene.linkage) >= FULL_TURN and not change_points(scene.linkage) else ["limits"]
         kinds += ["cylinder_flywheel"] if scene.drive is not None else ["elsewhere"] if bar != 2 else []
     lines: list[str] = [notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar) for kind in ("opens", *kinds)]
-    if reader == "genesis" and (names := _without_joints(scene)):
+    if reader == "genesis" and (names := _name_untaken(scene)):
         lines.append(notes["genesis_without"].format(names=", ".join(names)))
     lines += numbers["instant"] + (numbers["driven"] if drive == "flywheel" else []) + numbers["pins"]
     lines += [notes["loads"]] if reader == "mujoco" and scene.loads else []
     return [*lines, *numbers["after"]]
 
 
-def _without_joints(scene: Scene) -> list[str]:
+def _name_untaken(scene: Scene) -> list[str]:
     """Name what is no number of a joint but its rest angle."""
     names = ["loads"] if scene.loads else []
     for effect in scene.effects:
@@ -142,36 +142,40 @@ def _without_joints(scene: Scene) -> list[str]:
     return names
 
 
-def flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
+def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
     """Armature of pin O2, kg m^2: `settings.flywheel` times sum of m L^2 + I + (m g L + F L + M)/q.
 
     L is the longest arm at which anything acts, and the work is what each load and effect says of itself;
     in a revolution it is then a small part of the flywheel's energy. q is the greater of omega_2^2 and |alpha_2|.
     """
-    return float(f"{settings.flywheel * (_inertia(scene.linkage) + _work(scene)):.3g}")
+    return float(f"{settings.flywheel * (_sum_inertia(scene.linkage) + _sum_work(scene)):.3g}")
 
 
-def load_ratio(scene: Scene) -> float:
+def compute_load_ratio(scene: Scene) -> float:
     """(m g L + F L + M)/(q (m L^2 + I)): loads and weights against the inertia of the bars."""
-    inertia = _inertia(scene.linkage)
-    return _work(scene) / inertia if inertia else math.inf
+    inertia = _sum_inertia(scene.linkage)
+    return _sum_work(scene) / inertia if inertia else math.inf
 
 
-def _without_flywheel(scene: Scene, settings: Settings) -> Settings:
+def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
     """Choose the timestep by what moves the linkage, and for a free motion a closure that takes little energy out."""
-    quickest = math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + load_ratio(scene) * _quickness(scene)) or AT_REST
+    quickest = (
+        math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + compute_load_ratio(scene) * _compute_quickness(scene)) or AT_REST
+    )
     settings = replace(settings, flywheel=0.0, timestep=settings.timestep or math.tau / (RELEASED_STEPS * quickest))
     if scene.motion.free is None:
         return settings
     return replace(settings, pad=None, time_constant_steps=RELEASED_CLOSURE)
 
 
-def _pad(scene: Scene) -> float:
+def _fit_pad(scene: Scene) -> float:
     _, a, b, c = scene.linkage.lengths
-    return fitted_pad(_quickness(scene) * a / max(b, c), load_ratio(scene), mass_ratio(scene.linkage))
+    return fit_pad(
+        _compute_quickness(scene) * a / max(b, c), compute_load_ratio(scene), compute_mass_ratio(scene.linkage)
+    )
 
 
-def mass_ratio(linkage: FourBar) -> float:
+def compute_mass_ratio(linkage: FourBar) -> float:
     """Of coupler and output, the heavier by the lighter: (I + m r^2)/L^2 about the first pin, as the closure feels it.
 
     1 where one of them has no mass.
@@ -181,12 +185,12 @@ def mass_ratio(linkage: FourBar) -> float:
     return max(felt) / min(felt) if min(felt) > 0.0 else 1.0
 
 
-def _quickness(scene: Scene) -> float:
+def _compute_quickness(scene: Scene) -> float:
     """Return the greater of omega_2^2 and |alpha_2|: by it the accelerations of all bars scale, rad/s^2."""
     return max((scene.motion.omega_2 or AT_REST) ** 2, abs(scene.motion.alpha_2))
 
 
-def _inertia(linkage: FourBar) -> float:
+def _sum_inertia(linkage: FourBar) -> float:
     """Sum of m L^2 + I, kg m^2."""
     longest = max(linkage.lengths)
     inertia = 0.0
@@ -197,11 +201,11 @@ def _inertia(linkage: FourBar) -> float:
     return inertia
 
 
-def _work(scene: Scene) -> float:
+def _sum_work(scene: Scene) -> float:
     """Sum of the couples that loads and effects may ask of the drive, by the accelerations' scale, kg m^2."""
-    quickness = _quickness(scene)
+    quickness = _compute_quickness(scene)
     speed = math.sqrt(quickness)
-    couples = (row(term).couple(term, scene.linkage, speed) for term in (*scene.loads, *scene.effects))
+    couples = (find_row(term).couple(term, scene.linkage, speed) for term in (*scene.loads, *scene.effects))
     return sum(couples) / quickness
 
 
@@ -213,13 +217,13 @@ class Start(NamedTuple):
     run: WindowMotion
 
 
-def run_through(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
+def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
     """Choose the motion through positions: counter-clockwise from the least, or clockwise from the greatest."""
     least, most = float(np.min(theta_2)), float(np.max(theta_2))
     return WindowMotion(least, most, omega, alpha) if omega > 0.0 else WindowMotion(most, least, omega, alpha)
 
 
-def at_start(scene: Scene) -> Start:
+def find_start(scene: Scene) -> Start:
     """Where the motion begins: the first position, in the direction of motion, that assembles."""
     at = command(scene)
     alpha = scene.motion.alpha_2
@@ -234,21 +238,21 @@ def at_start(scene: Scene) -> Start:
     theta = (float(at.theta_2[first]), float(solution.theta_3[first]), float(solution.theta_4[first]))
     omega = (speed, float(solution.omega_3[first]), float(solution.omega_4[first]))
     if np.ptp(theta_2) == 0.0:
-        theta_2 = theta[0] + np.array([0.0, _span(scene.linkage)])
+        theta_2 = theta[0] + np.array([0.0, _compute_span(scene.linkage)])
         alpha = 0.0  # no window is requested: its length only sets the timestep
     return Start(
         (theta[0], theta[1] - theta[0], theta[2]),
         (omega[0], omega[1] - omega[0], omega[2]),
-        run_through(theta_2, speed or AT_REST, alpha if speed else 0.0),
+        choose_run(theta_2, speed or AT_REST, alpha if speed else 0.0),
     )
 
 
-def _span(linkage: FourBar) -> float:
+def _compute_span(linkage: FourBar) -> float:
     """Width of the range that the input can turn through, rad."""
-    least, most = default_range(linkage)
+    least, most = choose_range(linkage)
     return min(abs(most - least), 2.0 * math.pi)
 
 
-def plain(title: str) -> str:
+def make_plain(title: str) -> str:
     """Return a title that XML can hold: every character that does not print becomes a blank."""
     return "".join(character if character.isprintable() else " " for character in title).strip()

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 Joints = tuple[float, float, float]
 
 
-def _gravity(effect: "Gravity", model: Model) -> None:
+def _add_gravity(effect: "Gravity", model: Model) -> None:
     """Set the option ``gravity``."""
     model.option["gravity"] = (*effect.vector, 0.0)
 
 
-def _weights(effect: "Gravity", linkage: FourBar, speed: float) -> float:
+def _sum_weights(effect: "Gravity", linkage: FourBar, speed: float) -> float:
     """Sum of m g L, with L the longest arm at which a weight acts."""
     longest, total = max(linkage.lengths), 0.0
     for number in MOVING_BARS:
@@ -29,19 +29,19 @@ def _weights(effect: "Gravity", linkage: FourBar, speed: float) -> float:
     return total * abs(effect.magnitude)
 
 
-def _viscous(effect: "Viscous", model: Model) -> None:
+def _add_viscous(effect: "Viscous", model: Model) -> None:
     """Set the attribute ``damping`` of the hinge (of a tendon at the cut pin B)."""
     for pin, k in effect.coefficients:
         model.pin[pin]["damping"] = k
 
 
-def _friction(effect: "Friction", model: Model) -> None:
+def _add_friction(effect: "Friction", model: Model) -> None:
     """Set the attribute ``frictionloss`` of the hinge (of a tendon at the cut pin B)."""
     for pin, f in effect.torques:
         model.add_dry_friction(pin, f)
 
 
-def _torsion(effect: "Torsion", model: Model) -> None:
+def _add_torsion(effect: "Torsion", model: Model) -> None:
     """``stiffness`` of the hinge (of a tendon at the cut pin B), its rest shifted by the preload."""
     for pin, k, rest, preload in effect.springs:
         turned = model.linkage.ground_angle if pin in ("O2", "O4") else 0.0
@@ -69,22 +69,22 @@ def _unwind_torsion(effect: "Torsion", linkage: FourBar, q: Joints) -> Joints:
     return q2, q3, q4
 
 
-def _springs(effect: "Springs", model: Model) -> None:
+def _add_springs(effect: "Springs", model: Model) -> None:
     """Add a spatial tendon between two sites, its rest length shortened by the preload."""
     model.springs += effect.springs
 
 
-def _tensions(effect: "Springs", linkage: FourBar, speed: float) -> float:
+def _sum_tensions(effect: "Springs", linkage: FourBar, speed: float) -> float:
     """Greatest tensions times the longest bar."""
     return sum(spring.greatest_tension(linkage) for spring in effect.springs) * max(linkage.lengths)
 
 
-def _flywheel(effect: "Flywheel", model: Model) -> None:
+def _add_flywheel(effect: "Flywheel", model: Model) -> None:
     """Inertia of the body: MuJoCo's armature of pin O2 is what drives."""
     model.inertia[effect.bar] += effect.inertia
 
 
-def _load(effect: "Load", model: Model) -> None:
+def _add_load(effect: "Load", model: Model) -> None:
     """Add a constant actuator on a site (force) or on the bar (couple)."""
     if effect.table is not None:
         raise LimitError("a load that is a table over theta_2 has no counterpart in MJCF")
@@ -103,28 +103,30 @@ class MjcfForm(NamedTuple):
 
 
 MJCF_OF: dict[str, MjcfForm] = {
-    "gravity": MjcfForm(_gravity, _weights),
-    "viscous": MjcfForm(_viscous, lambda effect, linkage, speed: sum((k for _, k in effect.coefficients), 0.0) * speed),
-    "friction": MjcfForm(_friction, lambda effect, linkage, speed: sum((f for _, f in effect.torques), 0.0)),
-    "torsion": MjcfForm(_torsion, lambda effect, linkage, speed: effect.greatest_couple, _unwind_torsion),
-    "springs": MjcfForm(_springs, _tensions),
-    "flywheel": MjcfForm(_flywheel),
-    "load": MjcfForm(_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
+    "gravity": MjcfForm(_add_gravity, _sum_weights),
+    "viscous": MjcfForm(
+        _add_viscous, lambda effect, linkage, speed: sum((k for _, k in effect.coefficients), 0.0) * speed
+    ),
+    "friction": MjcfForm(_add_friction, lambda effect, linkage, speed: sum((f for _, f in effect.torques), 0.0)),
+    "torsion": MjcfForm(_add_torsion, lambda effect, linkage, speed: effect.greatest_couple, _unwind_torsion),
+    "springs": MjcfForm(_add_springs, _sum_tensions),
+    "flywheel": MjcfForm(_add_flywheel),
+    "load": MjcfForm(_add_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
 }
 """By the key of an effect."""
 NO_MJCF = {"pin_friction"}
 """Effects of which MJCF has no counterpart: here friction that depends on the pin forces."""
 
 
-def row(effect: "Effect") -> MjcfForm:
+def find_row(effect: "Effect") -> MjcfForm:
     """Return the row of an effect; LimitError where it has none."""
     if effect.key not in MJCF_OF:
         raise LimitError(f"the effect {effect.key!r} has no counterpart in MJCF")
     return MJCF_OF[effect.key]
 
 
-def unwound(scene: Scene, q: Joints) -> Joints:
+def unwind(scene: Scene, q: Joints) -> Joints:
     """Compute the angles of pins O2, A, O4 as the scene's springs count them, rad."""
     for effect in scene.effects:
-        q = row(effect).unwind(effect, scene.linkage, q)
+        q = find_row(effect).unwind(effect, scene.linkage, q)
     return q

@@ -7,8 +7,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from fourbar.mjcf.document import at_start
-from fourbar.mjcf.model import text
+from fourbar.mjcf.document import find_start
+from fourbar.mjcf.model import join
 from fourbar.mjcf.notes import NOTES
 from fourbar.scene import Scene
 
@@ -17,7 +17,7 @@ STEPS = 2.0
 times the square of the time constant (measured: 4e-4 rad at 628 steps a turn)."""
 
 
-def with_mimic(model: str, scene: Scene, about: float, joint_A: Sequence[float], theta_4: Sequence[float]) -> str:
+def replace_loop(model: str, scene: Scene, about: float, joint_A: Sequence[float], theta_4: Sequence[float]) -> str:
     """Replace the loop's closure in the MJCF text of a scene by polynomials in theta_2 - about.
 
     Parameters
@@ -26,7 +26,7 @@ def with_mimic(model: str, scene: Scene, about: float, joint_A: Sequence[float],
     about : rad.
     joint_A, theta_4 : coefficients of theta_3 - theta_2 and of theta_4 (rad), lowest power first, five at most.
     """
-    root, start = ET.fromstring(model), at_start(scene)
+    root, start = ET.fromstring(model), find_start(scene)
     for line in reversed(NOTES["mimic"].values()):
         root.insert(0, ET.Comment(f" {line} "))
     for body in list(root.iter("body")):  # they only carried the closure; its sites stay, and show what it is open by
@@ -38,7 +38,7 @@ def with_mimic(model: str, scene: Scene, about: float, joint_A: Sequence[float],
     (closure,) = equality.findall("connect")
     equality.remove(closure)
     timestep = float(option.get("timestep", "nan"))
-    solref, solimp = text(STEPS * timestep, 1.0), closure.get("solimp", "")
+    solref, solimp = join(STEPS * timestep, 1.0), closure.get("solimp", "")
     qpos, qvel = ([float(x) for x in key.get(name, "").split()] for name in ("qpos", "qvel"))
     for index, joint, coefficients in ((1, "A", joint_A), (2, "O4", theta_4)):
         # by what the joints have turned since the start, for in that pose the bodies are put down
@@ -46,10 +46,10 @@ def with_mimic(model: str, scene: Scene, about: float, joint_A: Sequence[float],
         rest = np.pad(own.coef, (0, 5 - len(own.coef)))
         rest[0] = math.remainder(rest[0] - start.qpos[index], math.tau)
         ET.SubElement(
-            equality, "joint", name=joint, joint1=joint, joint2="O2", polycoef=text(*rest), solref=solref, solimp=solimp
+            equality, "joint", name=joint, joint1=joint, joint2="O2", polycoef=join(*rest), solref=solref, solimp=solimp
         )
         qpos[index], qvel[index] = qpos[index] + float(rest[0]), float(rest[1]) * qvel[0]
-    key.set("qpos", text(*qpos))
-    key.set("qvel", text(*qvel))
+    key.set("qpos", join(*qpos))
+    key.set("qvel", join(*qvel))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"

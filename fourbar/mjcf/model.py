@@ -9,7 +9,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
-from fourbar.mjcf.appearance import add_camera, rounded
+from fourbar.mjcf.appearance import add_camera, write_rounded
 from fourbar.mjcf.settings import Settings
 
 if TYPE_CHECKING:
@@ -31,12 +31,12 @@ THICKNESS = 0.02
 """Radius of a bar's capsule, as a part of the longest bar."""
 
 
-def text(*numbers: float) -> str:
+def join(*numbers: float) -> str:
     """Numbers so that they read back bit for bit."""
     return " ".join(repr(float(number)).removesuffix(".0") for number in numbers)
 
 
-def _body(root: ET.Element, bar: int) -> ET.Element:
+def _find_body(root: ET.Element, bar: int) -> ET.Element:
     """Find the body of a bar."""
     body = root.find(f".//body[@name='{BAR_NAMES[bar]}']")
     assert body is not None
@@ -46,17 +46,17 @@ def _body(root: ET.Element, bar: int) -> ET.Element:
 UNCONTROLLED = {"gaintype": "fixed", "gainprm": "0", "biastype": "affine"}
 
 
-def constant(force: float) -> dict[str, str]:
+def make_constant_motor(force: float) -> dict[str, str]:
     """Make the drive a motor on pin O2 that ignores its control; none where the force is 0."""
-    return {**UNCONTROLLED, "joint": "O2", "biasprm": text(force, 0.0, 0.0)} if force else {}
+    return {**UNCONTROLLED, "joint": "O2", "biasprm": join(force, 0.0, 0.0)} if force else {}
 
 
-def servo(gain: float, omega: float) -> dict[str, str]:
+def make_servo(gain: float, omega: float) -> dict[str, str]:
     """Make the drive a speed servo, gain (omega - speed): without a control it turns at omega, and there it is idle."""
-    return {**UNCONTROLLED, "joint": "O2", "biasprm": text(gain * omega, 0.0, -gain)}
+    return {**UNCONTROLLED, "joint": "O2", "biasprm": join(gain * omega, 0.0, -gain)}
 
 
-def motor(bar: int | None) -> dict[str, str]:
+def make_motor(bar: int | None) -> dict[str, str]:
     """Make the drive a motor whose control is the couple of ground on a bar, N m; a cylinder has one of its own."""
     if bar is None:
         return {}
@@ -69,7 +69,7 @@ ALONE = 1e-3
 """kg, where no bar has a mass."""
 
 
-def carriable(linkage: FourBar) -> None:
+def require_carriable(linkage: FourBar) -> None:
     """Raise an InputError where a bar is lighter than MuJoCo carries; it says which mass does instead."""
     heaviest = max(linkage.bar(number).mass for number in MOVING_BARS)
     enough = max(A_MILLIONTH * heaviest, 2.0 * FLOOR) if heaviest else ALONE
@@ -130,12 +130,12 @@ class Model:
         """Integrator, solver, and flags that switch off what a closed loop does not need."""
         s = self.settings
         options = {
-            "timestep": text(self.timestep),
+            "timestep": join(self.timestep),
             "integrator": s.integrator,
             "solver": s.solver,
-            "tolerance": text(s.tolerance),
+            "tolerance": join(s.tolerance),
             "iterations": str(s.iterations),
-            **{key: text(*value) for key, value in self.option.items()},
+            **{key: join(*value) for key, value in self.option.items()},
         }
         option = ET.SubElement(root, "option", options)
         unneeded = list(NEVER_NEEDED)
@@ -151,7 +151,7 @@ class Model:
         ground = ET.SubElement(world, "body", name="ground")
         ET.SubElement(ground, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
         self._add_capsule(ground, 1, self.linkage.ground, -2.0 * self.radius)
-        ET.SubElement(ground, "site", name="O2", pos="0 0 0", size=rounded(self.radius))
+        ET.SubElement(ground, "site", name="O2", pos="0 0 0", size=write_rounded(self.radius))
         self._add_site(ground, "O4", *self.O4)
         crank = self._add_bar(ground, 2, (0.0, 0.0), armature=flywheel)
         self._add_bar(crank, 3, (self.linkage.input.length, 0.0))
@@ -160,21 +160,21 @@ class Model:
     def _add_bar(self, parent: ET.Element, number: int, at: tuple[float, float], **drive: float) -> ET.Element:
         """Add a bar turning about its first pin; bars 3 and 4 end in the sites that the loop's closure joins."""
         bar, pin = self.linkage.bar(number), FIRST_PIN[number]
-        body = ET.SubElement(parent, "body", name=BAR_NAMES[number], pos=text(*at, 0.0))
+        body = ET.SubElement(parent, "body", name=BAR_NAMES[number], pos=join(*at, 0.0))
         if self.rest is not None:
             angle = self.rest[number - 2]
-            body.set("axisangle", text(0.0, 0.0, 1.0, angle))
+            body.set("axisangle", join(0.0, 0.0, 1.0, angle))
             drive["ref"] = angle
         # only the z-component acts in the plane; three equal ones satisfy the triangle inequality
         ET.SubElement(
             body,
             "inertial",
-            pos=text(bar.to_centre.real, bar.to_centre.imag, 0.0),
-            mass=text(bar.mass),
-            diaginertia=text(*[bar.moment_of_inertia + self.inertia[number]] * 3),
+            pos=join(bar.to_centre.real, bar.to_centre.imag, 0.0),
+            mass=join(bar.mass),
+            diaginertia=join(*[bar.moment_of_inertia + self.inertia[number]] * 3),
         )
         numbers = {**drive, **self.pin[pin]}
-        joint = {key: text(*np.atleast_1d(value)) for key, value in numbers.items()}
+        joint = {key: join(*np.atleast_1d(value)) for key, value in numbers.items()}
         ET.SubElement(body, "joint", {"name": pin, "type": "hinge", "axis": "0 0 1", **joint})
         self._add_capsule(body, number, bar.length, self.radius if number == 3 else -self.radius)
         if number == 2:
@@ -185,13 +185,13 @@ class Model:
             assert not isinstance(self.settings.pad, str)  # the document has fitted it
             # massless and welded: it only moves the point at which MuJoCo measures how soft the closure may be
             end = ET.SubElement(body, "body", name=f"{BAR_NAMES[number]}_pad")
-            place = text(self.settings.pad * bar.length, 0.0, 0.0)
+            place = join(self.settings.pad * bar.length, 0.0, 0.0)
             ET.SubElement(end, "inertial", pos=place, mass="0", diaginertia="0 0 0")
         self._add_site(end, f"B{number}", bar.length)
         return body
 
     def _add_site(self, body: ET.Element, name: str, x: float, y: float = 0.0) -> None:
-        ET.SubElement(body, "site", name=name, pos=text(x, y, 0.0), size=rounded(self.radius))
+        ET.SubElement(body, "site", name=name, pos=join(x, y, 0.0), size=write_rounded(self.radius))
 
     def _add_capsule(self, body: ET.Element, number: int, length: float, z: float) -> None:
         """Add a bar's shape: for the eye only, without mass and without contact."""
@@ -200,9 +200,9 @@ class Model:
         shape = {
             "name": BAR_NAMES[number],
             "type": "capsule",
-            "size": rounded(self.radius, length / 2.0),
-            "pos": rounded(cos * length / 2.0, sin * length / 2.0, z),
-            "zaxis": rounded(cos, sin, 0.0),
+            "size": write_rounded(self.radius, length / 2.0),
+            "pos": write_rounded(cos * length / 2.0, sin * length / 2.0, z),
+            "zaxis": write_rounded(cos, sin, 0.0),
             "rgba": COLOURS[number],
         }
         ET.SubElement(body, "geom", shape, mass="0", contype="0", conaffinity="0")
@@ -210,8 +210,8 @@ class Model:
     def add_closure(self, root: ET.Element) -> None:
         """Close the loop at B."""
         s, pair = self.settings, {"name": "B", "site1": "B3", "site2": "B4"}
-        solref = text(s.time_constant_steps * self.timestep, 1.0)
-        solimp = text(s.impedance, s.impedance, 0.001, 0.5, 2.0)
+        solref = join(s.time_constant_steps * self.timestep, 1.0)
+        solimp = join(s.impedance, s.impedance, 0.001, 0.5, 2.0)
         ET.SubElement(ET.SubElement(root, "equality"), "connect", pair, solref=solref, solimp=solimp)
 
     def add_tendons(self, root: ET.Element) -> None:
@@ -220,15 +220,15 @@ class Model:
             return
         tendons = ET.SubElement(root, "tendon")
         if self.pin["B"]:
-            attributes = {key: text(*np.atleast_1d(value)) for key, value in self.pin["B"].items()}
+            attributes = {key: join(*np.atleast_1d(value)) for key, value in self.pin["B"].items()}
             fixed = ET.SubElement(tendons, "fixed", {"name": "B", **attributes})
             for joint, coefficient in (("O2", -1), ("A", -1), ("O4", 1)):
                 ET.SubElement(fixed, "joint", joint=joint, coef=str(coefficient))
         for index, spring in enumerate(self.springs, 1):
             tendon = self._add_line(root, tendons, f"spring_{index}", spring.start, spring.end)
             if _is_slack_somewhere(spring):
-                tendon.set("stiffness", text(spring.stiffness))
-                tendon.set("springlength", text(-spring.slack / spring.stiffness))
+                tendon.set("stiffness", join(spring.stiffness))
+                tendon.set("springlength", join(-spring.slack / spring.stiffness))
         if self.cylinder is not None:
             self._add_line(root, tendons, CYLINDER, self.cylinder.start, self.cylinder.end)
 
@@ -243,7 +243,7 @@ class Model:
             if point.bar == 1:  # the ground's body keeps world axes
                 cos, sin = math.cos(self.linkage.ground_angle), math.sin(self.linkage.ground_angle)
                 x, y = cos * x - sin * y, sin * x + cos * y
-            self._add_site(_body(root, point.bar), f"{name}_{which}", x, y)
+            self._add_site(_find_body(root, point.bar), f"{name}_{which}", x, y)
         return tendon
 
     def add_load_sites(self, root: ET.Element) -> None:
@@ -254,7 +254,7 @@ class Model:
             if load.frame == "bar":
                 x += load.at[0] * math.cos(load.at[1])
                 y += load.at[0] * math.sin(load.at[1])
-            self._add_site(_body(root, load.bar), f"load_{index}", x, y)
+            self._add_site(_find_body(root, load.bar), f"load_{index}", x, y)
 
     def add_actuators(self, root: ET.Element, drive: dict[str, str], *, cylinder: bool) -> None:
         """Actuators: the drive by its attributes, without any there is none; loads and some springs, uncontrolled."""
@@ -267,7 +267,7 @@ class Model:
         if cylinder:
             ET.SubElement(actuators, "general", name=CYLINDER, tendon=CYLINDER)
         for name, spring in springs.items():
-            tension = text(-spring.slack, 0.0 - spring.stiffness, 0.0)
+            tension = join(-spring.slack, 0.0 - spring.stiffness, 0.0)
             ET.SubElement(actuators, "general", UNCONTROLLED, name=name, tendon=name, biasprm=tension)
         for index, load in enumerate(self.loads, 1):
             fx = fy = 0.0
@@ -279,7 +279,7 @@ class Model:
             placed = {"name": f"load_{index}", "site": f"load_{index}"}
             if load.frame == "world":
                 placed["refsite"] = "O2"
-            gear = text(fx, fy, 0.0, 0.0, 0.0, couple)
+            gear = join(fx, fy, 0.0, 0.0, 0.0, couple)
             ET.SubElement(actuators, "general", {**UNCONTROLLED, **placed}, gear=gear, biasprm="1 0 0")
 
 

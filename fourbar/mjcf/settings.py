@@ -22,7 +22,7 @@ class Settings:
     impedance : solimp's impedance d; MuJoCo clamps it at 0.9999.
     pad : where the inertial frame of the massless pads that carry the closure lies, as a part of
         the bar's length: the softness of the closure goes as its square. None: no pads; "fitted": to
-        the speed and the loads (`fitted_pad`).
+        the speed and the loads (`fit_pad`).
     solver, tolerance, iterations : of the constraint solver. MuJoCo divides the tolerance by the
         flywheel's inertia, so only 0 is tight, and the number of iterations is then what stops it.
     flywheel : inertia on pin O2 relative to the linkage's own; the speed ripples by about its inverse.
@@ -55,7 +55,7 @@ LIGHT = 100.0
 and 1 g on 14.5 kg had the inertial torque 3e-5 and 3e-3 wrong, in proportion to the ratio. Pads follow it from here."""
 
 
-def fitted_pad(acceleration: float, load_ratio: float, mass_ratio: float = 1.0) -> float:
+def fit_pad(acceleration: float, load_ratio: float, mass_ratio: float = 1.0) -> float:
     """Choose the pad that leaves the closure stiff enough for the loads, and soft enough for one pass of Newton.
 
     The sag of the closure grows as pad^2 times the loads, the rounding of one pass as 1/(pad^2 times the loads).

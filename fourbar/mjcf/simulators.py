@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import get_args
 
 from fourbar.errors import InputError
-from fourbar.mjcf.document import Drive, mjcf
+from fourbar.mjcf.document import Drive, write_mjcf
 from fourbar.mjcf.settings import RECIPE
 from fourbar.scene import Scene
 
@@ -21,12 +21,12 @@ OWN_MOTORS = ("genesis", "newton")
 """Who puts couples on joints itself, and takes none from the controls of a file; Genesis takes no actuator at all."""
 
 
-def mjcf_for(scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel") -> str:
+def write_mjcf_for(scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel") -> str:
     """Write the MJCF text of a scene for one simulator, its comments naming where torque and pin force are read.
 
     Raises
     ------
-    InputError : no such simulator, or a motor for one that does not take it; else as `mjcf`.
+    InputError : no such simulator, or a motor for one that does not take it; else as `write_mjcf`.
     """
     if simulator not in SIMULATORS:
         raise InputError("simulator", simulator, f"must be one of {', '.join(SIMULATORS)}")
@@ -34,4 +34,4 @@ def mjcf_for(scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel")
         raise InputError("drive", drive, f"must be one of {', '.join(get_args(Drive))}")
     if drive == "motor" and simulator in OWN_MOTORS:
         raise InputError("drive", drive, f"is read by mujoco, warp and mjx; for {simulator} take none")
-    return mjcf(scene, SIMULATORS[simulator], simulator, drive=drive)
+    return write_mjcf(scene, SIMULATORS[simulator], simulator, drive=drive)

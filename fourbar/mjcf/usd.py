@@ -4,12 +4,12 @@ import json
 import math
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.assembly import PARENT, assemble, comment
-from fourbar.mjcf.document import Start, plain
+from fourbar.mjcf.assembly import PARENT, assemble, write_comment
+from fourbar.mjcf.document import Start, make_plain
 from fourbar.scene import Scene
 
 
-def usd(scene: Scene, start: Start | None = None, *, without_loads: bool = False) -> str:
+def write_usd(scene: Scene, start: Start | None = None, *, without_loads: bool = False) -> str:
     """Write the USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
 
     Parameters
@@ -42,7 +42,7 @@ def usd(scene: Scene, start: Start | None = None, *, without_loads: bool = False
         float3 physics:diagonalInertia = ({", ".join([repr(inertia[number])] * 3)})
         quatf physics:principalAxes = (1, 0, 0, 0)
         double3 xformOp:translate = {_place(foot[number])}
-        quatd xformOp:orient = {_turned(turn[number])}
+        quatd xformOp:orient = {_write_turn(turn[number])}
         uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]
     }}
 """
@@ -59,14 +59,14 @@ def usd(scene: Scene, start: Start | None = None, *, without_loads: bool = False
         {"" if one == 1 else f"rel physics:body0 = </four_bar/{BAR_NAMES[one]}>"}
         rel physics:body1 = </four_bar/{BAR_NAMES[other]}>
         point3f physics:localPos0 = {_place(on_one)}
-        quatf physics:localRot0 = {_turned(turn[other] - turn[one])}
+        quatf physics:localRot0 = {_write_turn(turn[other] - turn[one])}
         point3f physics:localPos1 = {_place(complex(along))}
         quatf physics:localRot1 = (1, 0, 0, 0)
         bool physics:excludeFromArticulation = {"true" if pin == "B" else "false"}
     }}
 """
         )
-    notes = json.dumps(comment(scene, "USD", "newton", assembled))
+    notes = json.dumps(write_comment(scene, "USD", "newton", assembled))
     return f"""#usda 1.0
 (
     doc = {notes}
@@ -83,7 +83,7 @@ def PhysicsScene "physics"
 }}
 
 def Xform "four_bar" (
-    doc = {json.dumps(plain(scene.title) or "four-bar", ensure_ascii=False)}
+    doc = {json.dumps(make_plain(scene.title) or "four-bar", ensure_ascii=False)}
     prepend apiSchemas = ["PhysicsArticulationRootAPI"]
 )
 {{
@@ -95,6 +95,6 @@ def _place(point: complex) -> str:
     return f"({point.real!r}, {point.imag!r}, 0)"
 
 
-def _turned(angle: float) -> str:
+def _write_turn(angle: float) -> str:
     """Quaternion (w, x, y, z) of a turn about z."""
     return f"({math.cos(0.5 * angle)!r}, 0, 0, {math.sin(0.5 * angle)!r})"

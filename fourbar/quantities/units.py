@@ -60,13 +60,13 @@ def to_si(text: str, unit: str) -> float:
         raise UnitError(f"a comma is no part of a number{hint}")
     if not name:
         raise UnitError("the unit is missing")
-    wanted, wanted_dimension = _factor(unit)
+    wanted, wanted_dimension = _find_factor(unit)
     try:
-        factor, dimension = _factor(name)
+        factor, dimension = _find_factor(name)
     except UnitError as error:
-        raise UnitError(f"{error}{_hint(found[0], name, unit)}") from None
+        raise UnitError(f"{error}{_suggest(found[0], name, unit)}") from None
     if dimension != wanted_dimension:
-        raise UnitError(f'"{name}" does not convert to {unit}{_hint(found[0], name, unit)}')
+        raise UnitError(f'"{name}" does not convert to {unit}{_suggest(found[0], name, unit)}')
     try:
         number = Fraction(found[0]) if found.re is NUMBER else int(found[1] or 0) + Fraction(f"{found[2]}/{found[3]}")
         value = float(number * factor / wanted)
@@ -78,7 +78,7 @@ def to_si(text: str, unit: str) -> float:
     return -0.0 if value == 0.0 and found[0].startswith("-") else value
 
 
-def factor_to(unit: str, given: str) -> float:
+def find_factor(unit: str, given: str) -> float:
     """Return what a number in the unit `given` is multiplied by to be in `unit`.
 
     Raises InputError for a unit that is unknown or of another dimension.
@@ -89,7 +89,7 @@ def factor_to(unit: str, given: str) -> float:
         raise InputError("unit", given, f"{error}; must convert to {unit}") from None
 
 
-def _hint(number: str, name: str, unit: str) -> str:
+def _suggest(number: str, name: str, unit: str) -> str:
     """Suggest what may have been meant by a unit that is unknown or of another dimension than `unit`."""
     if len(name) > LONGEST_UNIT:
         return ""
@@ -111,7 +111,7 @@ def _hint(number: str, name: str, unit: str) -> str:
     ]
     for candidate in candidates:
         try:
-            if candidate != name and _factor(candidate)[1] == _factor(unit)[1]:
+            if candidate != name and _find_factor(candidate)[1] == _find_factor(unit)[1]:
                 return f'; did you mean "{number} {candidate}"?'
         except UnitError:
             continue
@@ -119,7 +119,7 @@ def _hint(number: str, name: str, unit: str) -> str:
 
 
 @cache
-def _registry() -> Any:
+def _load_registry() -> Any:
     import pint
 
     registry: Any = pint.UnitRegistry(None, non_int_type=Fraction)
@@ -128,12 +128,12 @@ def _registry() -> Any:
 
 
 @cache
-def _factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
+def _find_factor(name: str) -> tuple[Fraction, dict[str, Fraction]]:
     """Return what one of the unit is in base units, and its dimension."""
     name = JOINED.sub(" ", name.rstrip("."))
     if len(name) > LONGEST_UNIT or not UNIT.fullmatch(name):
         raise UnitError("the unit cannot be read")
-    registry = _registry()
+    registry = _load_registry()
     try:
         one = registry.Quantity(Fraction(1), registry.parse_units(name)).to_root_units()
     except Exception:  # the parser of the library raises whatever its tokenizer and evaluator do

@@ -8,7 +8,7 @@ import numpy as np
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import A_BRANCH, require, require_numbers, require_whole
-from fourbar.scene.motion_law import COMMANDS, STEPS, Law, the_bar
+from fourbar.scene.motion_law import COMMANDS, STEPS, Law, find_bar
 from fourbar.solution import Array
 
 OPEN, CROSSED = 1, -1
@@ -110,7 +110,7 @@ class Motion:
 
     def __post_init__(self) -> None:
         expect("motion.law", self.law, Law, type(None))
-        stated = the_bar("motion", self, COMMANDS)
+        stated = find_bar("motion", self, COMMANDS)
         object.__setattr__(self, "bar", (stated or 2) if self.law is None else self.law.bar)
         if self.stroke is not None or self.side is not None or self.stroke_speed is not None:
             self._require_stroke(stated)
@@ -147,13 +147,13 @@ class Motion:
             return NotImplemented
         one, two = self.angle, other.angle
         if isinstance(one, np.ndarray) or isinstance(two, np.ndarray):
-            return bool(np.array_equal(one, two)) and self._rest() == other._rest()  # type: ignore[arg-type]
-        return one == two and self._rest() == other._rest()
+            return bool(np.array_equal(one, two)) and self._check_rest() == other._check_rest()  # type: ignore[arg-type]
+        return one == two and self._check_rest() == other._check_rest()
 
     def __hash__(self) -> int:
-        return hash(self._rest())
+        return hash(self._check_rest())
 
-    def _rest(self) -> tuple[object, ...]:
+    def _check_rest(self) -> tuple[object, ...]:
         """Everything but the angles."""
         return (self.names, self.side, self.speed, self.acceleration, self.branch, self.through, self.free, self.law)
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.linkage import MOST_STEPS, MOVING_BARS, require_numbers, require_whole
 from fourbar.solution import Array
 
@@ -24,7 +24,7 @@ COMMANDS = {bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOV
 ANGLES = {bar: names[:1] for bar, names in COMMANDS.items()}
 
 
-def the_bar(key: str, stated: object, commands: Mapping[int, tuple[str, ...]]) -> int | None:
+def find_bar(key: str, stated: object, commands: Mapping[int, tuple[str, ...]]) -> int | None:
     """Return the bar of which numbers are stated, None where none is; InputError where there are two."""
     found = [
         bar
@@ -81,7 +81,7 @@ class Law:
     @property
     def bar(self) -> int:
         """Whose angle it gives: 2, 3 or 4."""
-        return the_bar("motion.law", self, ANGLES) or 2
+        return find_bar("motion.law", self, ANGLES) or 2
 
     @property
     def angle(self) -> tuple[float, ...]:
@@ -101,7 +101,7 @@ class Law:
         try:
             from scipy.interpolate import CubicSpline
         except ModuleNotFoundError:
-            raise DependencyError(f"SciPy is needed for a motion law: {installing('dynamics')}") from None
+            raise DependencyError(f"SciPy is needed for a motion law: {say_install('dynamics')}") from None
         time = require_numbers("time", time)
         t, angle = np.array(self.time), np.array(self.angle)
         mean = 0.0

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, LimitError, expect
-from fourbar.formulas.mobility import MARGIN, default_range, limit_angles, on_smooth_path
+from fourbar.formulas.mobility import MARGIN, choose_range, find_limit_angles, follow_smooth_path
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import COMMANDS
@@ -61,10 +61,10 @@ class Scene:
         else:
             self._require_linear(self.drive)
         if self.motion.stroke is not None:
-            from fourbar.scene.stroke import triangle
+            from fourbar.scene.stroke import find_triangle
 
             object.__setattr__(self, "motion", replace(self.motion))
-            object.__setattr__(self.motion, "bar", triangle(self.linkage, self.drive).bar)
+            object.__setattr__(self.motion, "bar", find_triangle(self.linkage, self.drive).bar)
         from fourbar.effects.effect import Effect
 
         many = {"loads": Effect, "effects": Effect, "pictures": object, "points": Point, "tolerances": Tolerance}
@@ -175,11 +175,11 @@ def require_input(scene: Scene, what: str) -> None:
 def default_places(scene: Scene, holding: float | None = None) -> Array:
     """List the angles (of the range that holds one), or strokes, that are swept where a scene names none, (n,)."""
     if scene.motion.stroke is not None:
-        from fourbar.scene.stroke import triangle
+        from fourbar.scene.stroke import find_triangle
 
-        first, last = triangle(scene.linkage, scene.drive).strokes(np.array([MARGIN, np.pi - MARGIN])).tolist()
+        first, last = find_triangle(scene.linkage, scene.drive).strokes(np.array([MARGIN, np.pi - MARGIN])).tolist()
     else:
-        first, last = default_range(scene.linkage, scene.motion.bar, holding)
+        first, last = choose_range(scene.linkage, scene.motion.bar, holding)
     return np.linspace(first, last, DEFAULT_STEPS + 1)
 
 
@@ -195,9 +195,9 @@ def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = No
     speed: float | Array | None = motion.speed
     acceleration: float | Array = motion.acceleration
     if motion.stroke is not None:
-        from fourbar.scene.stroke import triangle
+        from fourbar.scene.stroke import find_triangle
 
-        own = triangle(scene.linkage, scene.drive)
+        own = find_triangle(scene.linkage, scene.drive)
         own.require(places)
         angle, speed, acceleration, lever = own.turned(places, speed, acceleration, motion.side)
     elif motion.law is not None:
@@ -205,7 +205,7 @@ def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = No
     if branch is None:
         branch = np.full(angle.shape, motion.branch, dtype=np.int8)
         if motion.through == "follow":
-            branch = on_smooth_path(scene.linkage, angle, motion.branch, bar)
+            branch = follow_smooth_path(scene.linkage, angle, motion.branch, bar)
     stroke = None if lever is None else places
     return Command(angle, branch, speed, acceleration, None, time, bar, stroke, lever)
 
@@ -222,7 +222,7 @@ def command(scene: Scene) -> Command:
     elif isinstance(stated, Sweep):
         places = np.linspace(stated.start, stated.stop, stated.steps + 1)
     elif isinstance(stated, FromLimit):
-        key, limits = f"motion.theta_{bar}.limit", limit_angles(linkage, bar)
+        key, limits = f"motion.theta_{bar}.limit", find_limit_angles(linkage, bar)
         if not limits:
             raise InputError(key, stated.limit, f"the {BAR_NAMES[bar]} of this linkage has no limit positions")
         if stated.limit > len(limits):

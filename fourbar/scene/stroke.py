@@ -64,7 +64,7 @@ class Triangle(NamedTuple):
         return theta, sign * rate, sign * growth, share
 
 
-def triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
+def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
     """Return the triangle of a cylinder between the ground and bar 2 or 4; InputError for any other drive."""
     if drive is None or {drive.start.bar, drive.end.bar} not in ({1, 2}, {1, 4}):
         drives = "no cylinder" if drive is None else f"one from bar {drive.start.bar} to bar {drive.end.bar}"

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from fourbar.effects.numbers import unit_of
+from fourbar.effects.numbers import find_unit
 from fourbar.errors import InputError, expect
 from fourbar.linkage import require
 
@@ -29,7 +29,7 @@ class Tolerance:
 
     def __post_init__(self) -> None:
         expect("tolerances", self.key, str)
-        unit = unit_of(self.key)
+        unit = find_unit(self.key)
         if unit is None and isinstance(self.width, str):
             raise InputError(f"tolerances.{self.key}", self.width, "unknown key")
         object.__setattr__(self, "width", require(f"tolerances.{self.key}", self.width, unit or "1", positive=True))

@@ -48,7 +48,7 @@ class Symbol(NamedTuple):
         return (factor > 0.0) - (factor < 0.0)
 
 
-def acting(scene: Scene) -> list[Symbol]:
+def list_acting(scene: Scene) -> list[Symbol]:
     """Everything that acts, the drive first; nothing that has no size."""
     found = []
     if scene.drive is not None and scene.motion.free is None:
@@ -64,11 +64,11 @@ def acting(scene: Scene) -> list[Symbol]:
         if load.moment != 0.0:
             found.append(Symbol("moment", f"load {number}", load.bar, at, moment=load.moment, table=load.table))
     for effect in scene.effects:
-        found += _effect(effect)
+        found += _list_symbols(effect)
     return found
 
 
-def _effect(effect: Any) -> list[Symbol]:
+def _list_symbols(effect: Any) -> list[Symbol]:
     """List the symbols of one effect; none of a kind without one."""
     if effect.key in ROWS:
         entries = getattr(effect, ROWS[effect.key])

@@ -1,6 +1,6 @@
 """A scene that moves: one self-contained web page, or a film (GIF, MP4).
 
-The page needs nothing but a browser: no network, no library. Its numbers are those of `page_data`; the position
+The page needs nothing but a browser: no network, no library. Its numbers are those of `collect_page_data`; the position
 formula runs in the page as well, so that the picture follows when a length is changed.
 """
 
@@ -16,8 +16,8 @@ from string import Template
 
 from fourbar.errors import InputError
 from fourbar.scene import Scene
-from fourbar.show.page_data import page_data
-from fourbar.show.plot.style import format_of, plain
+from fourbar.show.page_data import collect_page_data
+from fourbar.show.plot.style import format_of, shorten_text
 from fourbar.solution import SI, Conversion
 from fourbar.writing import write_text
 
@@ -58,7 +58,7 @@ def write(
     """
     target, kind = Path(path), format_of(path, file_format, FORMATS)
     if kind == "html":
-        write_text(target, page(scene, pictures or {}, units, vectors))
+        write_text(target, write_page(scene, pictures or {}, units, vectors))
         return
     if pictures:
         raise InputError("picture", sorted(pictures), "pictures are shown in an .html page only")
@@ -67,7 +67,7 @@ def write(
     write_film(scene, target, kind, seconds, units, moving=vectors)
 
 
-def page(
+def write_page(
     scene: Scene,
     pictures: Mapping[str, str | Path] | None = None,
     units: Conversion = SI,
@@ -85,29 +85,29 @@ def page(
     if live:
         style, script = style + asset("edit.css"), script + asset(*LIVE_SCRIPTS)
     return Template(asset("page.html")).substitute(
-        title=html.escape(plain(scene.title, 200) or "Four-bar linkage"),
-        source=html.escape(plain(scene.source, 400)),
+        title=html.escape(shorten_text(scene.title, 200) or "Four-bar linkage"),
+        source=html.escape(shorten_text(scene.source, 400)),
         version=__version__,
         style=style,
-        style_hash=_content_hash(style),
+        style_hash=_hash_content(style),
         script=script,
-        script_hash=_content_hash(script),
+        script_hash=_hash_content(script),
         connect=f"connect-src ws://{live.split('/')[2]}; " if live else "",
         panel=asset("edit.html") if live else "",
         results=asset("bench.html") if live else "",
-        data=embedded(
-            page_data(replace(scene, tolerances=()) if live else scene, pictures or {}, units)
+        data=embed_json(
+            collect_page_data(replace(scene, tolerances=()) if live else scene, pictures or {}, units)
             | {"vectors": vectors, "live": live}
         ),
     )
 
 
-def _content_hash(text: str) -> str:
+def _hash_content(text: str) -> str:
     """Hash an inline script or style: by this name the page's own security policy allows it."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
 
 
-def embedded(value: object) -> str:
+def embed_json(value: object) -> str:
     """JSON that can stand inside a script element, whatever strings it holds."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fourbar.linkage import PINS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command_at
-from fourbar.show.duty import driving
+from fourbar.show.duty import read_drive
 from fourbar.solution import Array, Solution
 from fourbar.solve import solve
 
@@ -33,22 +33,22 @@ class Between(NamedTuple):
     """A sweep with what its steps pass over."""
 
     solution: Solution
-    """At its positions and, among them, at both sides of each reversal and where each of `sizes` is largest."""
+    """At its positions and, among them, at both sides of each reversal and where each of `list_sizes` is largest."""
     reversals: list[tuple[float, str]]
     """Commanded angle or stroke, rad or m, and the pin at which dry friction reverses there: the pin forces jump."""
     growing: set[str]
-    """Those of `sizes` that grow without bound within a step."""
+    """Those of `list_sizes` that grow without bound within a step."""
 
 
-def sizes(solution: Solution) -> dict[str, Array]:
+def list_sizes(solution: Solution) -> dict[str, Array]:
     """List the magnitudes whose largest values are located: torque, power and speed of the drive, and pin forces."""
-    of_drive = driving(solution)
+    of_drive = read_drive(solution)
     drive = {of_drive.keys.value: of_drive.keys.value, "power": "power", "speed": of_drive.speed_key}
     forces = {name: np.hypot(*getattr(solution, name).T) for name in PIN_FORCES}
     return {**{name: np.abs(getattr(solution, key)) for name, key in drive.items()}, **forces}
 
 
-def between(scene: Scene, solution: Solution) -> Between | None:
+def locate_between(scene: Scene, solution: Solution) -> Between | None:
     """Locate what the steps of a sweep, or of a motion law, pass over: by `solve`, at ever finer positions.
 
     None where nothing stands between the positions: of a released motion, a list of angles, positions alone.
@@ -64,26 +64,26 @@ def between(scene: Scene, solution: Solution) -> Between | None:
     def at(places: Array, branch: Branch, stage: str = "force") -> Solution:
         return solve(scene, stage, at=command_at(scene, places, branch))
 
-    pins, low, high, branch = _reversing(scene, solution)
+    pins, low, high, branch = _find_reversing(scene, solution)
     for _ in range(ROUNDS if pins else 0):
         places = _cut(low, high)
         inside = at(places.ravel(), np.repeat(branch, CUTS + 1), "velocity")
-        slips = np.array([_slip(inside, pin).reshape(places.shape)[row] for row, pin in enumerate(pins)])
+        slips = np.array([_compute_slip(inside, pin).reshape(places.shape)[row] for row, pin in enumerate(pins)])
         turned = np.argmax(slips * slips[:, :1] <= 0.0, axis=1)
         rows = np.arange(len(pins))
         low, high = places[rows, turned - 1], places[rows, turned]
-    merged = _merged(at, solution, np.concatenate([low, high]), np.concatenate([branch, branch]))
+    merged = _merge(at, solution, np.concatenate([low, high]), np.concatenate([branch, branch]))
     angles = low if motion.law is None else motion.law.at(low)[0]
-    found, branch, growing = _largest(at, merged)
+    found, branch, growing = _find_largest(at, merged)
     reversals = sorted(zip(angles.tolist(), pins, strict=True))
-    return Between(_merged(at, merged, found, branch), reversals, growing)
+    return Between(_merge(at, merged, found, branch), reversals, growing)
 
 
 def _cut(low: Array, high: Array) -> Array:
     return low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, CUTS + 1)
 
 
-def _merged(at: At, solution: Solution, places: Array, branch: Branch) -> Solution:
+def _merge(at: At, solution: Solution, places: Array, branch: Branch) -> Solution:
     """Solve at the positions of a solution and at others among them, in the order of the solution."""
     if not len(places):
         return solution
@@ -92,17 +92,17 @@ def _merged(at: At, solution: Solution, places: Array, branch: Branch) -> Soluti
     return at(over[order], np.concatenate([solution.at.branch, branch])[order], "force")
 
 
-def _slip(solution: Solution, pin: str) -> Array:
+def _compute_slip(solution: Solution, pin: str) -> Array:
     """Compute omega_j - omega_i of the bars that meet at a pin."""
     one, other = (0.0 if bar == 1 else getattr(solution, f"omega_{bar}") for bar in PINS[pin])
     return np.asarray(other - one)
 
 
-def _reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array, Branch]:
+def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array, Branch]:
     """List the steps in which a pin with dry friction changes its sense: pin, ends, branch."""
     over, branch, steps = solution.at.places, solution.at.branch, list[tuple[str, int, int]]()
     for pin in sorted({pin for effect in scene.effects for pin in effect.dry_pins}):
-        slip = np.nan_to_num(_slip(solution, pin))
+        slip = np.nan_to_num(_compute_slip(solution, pin))
         moving = np.flatnonzero(np.abs(slip) > AT_REST * np.abs(slip).max())
         steps += [
             (pin, i, j)
@@ -113,10 +113,10 @@ def _reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Arra
     return [pin for pin, *_ in steps], over[first], over[last], branch[first]
 
 
-def _largest(at: At, solution: Solution) -> tuple[Array, Branch, set[str]]:
+def _find_largest(at: At, solution: Solution) -> tuple[Array, Branch, set[str]]:
     """Find where each size is largest between positions that it has a local maximum at: places, branches, growing."""
     over, branch, peaks = solution.at.places, solution.at.branch, list[tuple[str, int, int, int]]()
-    for name, size in sizes(solution).items():
+    for name, size in list_sizes(solution).items():
         known = np.concatenate([[-1.0], np.nan_to_num(size, nan=-1.0, posinf=-1.0), [-1.0]])
         before, here, after = known[:-2], known[1:-1], known[2:]
         tops = np.flatnonzero((here >= before) & (here >= after) & (here > np.minimum(before, after)) & (here > 0.0))
@@ -127,10 +127,10 @@ def _largest(at: At, solution: Solution) -> tuple[Array, Branch, set[str]]:
     rows, names = np.arange(len(peaks)), [name for name, *_ in peaks]
     at_grid, left, right = (np.array([peak[k] for peak in peaks], dtype=int) for k in (1, 2, 3))
     low, high, places = over[left], over[right], over[at_grid]
-    reached = [np.array([sizes(solution)[name][i] for name, i, *_ in peaks])]
+    reached = [np.array([list_sizes(solution)[name][i] for name, i, *_ in peaks])]
     for _ in range(ROUNDS if len(peaks) else 0):
         cut = _cut(low, high)
-        found = sizes(at(cut.ravel(), np.repeat(branch[at_grid], CUTS + 1), "force"))
+        found = list_sizes(at(cut.ravel(), np.repeat(branch[at_grid], CUTS + 1), "force"))
         values = np.array([np.nan_to_num(found[n].reshape(cut.shape)[k], nan=-1.0) for k, n in enumerate(names)])
         best = np.argmax(values, axis=1)
         places, low, high = (cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1))

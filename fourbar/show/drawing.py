@@ -18,7 +18,7 @@ MOST_POINTS = 120
 """Points of a path: finer than can be seen at this size."""
 
 
-def drawing(scene: Scene, solution: Solution) -> str:
+def draw_scene(scene: Scene, solution: Solution) -> str:
     """Draw the linkage at its best conditioned position; ink in the colour of the text around it.
 
     Raises NotAssembledError where it assembles nowhere.
@@ -43,36 +43,36 @@ def drawing(scene: Scene, solution: Solution) -> str:
 
     A, B = solution.A[index], solution.B[index]
     every = max(1, np.count_nonzero(good) // MOST_POINTS)
-    parts = [_path([place(point) for point in path[good][::every]], colour) for path, colour in paths]
-    parts += [_bar(place(start), place(end), BARS[n]) for n, start, end in ((2, O2, A), (3, A, B), (4, O4, B))]
-    parts += [_support(*place(O2)), _support(*place(O4))]
+    parts = [_draw_path([place(point) for point in path[good][::every]], colour) for path, colour in paths]
+    parts += [_draw_bar(place(start), place(end), BARS[n]) for n, start, end in ((2, O2, A), (3, A, B), (4, O4, B))]
+    parts += [_draw_support(*place(O2)), _draw_support(*place(O4))]
     centre = np.mean([place(point) for point in (O2, A, B, O4)], axis=0)
     for name, point in (("O₂", O2), ("A", A), ("B", B), ("O₄", O4)):
         parts.append(_pin(name, place(point), (float(centre[0]), float(centre[1])), supported=name[0] == "O"))
     theta_2 = f"{math.degrees(solution.theta_2[index]):.1f}".replace("-", "−")
-    parts.append(_text(f"θ₂ = {theta_2}°", WIDTH / 2.0, HEIGHT - 6.0, 11, SOFT))
+    parts.append(_draw_text(f"θ₂ = {theta_2}°", WIDTH / 2.0, HEIGHT - 6.0, 11, SOFT))
     box = f'viewBox="0 0 {WIDTH:g} {HEIGHT:g}"'
     return f'<svg class="linkage" xmlns="http://www.w3.org/2000/svg" {box}>{"".join(parts)}</svg>'
 
 
-def _path(points: Iterable[Point], colour: str) -> str:
+def _draw_path(points: Iterable[Point], colour: str) -> str:
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     return f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-dasharray="2 3" opacity=".7"/>'
 
 
-def _bar(start: Point, end: Point, colour: str) -> str:
+def _draw_bar(start: Point, end: Point, colour: str) -> str:
     line = 'x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}"'.format(*start, *end)
     return f'<line {line} stroke="{colour}" stroke-width="6" stroke-linecap="round"/>'
 
 
-def _support(x: float, y: float) -> str:
+def _draw_support(x: float, y: float) -> str:
     return (
         f'<path d="M{x:.1f} {y:.1f}l-8 13h16z" fill="{PAPER}" stroke="{INK}"/>'
         f'<path d="M{x - 12:.1f} {y + 13:.1f}h24" stroke="{INK}"/>'
     )
 
 
-def _text(text: str, x: float, y: float, size: int, colour: str) -> str:
+def _draw_text(text: str, x: float, y: float, size: int, colour: str) -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" font-size="{size}" fill="{colour}">{text}</text>'
 
 
@@ -84,4 +84,4 @@ def _pin(name: str, at: Point, centre: Point, *, supported: bool) -> str:
     if supported and up > 0.0:
         across, up = math.copysign(18.0, dx), 2.0  # clear of the support
     circle = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{PAPER}" stroke="{INK}" stroke-width="1.5"/>'
-    return circle + _text(name, x + across, y + up + 4.0, 13, INK)
+    return circle + _draw_text(name, x + across, y + up + 4.0, 13, INK)

@@ -5,15 +5,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects.actions import Actions, bodies
-from fourbar.errors import DependencyError, InputError, expect, installing
-from fourbar.evaluation.case import state_at
+from fourbar.effects.actions import Actions, list_bodies
+from fourbar.errors import DependencyError, InputError, expect, say_install
+from fourbar.evaluation.case import compute_state
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
 from fourbar.quantities import COUPLE, LINE, UNITS, DriveNames
 from fourbar.scene import Command, Scene
-from fourbar.solution import Array, Conversion, Solution, unit_in
+from fourbar.solution import Array, Conversion, Solution, find_unit_in
 
 
 class BearingLoad(NamedTuple):
@@ -27,7 +27,7 @@ class BearingLoad(NamedTuple):
     """theta_2 of the largest load, rad."""
 
 
-def _evaluated(solution: Solution, name: str) -> Array:
+def _require_evaluated(solution: Solution, name: str) -> Array:
     expect("solution", solution, Solution)
     force: Array | None = getattr(solution, name)
     if force is None:
@@ -40,16 +40,18 @@ def shaking_force(solution: Solution) -> Array:
 
     A linear drive with an end on the ground adds its own; a spring pulls there besides.
     """
-    return -(_evaluated(solution, "F12") + _evaluated(solution, "F14")) + _pushed(solution)
+    return -(_require_evaluated(solution, "F12") + _require_evaluated(solution, "F14")) + _compute_push(solution)
 
 
-def _pushed(solution: Solution) -> Array:
+def _compute_push(solution: Solution) -> Array:
     """Force of a linear drive on the frame, N, (n, 2)."""
     ends = () if solution.drive is None else solution.drive.ends
     sense = sum(sense for sense, point in ends if point.bar == 1)
     if not sense:
         return np.zeros((*solution.theta_2.shape, 2))
-    return np.asarray(sense * _evaluated(solution, "drive_force")[..., None] * _evaluated(solution, "drive_line"))
+    return np.asarray(
+        sense * _require_evaluated(solution, "drive_force")[..., None] * _require_evaluated(solution, "drive_line")
+    )
 
 
 def shaking_moment(solution: Solution) -> Array:
@@ -60,17 +62,17 @@ def shaking_moment(solution: Solution) -> Array:
     Couples that effects exert between the bars and ground (pin damping or friction at O2, O4)
     are not part of it.
     """
-    F14 = _evaluated(solution, "F14")
-    of_drive = 0.0 if solution.drive is not None else -_evaluated(solution, "torque")
+    F14 = _require_evaluated(solution, "F14")
+    of_drive = 0.0 if solution.drive is not None else -_require_evaluated(solution, "torque")
     assert solution.ground is not None
     length, angle = solution.ground
     for _, point in () if solution.drive is None else solution.drive.ends:
         if point.bar == 1:
-            of_drive = _moment(point.distance, point.angle + angle, _pushed(solution))
-    return np.asarray(of_drive - _moment(length, angle, F14))
+            of_drive = _compute_moment(point.distance, point.angle + angle, _compute_push(solution))
+    return np.asarray(of_drive - _compute_moment(length, angle, F14))
 
 
-def _moment(distance: Any, angle: Any, force: Array) -> Array:
+def _compute_moment(distance: Any, angle: Any, force: Array) -> Array:
     """About O2, of a force at a place, N m, (n,), of a study (m, n)."""
     return np.asarray(distance * (np.cos(angle) * force[..., 1] - np.sin(angle) * force[..., 0]))
 
@@ -91,7 +93,7 @@ class Driving(NamedTuple):
     """rad/s of the driven bar, or m/s of the stroke."""
 
 
-def driving(solution: Solution) -> Driving:
+def read_drive(solution: Solution) -> Driving:
     """Torque or force of the drive, with its error bar and speed."""
     names, symbol, word, speed = COUPLE, f"T{solution.drive_bar}", "torque", f"omega_{solution.drive_bar}"
     if solution.drive is not None:
@@ -100,7 +102,7 @@ def driving(solution: Solution) -> Driving:
     return Driving(word, symbol, UNITS[names.value], values, error, names, speed, getattr(solution, speed))
 
 
-def drive_words(scene: Scene) -> str:
+def describe_drive(scene: Scene) -> str:
     """Say what is driven."""
     if scene.drive is not None:
         start, end = scene.drive.start.bar, scene.drive.end.bar
@@ -108,7 +110,7 @@ def drive_words(scene: Scene) -> str:
     return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
 
 
-def once_round(solution: Solution) -> Any:
+def is_once_round(solution: Solution) -> Any:
     """Whether a sweep goes over whole turns: its last position then repeats the first; of a study (m,)."""
     angle = solution.at.angle
     if angle.shape[-1] == 1:
@@ -117,22 +119,22 @@ def once_round(solution: Solution) -> Any:
     return (turns > 0.5) & np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
 
 
-def _counted(solution: Solution, values: Array) -> Array:
+def _count_once(solution: Solution, values: Array) -> Array:
     """Values at each position once: NaN at the end of whole turns."""
     last = np.arange(values.shape[-1]) == values.shape[-1] - 1
-    return np.where(once_round(solution)[..., None] & last, np.nan, values)
+    return np.where(is_once_round(solution)[..., None] & last, np.nan, values)
 
 
-def _plain(value: Any) -> Any:
+def _make_plain(value: Any) -> Any:
     """Return a number, or of a study an array (m,)."""
     return float(value) if np.ndim(value) == 0 else value
 
 
-def _of_known(reduce: Any, values: Array) -> Any:
+def _reduce_known(reduce: Any, values: Array) -> Any:
     """Reduce over the positions that have a value; NaN where none has."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of a member without any
-        return _plain(reduce(values, axis=-1))
+        return _make_plain(reduce(values, axis=-1))
 
 
 def bearing_load(solution: Solution, pin: str) -> BearingLoad:
@@ -142,13 +144,13 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     """
     if not isinstance(pin, str) or pin not in PIN_FORCE:
         raise InputError("pin", pin, "the pins are " + ", ".join(PIN_FORCE))
-    force = _evaluated(solution, PIN_FORCE[pin])
-    load = _counted(solution, np.hypot(force[..., 0], force[..., 1]))
+    force = _require_evaluated(solution, PIN_FORCE[pin])
+    load = _count_once(solution, np.hypot(force[..., 0], force[..., 1]))
     known = np.isfinite(load)
     worst = np.argmax(np.where(known, load, -1.0), axis=-1)[..., None]
     where = np.where(known.any(axis=-1), np.take_along_axis(solution.theta_2, worst, axis=-1)[..., 0], np.nan)
     load = np.where(known, load, np.nan)
-    return BearingLoad(_peak(load), _rms(load), _plain(where))
+    return BearingLoad(_find_peak(load), _compute_rms(load), _make_plain(where))
 
 
 class MotorDuty(NamedTuple):
@@ -200,20 +202,20 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
     located : the same with the positions of the peaks among its own, of which the peaks are taken.
     """
     expect("solution", solution, Solution)
-    drive = driving(solution)
+    drive = read_drive(solution)
     if drive.values is None or not np.isfinite(drive.values).any():
         return None
-    power = _evaluated(solution, "power")
-    closed, peak = once_round(solution), solution if located is None else located
-    linear, largest = solution.drive is not None, _peak(_evaluated(peak, drive.keys.value))
-    rms = _rms(_counted(solution, drive.values))
-    energy_in, energy_out = _energy(solution, power)
+    power = _require_evaluated(solution, "power")
+    closed, peak = is_once_round(solution), solution if located is None else located
+    linear, largest = solution.drive is not None, _find_peak(_require_evaluated(peak, drive.keys.value))
+    rms = _compute_rms(_count_once(solution, drive.values))
+    energy_in, energy_out = _integrate_power(solution, power)
     return MotorDuty(
         None if linear else largest,
         None if linear else rms,
-        _peak(_evaluated(peak, drive.speed_key)),
-        _peak(_evaluated(peak, "power")),
-        _rms(_counted(solution, power)),
+        _find_peak(_require_evaluated(peak, drive.speed_key)),
+        _find_peak(_require_evaluated(peak, "power")),
+        _compute_rms(_count_once(solution, power)),
         energy_in,
         energy_out,
         bool(closed) if np.ndim(closed) == 0 else closed,
@@ -222,7 +224,7 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
     )
 
 
-def _energy(solution: Solution, power: Array) -> tuple[float | None, float | None]:
+def _integrate_power(solution: Solution, power: Array) -> tuple[float | None, float | None]:
     """Integrate the positive and the negative part of the power, each over time."""
     stroke, bar = solution.at.stroke, solution.at.bar
     omega = getattr(solution, f"omega_{bar}") if stroke is None else solution.stroke_speed
@@ -238,19 +240,19 @@ def _energy(solution: Solution, power: Array) -> tuple[float | None, float | Non
     ]
     if not np.isfinite(parts[0]).any():
         return None, None
-    energy_in, energy_out = (_plain(np.nansum(part, axis=-1)) for part in parts)
+    energy_in, energy_out = (_make_plain(np.nansum(part, axis=-1)) for part in parts)
     return energy_in, energy_out
 
 
-def _peak(values: Array) -> float:
-    return _of_known(np.nanmax, np.abs(values))  # type: ignore[no-any-return]
+def _find_peak(values: Array) -> float:
+    return _reduce_known(np.nanmax, np.abs(values))  # type: ignore[no-any-return]
 
 
-def _rms(values: Array) -> float:
-    return _plain(np.sqrt(_of_known(np.nanmean, np.square(values))))  # type: ignore[no-any-return]
+def _compute_rms(values: Array) -> float:
+    return _make_plain(np.sqrt(_reduce_known(np.nanmean, np.square(values))))  # type: ignore[no-any-return]
 
 
-def motor_entry(solution: Solution, units: Conversion, located: Solution | None = None) -> dict[str, Any] | None:
+def write_motor(solution: Solution, units: Conversion, located: Solution | None = None) -> dict[str, Any] | None:
     """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
     duty = motor_duty(solution, located)
     if duty is None:
@@ -259,15 +261,15 @@ def motor_entry(solution: Solution, units: Conversion, located: Solution | None 
     own = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
     for name, unit in own.items():
         number = getattr(duty, name)
-        entry[name] = None if number is None else number * unit_in(unit, units)[1]
-    force, angle = unit_in("N", units)[1], unit_in("rad", units)[1]
+        entry[name] = None if number is None else number * find_unit_in(unit, units)[1]
+    force, angle = find_unit_in("N", units)[1], find_unit_in("rad", units)[1]
     loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
     peaks = loads if located is None else {pin: bearing_load(located, pin) for pin in PIN_FORCE}
     entry["pins"] = {
         pin: {"peak": peaks[pin].largest * force, "rms": load.rms * force, "theta_2": peaks[pin].where * angle}
         for pin, load in loads.items()
     }
-    entry["units"] = {name: unit_in(unit, units)[0] for name, unit in own.items()}
+    entry["units"] = {name: find_unit_in(unit, units)[0] for name, unit in own.items()}
     return entry
 
 
@@ -280,7 +282,7 @@ class Energies(NamedTuple):
     """Done since the first instant, (n,): by all loads together, and by each effect that does any."""
 
 
-def energies(scene: Scene, motion: Solution) -> Energies:
+def compute_energies(scene: Scene, motion: Solution) -> Energies:
     """Kinetic energy, and the work of each effect and of the loads.
 
     T = sum of m v_G^2/2 + I omega^2/2;   W(t) = integral of the power, by a cubic spline through the instants.
@@ -290,25 +292,25 @@ def energies(scene: Scene, motion: Solution) -> Energies:
     try:
         from scipy.interpolate import CubicSpline
     except ModuleNotFoundError:
-        raise DependencyError(f"SciPy is needed for free motion: {installing('dynamics')}") from None
+        raise DependencyError(f"SciPy is needed for free motion: {say_install('dynamics')}") from None
     assert motion.time is not None and motion.omega_2 is not None
-    state = state_at(scene, Command(motion.theta_2, motion.branch, motion.omega_2, 0.0))
+    state = compute_state(scene, Command(motion.theta_2, motion.branch, motion.omega_2, 0.0))
     groups = {"loads": scene.loads, **{effect.key: (effect,) for effect in scene.effects}}
     work = {}
     for name, terms in groups.items():
-        actions = Actions(state, bodies(scene.linkage))
+        actions = Actions(state, list_bodies(scene.linkage))
         for term in terms:
             term.act(actions, state)
         power = np.zeros(len(motion)) + actions.work()[0] * motion.omega_2
         known = np.isfinite(power)  # bars 3 and 4 in line: the velocities are 0/0
         if np.count_nonzero(known) > 1 and np.any(power[known]):
             work[name] = CubicSpline(motion.time[known], power[known]).antiderivative()(motion.time)
-    return Energies(_kinetic(scene, state), work)
+    return Energies(_compute_kinetic(scene, state), work)
 
 
-def _kinetic(scene: Scene, state: State) -> Array:
+def _compute_kinetic(scene: Scene, state: State) -> Array:
     total = np.zeros(len(state.theta_2))
-    for number, body in zip(MOVING_BARS, bodies(scene.linkage, scene.effects), strict=True):
+    for number, body in zip(MOVING_BARS, list_bodies(scene.linkage, scene.effects), strict=True):
         v = state.velocity(number, body.z)
         total = total + 0.5 * body.m * dot(v, v) + 0.5 * body.I * np.square(state.omega(number))
     return total

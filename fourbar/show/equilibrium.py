@@ -8,8 +8,8 @@ import numpy as np
 
 from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.duty import driving
-from fourbar.show.tables import MOST_ROWS, plain_table, under_heading
+from fourbar.show.duty import read_drive
+from fourbar.show.tables import MOST_ROWS, make_plain_table, write_table
 from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
 
@@ -17,40 +17,40 @@ SCHEMA = "fourbar-equilibrium/1"
 MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 
 
-def printed(title: str, found: Equilibria) -> str:
+def write_tables(title: str, found: Equilibria) -> str:
     """Write both tables as text."""
     friction = bool(found.held)
     heads = ["theta_2 (deg)", "theta_4 (deg)", "branch", "", "by", "dQ/dq (N m/rad)", "J (kg m^2)", "frequency (Hz)"]
-    rows = [_row(each, friction=friction) for each in found.found]
-    own = plain_table([*heads, *(["friction holds (deg)"] if friction else [])], rows, left=("branch", "", "by"))
+    rows = [_write_row(each, friction=friction) for each in found.found]
+    own = make_plain_table([*heads, *(["friction holds (deg)"] if friction else [])], rows, left=("branch", "", "by"))
     text = (
-        under_heading(title, _heading(found), own)
+        write_table(title, _write_heading(found), own)
         if rows
-        else "\n".join([*([title] if title else []), *_heading(found)])
+        else "\n".join([*([title] if title else []), *_write_heading(found)])
     )
-    return text.rstrip("\n") + "\n\n" + under_heading("", *_holding(found))
+    return text.rstrip("\n") + "\n\n" + write_table("", *_write_holding(found))
 
 
-def _heading(found: Equilibria) -> list[str]:
+def _write_heading(found: Equilibria) -> list[str]:
     count = len(found.found)
     how = "proven to be all" if found.proven else "of those found, by changes of sign: there may be others"
     lines = [f"{count} equilibri{'um' if count == 1 else 'a'} without friction, {how}"]
     if found.not_decided:
-        at = " and ".join(f"theta_2 = {_degrees(place.theta_2)}" for place in found.not_decided)
+        at = " and ".join(f"theta_2 = {_write_degrees(place.theta_2)}" for place in found.not_decided)
         lines.append(f"at the change point {at} deg nothing is decided: there the linkage has two ways to move")
-    lines += [f"indifferent (Q = 0 throughout): {_range(ends)}" for ends in found.indifferent]
+    lines += [f"indifferent (Q = 0 throughout): {_write_range(ends)}" for ends in found.indifferent]
     lines += [
-        f"friction alone holds, without an equilibrium: {_range(ends)}"
+        f"friction alone holds, without an equilibrium: {_write_range(ends)}"
         for ends in found.held
         if all(each.held != ends for each in found.found)
     ]
     return lines
 
 
-def _holding(found: Equilibria) -> tuple[list[str], Any]:
+def _write_holding(found: Equilibria) -> tuple[list[str], Any]:
     """Write what holds the scene's positions, thinned out to what can be read."""
     at = found.positions
-    drive = driving(at)
+    drive = read_drive(at)
     values, low, high = drive.values, getattr(at, drive.keys.low), getattr(at, drive.keys.high)
     assert values is not None
     index = range(0, len(at), -(-len(at) // MOST_ROWS))
@@ -59,7 +59,7 @@ def _holding(found: Equilibria) -> tuple[list[str], Any]:
         heads, columns = [heads[0], f"from ({drive.unit})", f"to ({drive.unit})"], [columns[0], low, high]
     rows = [
         [
-            *(_number(column[i]) for column in columns),
+            *(_write_number(column[i]) for column in columns),
             MOVES[int(found.moves[i])] if at.status_code[i] not in (NOT_ASSEMBLED, SINGULAR) else at.status[i],
         ]
         for i in index
@@ -68,63 +68,68 @@ def _holding(found: Equilibria) -> tuple[list[str], Any]:
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
     if np.isfinite(values).any():
         most = int(np.nanargmax(np.abs(values)))
-        lines.append(f"largest: {values[most]:.6g} {drive.unit} at theta_2 = {_degrees(at.theta_2[most])} deg")
-    return lines, plain_table([*heads, "released"], rows, left=("released",))
+        lines.append(f"largest: {values[most]:.6g} {drive.unit} at theta_2 = {_write_degrees(at.theta_2[most])} deg")
+    return lines, make_plain_table([*heads, "released"], rows, left=("released",))
 
 
-def _row(each: Equilibrium, *, friction: bool) -> list[str]:
+def _write_row(each: Equilibrium, *, friction: bool) -> list[str]:
     place, frequency = each.place, "-" if each.frequency is None else f"{each.frequency:.10g}"
-    row = [_degrees(place.theta_2), _degrees(place.theta_4), BRANCH_NAMES.get(place.branch, "limit"), each.stability]
+    row = [
+        _write_degrees(place.theta_2),
+        _write_degrees(place.theta_4),
+        BRANCH_NAMES.get(place.branch, "limit"),
+        each.stability,
+    ]
     row += [each.angle, f"{each.slope:.6g}", f"{each.inertia:.6g}", frequency]
-    return row + ([_range(each.held) if each.held else "-"] if friction else [])
+    return row + ([_write_range(each.held) if each.held else "-"] if friction else [])
 
 
-def _range(ends: tuple[RestPosition, RestPosition]) -> str:
+def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
     one, other = ends
-    text = f"{_degrees(one.theta_2)} to {_degrees(other.theta_2)}"
+    text = f"{_write_degrees(one.theta_2)} to {_write_degrees(other.theta_2)}"
     return text if one.branch == other.branch else f"{text} through a limit"
 
 
-def _degrees(angle: float) -> str:
+def _write_degrees(angle: float) -> str:
     return f"{math.degrees(angle):.4f}"
 
 
-def _finite(value: Any) -> Any:
+def _null_infinite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _finite_parts(of: Any) -> dict[str, Any]:
-    return {name: _finite(value) for name, value in of._asdict().items()}
+def _list_finite_parts(of: Any) -> dict[str, Any]:
+    return {name: _null_infinite(value) for name, value in of._asdict().items()}
 
 
-def _number(value: float) -> str:
+def _write_number(value: float) -> str:
     return f"{value:.6g}" if math.isfinite(value) else "-"
 
 
-def json_text(title: str, found: Equilibria) -> str:
+def write_json(title: str, found: Equilibria) -> str:
     """One object, SI and rad."""
 
     def ends(of: tuple[RestPosition, RestPosition] | None) -> Any:
-        return None if of is None else [_finite_parts(place) for place in of]
+        return None if of is None else [_list_finite_parts(place) for place in of]
 
     def column(values: Any) -> Any:
-        return None if values is None else [*map(_finite, values.tolist())]
+        return None if values is None else [*map(_null_infinite, values.tolist())]
 
-    at, keys = found.positions, driving(found.positions).keys
+    at, keys = found.positions, read_drive(found.positions).keys
     document = {
         "schema": SCHEMA,
         "title": title,
         "proven": found.proven,
         "equilibria": [
             {
-                **_finite_parts(each),
-                **{"place": _finite_parts(each.place), "held": ends(each.held)},
+                **_list_finite_parts(each),
+                **{"place": _list_finite_parts(each.place), "held": ends(each.held)},
             }
             for each in found.found
         ],
         "indifferent": [ends(each) for each in found.indifferent],
         "held": [ends(each) for each in found.held],
-        "not_decided": [_finite_parts(place) for place in found.not_decided],
+        "not_decided": [_list_finite_parts(place) for place in found.not_decided],
         "positions": {
             "drive_bar": at.drive_bar,
             "status": list(at.status),

@@ -4,8 +4,8 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from fourbar.scene import Scene
-from fourbar.show.tables import plain_table, value
-from fourbar.solution import DEGREES, Conversion, unit_in, unit_of
+from fourbar.show.tables import make_plain_table, write_value
+from fourbar.solution import DEGREES, Conversion, find_unit, find_unit_in
 from fourbar.studies.enclosure import PROVEN, Extremes
 
 if TYPE_CHECKING:
@@ -14,14 +14,15 @@ if TYPE_CHECKING:
 SCHEMA = "fourbar-extremes/1"
 
 
-def heading(scene: Scene, found: Extremes, units: Conversion = DEGREES) -> list[str]:
+def write_heading(scene: Scene, found: Extremes, units: Conversion = DEGREES) -> list[str]:
     """Write the lines above the table."""
-    unit, factor = unit_in("rad", units)
+    unit, factor = find_unit_in("rad", units)
     parts = " and ".join(f"{low * factor:.6g} to {high * factor:.6g}" for low, high in found.parts)
     lines = [f"guaranteed over theta_2 = {parts} {unit}, by interval arithmetic in {found.boxes} pieces of it"]
     if found.distance:
         lines.append(
-            f"left out: theta_2 within {value(found.distance, 'rad', units)} of a limit of the input or of a pole of "
+            f"left out: theta_2 within {write_value(found.distance, 'rad', units)} "
+            "of a limit of the input or of a pole of "
             "the drive, where the loads grow without bound"
         )
     if found.nominal is None:
@@ -37,11 +38,11 @@ def heading(scene: Scene, found: Extremes, units: Conversion = DEGREES) -> list[
     return lines
 
 
-def table(found: Extremes, units: Conversion = DEGREES) -> "Table":
+def make_table(found: Extremes, units: Conversion = DEGREES) -> "Table":
     """Two rows for each quantity."""
-    rows, (angle_unit, of_angle) = [], unit_in("rad", units)
+    rows, (angle_unit, of_angle) = [], find_unit_in("rad", units)
     for name in found.least:
-        unit, factor = unit_in("rad" if name == "transmission" else unit_of(name.strip("|")), units)
+        unit, factor = find_unit_in("rad" if name == "transmission" else find_unit(name.strip("|")), units)
         for word, sign, extreme in (("least", -1, found.least[name]), ("greatest", 1, found.greatest[name])):
             ends = (f"{factor * extreme.low:.11g}", f"{factor * extreme.high:.11g}")
             rows.append([name, unit, word, *ends, f"{of_angle * extreme.theta_2:.6f}"])
@@ -49,10 +50,10 @@ def table(found: Extremes, units: Conversion = DEGREES) -> "Table":
                 over = found.over_estimate(name, sign)
                 rows[-1].append("-" if over is None else f"{over:.3g} times")
     heads = ("", "unit", "", "from", "to", f"theta_2 ({angle_unit})", *(["over-estimate"] if found.nominal else []))
-    return plain_table(heads, rows, left=("", "unit", "over-estimate"))
+    return make_plain_table(heads, rows, left=("", "unit", "over-estimate"))
 
 
-def json_text(scene: Scene, found: Extremes) -> str:
+def write_json(scene: Scene, found: Extremes) -> str:
     """One object, SI and rad."""
 
     def rows(of: Extremes) -> dict[str, Any]:

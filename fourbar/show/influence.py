@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES
-from fourbar.show.tables import plain_table
-from fourbar.solution import nulled, unit_of
+from fourbar.show.tables import make_plain_table
+from fourbar.solution import find_unit, null_nan
 from fourbar.studies.derivatives import Sensitivity
 
 if TYPE_CHECKING:
@@ -31,25 +31,25 @@ class Influence(NamedTuple):
     """rad."""
 
 
-def step_of(found: Sensitivity, key: str) -> float:
+def choose_step(found: Sensitivity, key: str) -> float:
     """Choose the change of a number that the influences are for: 1 % of it, of an angle 1 deg."""
     if found.keys[key].unit == "rad":
         return DEGREE
     return HUNDREDTH * abs(float(found.numbers[list(found.keys).index(key)]))
 
 
-def shown_quantities(found: Sensitivity) -> list[str]:
+def list_shown(found: Sensitivity) -> list[str]:
     """Torque and pin forces, or where the scene states no speed the angles; and its own points."""
     own = [point.name for point in found.scene.points]
     drive = [name for name in (COUPLE.value, LINE.value) if name in found.by]
     return [*((*drive, *PIN_FORCES) if drive else ("theta_3", "theta_4")), *own]
 
 
-def influences(found: Sensitivity, quantity: str) -> list[Influence]:
+def list_influences(found: Sensitivity, quantity: str) -> list[Influence]:
     """Of every number on a quantity, the largest first; those without any are left out."""
     value, rows = found.value(quantity), []
     for key in found.keys:
-        change = step_of(found, key) * found.of(quantity, key)
+        change = choose_step(found, key) * found.of(quantity, key)
         if quantity in PIN_FORCES:  # of the magnitude
             with np.errstate(all="ignore"):
                 change = np.sum(value * change, axis=-1) / np.hypot(*value.T)
@@ -61,20 +61,20 @@ def influences(found: Sensitivity, quantity: str) -> list[Influence]:
     return sorted((row for row in rows if row.change != 0.0), key=lambda row: -abs(row.change))
 
 
-def largest_value(found: Sensitivity, quantity: str) -> float:
+def find_largest(found: Sensitivity, quantity: str) -> float:
     """Find the largest magnitude of a quantity over the positions that have one; NaN where none has."""
     value = found.value(quantity)
     size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
     return float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
 
 
-def heading(found: Sensitivity) -> list[str]:
+def write_heading(found: Sensitivity) -> list[str]:
     """Write the lines above the table."""
     lines = [
         "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude",
     ]
-    for name in shown_quantities(found):
-        own = influences(found, name)
+    for name in list_shown(found):
+        own = list_influences(found, name)
         angles = [row for row in own if found.keys[row.key].unit == "rad"]
         most = [rows[0] for rows in ([row for row in own if row not in angles], angles) if rows]
         if most:
@@ -87,26 +87,26 @@ def heading(found: Sensitivity) -> list[str]:
     return lines
 
 
-def table(found: Sensitivity) -> "Table":
+def make_table(found: Sensitivity) -> "Table":
     """List a row for each number that matters, those first that change any quantity most against its largest value."""
-    names = shown_quantities(found)
-    by = {name: {row.key: row.change for row in influences(found, name)} for name in names}
-    rows = [["largest value", *(f"{largest_value(found, name):.4g}" for name in names)]]
-    rows += [[key, *(f"{by[name].get(key, 0.0):.3g}" for name in names)] for key in ranked(found, names)]
-    return plain_table(["", *(f"{name}\n{unit_of(name)}" for name in names)], rows, left=("",))
+    names = list_shown(found)
+    by = {name: {row.key: row.change for row in list_influences(found, name)} for name in names}
+    rows = [["largest value", *(f"{find_largest(found, name):.4g}" for name in names)]]
+    rows += [[key, *(f"{by[name].get(key, 0.0):.3g}" for name in names)] for key in rank_numbers(found, names)]
+    return make_plain_table(["", *(f"{name}\n{find_unit(name)}" for name in names)], rows, left=("",))
 
 
-def ranked(found: Sensitivity, names: list[str]) -> list[str]:
+def rank_numbers(found: Sensitivity, names: list[str]) -> list[str]:
     """Rank the numbers that any of the quantities depends on, by their largest share of a largest value."""
     share: dict[str, float] = {}
     for name in names:
-        size = largest_value(found, name)
-        for row in influences(found, name):
+        size = find_largest(found, name)
+        for row in list_influences(found, name):
             share[row.key] = max(share.get(row.key, 0.0), abs(row.change) / size if size > 0.0 else 0.0)
     return sorted(share, key=lambda key: -share[key])
 
 
-def json_text(found: Sensitivity) -> str:
+def write_json(found: Sensitivity) -> str:
     """One object, SI and rad: d(quantity)/d(key) over the positions, vectors as [x, y], null where there is none."""
     document: dict[str, Any] = {
         "schema": SCHEMA,
@@ -119,7 +119,7 @@ def json_text(found: Sensitivity) -> str:
             for (key, entry), number in zip(found.keys.items(), found.numbers.tolist(), strict=True)
         },
         "by": {
-            name: {key: nulled(row) for key, row in zip(found.keys, rows, strict=True)}
+            name: {key: null_nan(row) for key, row in zip(found.keys, rows, strict=True)}
             for name, rows in found.by.items()
         },
     }

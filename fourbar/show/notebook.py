@@ -15,18 +15,18 @@ SHOWN = 5
 """Positions shown at either end of a long sweep."""
 
 
-def scene_html(scene: "Scene", units: Conversion = SI) -> str:
+def show_scene(scene: "Scene", units: Conversion = SI) -> str:
     """Draw the linkage, next to what the scene states."""
-    from fourbar.show.drawing import drawing
+    from fourbar.show.drawing import draw_scene
     from fourbar.solve import solve
 
     try:
-        picture = drawing(scene, solve(scene, "position"))
+        picture = draw_scene(scene, solve(scene, "position"))
     except FourBarError as error:  # a notebook shows the reason, not a traceback
         picture = f"<p>{escape(str(error))}</p>"
     rows = "".join(
         f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(text)}</td></tr>'
-        for name, text in _facts(scene, units)
+        for name, text in _list_facts(scene, units)
     )
     return (
         f"<div><b>{escape(scene.title or 'Four-bar linkage')}</b>"
@@ -35,37 +35,37 @@ def scene_html(scene: "Scene", units: Conversion = SI) -> str:
     )
 
 
-def _facts(scene: "Scene", units: Conversion) -> list[tuple[str, str]]:
+def _list_facts(scene: "Scene", units: Conversion) -> list[tuple[str, str]]:
     from fourbar.formulas.linkage_type import classify
-    from fourbar.show.duty import drive_words
-    from fourbar.show.tables import value
+    from fourbar.show.duty import describe_drive
+    from fourbar.show.tables import write_value
 
     motion = scene.motion
     facts = [("type", classify(scene.linkage).name)]
     masses = (0.0, *(bar.mass for bar in scene.linkage.moving))
     for name, length, mass in zip(BAR_NAMES.values(), scene.linkage.lengths, masses, strict=True):
-        facts.append((name, value(length, "m", units) + (f", {value(mass, 'kg', units)}" if mass else "")))
+        facts.append((name, write_value(length, "m", units) + (f", {write_value(mass, 'kg', units)}" if mass else "")))
     speed = "positions only"
     if motion.speed is not None:
-        omega, alpha = value(motion.speed, "rad/s", units), value(motion.acceleration, "rad/s^2", units)
+        omega, alpha = write_value(motion.speed, "rad/s", units), write_value(motion.acceleration, "rad/s^2", units)
         speed = f"ω{motion.bar} = {omega}, α{motion.bar} = {alpha}"
     acting = [f"load on bar {load.bar}" for load in scene.loads] + [effect.key for effect in scene.effects]
     return [
         *facts,
         ("motion", f"{speed}; {BRANCH_NAMES[motion.branch]} branch"),
-        ("drive", "released" if motion.free is not None else drive_words(scene)),
+        ("drive", "released" if motion.free is not None else describe_drive(scene)),
         ("acting", ", ".join(acting) or "nothing"),
     ]
 
 
-def solution_html(solution: Solution, units: Conversion = DEGREES) -> str:
+def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
     """Show the first and last positions as a table; angles in degrees by default."""
-    from fourbar.show.tables import columns
+    from fourbar.show.tables import list_columns
 
     if solution.theta_2.ndim == 2:
         members, count = solution.theta_2.shape
         return f"<div><b>{escape(solution.title or 'Study')}</b>: {members} linkages, {count} positions each</div>"
-    cells = columns(solution, units)
+    cells = list_columns(solution, units)
     if (solution.status_code != 0).any():
         cells = {"status": [status.replace("_", " ") for status in solution.status], **cells}
     count = len(solution)
@@ -96,8 +96,8 @@ class InUnits:
 
     def _repr_html_(self) -> str:
         if isinstance(self.shown, Solution):
-            return solution_html(self.shown, {**DEGREES, **self.units})
-        return scene_html(self.shown, self.units)
+            return show_solution(self.shown, {**DEGREES, **self.units})
+        return show_scene(self.shown, self.units)
 
 
 def in_units(shown: "Scene | Solution", units: str) -> InUnits:

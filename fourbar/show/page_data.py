@@ -9,17 +9,17 @@ import numpy as np
 
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import dump
-from fourbar.files.pictures import data_uri
+from fourbar.files.pictures import encode_picture
 from fourbar.files.scene_text import BARS
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command, command_at
-from fourbar.show.acting import Symbol, acting
-from fourbar.show.duty import energies
-from fourbar.show.plot.style import length_unit
-from fourbar.show.plot.view import on_branch, over_time, sweep_command
-from fourbar.show.tolerances import embedded_tolerances
-from fourbar.solution import SI, Array, Conversion, Solution, nulled
+from fourbar.show.acting import Symbol, list_acting
+from fourbar.show.duty import compute_energies
+from fourbar.show.plot.style import choose_length_unit
+from fourbar.show.plot.view import is_over_time, list_sweep, set_branch
+from fourbar.show.tolerances import collect_tolerances
+from fourbar.solution import SI, Array, Conversion, Solution, null_nan
 from fourbar.solve import solve
 
 MAX_ROWS = 1441
@@ -40,17 +40,17 @@ SCALARS = (
 )
 
 
-def page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
+def collect_page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
     """Everything the page's script needs: SI units, radians, null where there is no value."""
-    data = live_data(scene, units, signs=(1, -1))
+    data = collect_live_data(scene, units, signs=(1, -1))
     for columns in data["branches"].values():
-        columns |= {name: nulled(each) for name, each in columns.items() if isinstance(each, np.ndarray)}
-    given = {str(number): picture for number, picture in _pictures(scene, pictures).items()}
-    found = embedded_tolerances(scene, data["over"]["values"] or data["theta_2"]) if scene.tolerances else None
-    return data | {"pictures": given, "tolerances": found, "toml": _scene_file(scene)}
+        columns |= {name: null_nan(each) for name, each in columns.items() if isinstance(each, np.ndarray)}
+    given = {str(number): picture for number, picture in _encode_pictures(scene, pictures).items()}
+    found = collect_tolerances(scene, data["over"]["values"] or data["theta_2"]) if scene.tolerances else None
+    return data | {"pictures": given, "tolerances": found, "toml": _write_scene_file(scene)}
 
 
-def live_data(
+def collect_live_data(
     scene: Scene, units: Conversion = SI, *, signs: tuple[int, ...] = (), stage: str | None = None
 ) -> dict[str, Any]:
     """Collect what the page's script draws, columns as arrays, without tolerances, pictures and the file.
@@ -61,12 +61,16 @@ def live_data(
     stage : the last one evaluated; left out: as of `solve`.
     """
     linkage, motion = scene.linkage, scene.motion
-    shown = _through_time(scene, stage) if over_time(scene) else _sweep(scene, signs or (motion.branch,), stage)
+    shown = (
+        _collect_motion(scene, stage)
+        if is_over_time(scene)
+        else _collect_sweep(scene, signs or (motion.branch,), stage)
+    )
     closes = np.isfinite(shown["branches"][str(motion.branch)]["theta_3"])
     if not closes.any():
         raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
     shown["start"] = int(closes.argmax()) if shown["start"] is None else shown["start"]
-    factor, unit = length_unit(max(linkage.lengths), units)
+    factor, unit = choose_length_unit(max(linkage.lengths), units)
     return {
         "lengths": list(linkage.lengths),
         "theta_1": linkage.ground_angle,
@@ -82,13 +86,13 @@ def live_data(
             {"name": p.name, "bar": p.bar, "at": [p.from_pin[0] * f(p.from_pin[1]) for f in (math.cos, math.sin)]}
             for p in scene.points
         ],
-        "acting": [_symbol(symbol, shown["theta_2"]) for symbol in acting(scene)],
+        "acting": [_write_symbol(symbol, shown["theta_2"]) for symbol in list_acting(scene)],
         "followed": motion.through == "follow",
         **shown,
     }
 
 
-def _symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
+def _write_symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
     """One thing that acts, as the page's script draws it."""
     entry: dict[str, Any] = symbol._asdict()
     for name in ("at", "beyond", "vector"):
@@ -99,7 +103,7 @@ def _symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
     return entry
 
 
-def _scene_file(scene: Scene) -> str | None:
+def _write_scene_file(scene: Scene) -> str | None:
     """Write the scene as its file, to be downloaded; None where a file has no form of what acts."""
     try:
         return dump(scene)
@@ -107,25 +111,25 @@ def _scene_file(scene: Scene) -> str | None:
         return None
 
 
-def _sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> dict[str, Any]:
+def _collect_sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> dict[str, Any]:
     """Both branches over theta_2, or that of another command over what is commanded."""
     motion = scene.motion
-    swept, own = sweep_command(scene), command(scene)
-    where, start, name = thinned(swept), None, swept.commanded
+    swept, own = list_sweep(scene), command(scene)
+    where, start, name = thin_out(swept), None, swept.commanded
     if len(own.angle) == 1:
         away = np.angle(np.exp(1j * (where.angle - own.angle[0]))) if own.stroke is None else where.places - own.places
         start = int(np.argmin(np.abs(away)))
     theta_2, branches = where.angle, {}
     for sign in signs if name == "theta_2" else (motion.branch,):
         branch = None if motion.through == "follow" else np.full(where.angle.shape, sign, dtype=np.int8)
-        solution = solve(each := on_branch(scene, sign), stage, at=command_at(each, where.places, branch))
-        branches[str(sign)], theta_2 = _columns(solution), solution.theta_2
+        solution = solve(each := set_branch(scene, sign), stage, at=command_at(each, where.places, branch))
+        branches[str(sign)], theta_2 = _collect_columns(solution), solution.theta_2
     if name != "theta_2":
         branches[str(motion.branch)]["theta_2"] = theta_2
     return {
         "omega_2": motion.omega_2,
         "alpha_2": motion.alpha_2,
-        "theta_2": nulled(theta_2),
+        "theta_2": null_nan(theta_2),
         "time": None,
         "over": _over(name, name, where.places, motion.speed),
         "rate": None,
@@ -142,42 +146,42 @@ def _over(name: str, commanded: str, values: Array, speed: float | None = None) 
     return {"name": name, "commanded": commanded, "values": own, "speed": speed}
 
 
-def _through_time(scene: Scene, stage: str | None) -> dict[str, Any]:
+def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
     """Collect the one motion that the scene makes: released, or by a law."""
     whole = solve(scene)
     assert whole.time is not None and whole.omega_2 is not None and whole.alpha_2 is not None
-    where = thinned(whole.at)
+    where = thin_out(whole.at)
     assert where.time is not None
     solution = solve(scene, stage, at=where)
-    columns = _columns(solution)
+    columns = _collect_columns(solution)
     columns["theta_2"] = solution.theta_2.tolist()
     if scene.motion.free is not None:
         for name in ("torque", "torque_error", "power", "drive_force", "drive_force_error"):
             columns.pop(name, None)
-        columns["energy"] = energies(scene, solution).kinetic
+        columns["energy"] = compute_energies(scene, solution).kinetic
     duration = float(where.time[-1] - where.time[0])
-    rate = _rate(duration)
+    rate = _choose_rate(duration)
     return {
         "omega_2": None,
         "alpha_2": 0.0,
-        "theta_2": nulled(solution.theta_2),
+        "theta_2": null_nan(solution.theta_2),
         "time": where.time.tolist(),
         "over": _over("time", whole.commanded, where.time),
         "rate": rate,
         "start": None,
         "branches": {str(scene.motion.branch): columns},
-        "pace": _pace_in_time(whole, rate, len(where.time)),
+        "pace": _describe_pace(whole, rate, len(where.time)),
         "positions": len(whole),
     }
 
 
-def thinned(where: Command) -> Command:
+def thin_out(where: Command) -> Command:
     """At most `MAX_ROWS` of the positions, evenly, both ends included."""
     n = len(where.angle)
     return where if n <= MAX_ROWS else where.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
 
 
-def _rate(duration: float) -> float:
+def _choose_rate(duration: float) -> float:
     """Seconds of a motion shown in one second: 1, or the power of ten that makes it last neither too short nor long."""
     if duration <= 0.0:
         return 1.0
@@ -187,7 +191,7 @@ def _rate(duration: float) -> float:
     return float(10.0 ** math.ceil(math.log10(duration / longest))) if duration > longest else 1.0
 
 
-def _pace_in_time(whole: Solution, rate: float, shown: int) -> str:
+def _describe_pace(whole: Solution, rate: float, shown: int) -> str:
     """Say what speed 1 means, when the linkage stops before its time, and whether instants were left out."""
     words = "At speed 1× it moves in real time"
     if rate < 1.0:
@@ -201,7 +205,7 @@ def _pace_in_time(whole: Solution, rate: float, shown: int) -> str:
     return words + "."
 
 
-def _columns(solution: Solution) -> dict[str, Any]:
+def _collect_columns(solution: Solution) -> dict[str, Any]:
     """Quantity by quantity."""
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
     if (solution.status_code != OK).any():
@@ -214,12 +218,12 @@ def _columns(solution: Solution) -> dict[str, Any]:
     return columns
 
 
-def _pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:
+def _encode_pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:
     """Encode the pictures of the bars as data URIs: those of the scene, and those given in their place."""
     found = {}
     for name, path in pictures.items():
         if name not in BARS:
             raise InputError("picture", name, "must name one of " + ", ".join(BARS))
-        found[BARS[name]] = data_uri(f"picture.{name}", path)
+        found[BARS[name]] = encode_picture(f"picture.{name}", path)
     own = {picture.bar: picture for picture in scene.pictures if picture.bar not in found}
     return found | {bar: picture.data_uri() for bar, picture in own.items()}

@@ -7,7 +7,7 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-def counted(items: Sequence[T], text: str) -> Iterable[T]:
+def count_items(items: Sequence[T], text: str) -> Iterable[T]:
     """Pass the items on, with a bar on standard error that says how many are done; no bar where that is no terminal."""
     from rich.console import Console
     from rich.progress import track
@@ -17,7 +17,7 @@ def counted(items: Sequence[T], text: str) -> Iterable[T]:
 
 
 @contextmanager
-def running(text: str) -> Iterator[Callable[[float], None] | None]:
+def show_running(text: str) -> Iterator[Callable[[float], None] | None]:
     """Move a line on standard error while the body runs; nothing where that is no terminal.
 
     Yields what the body may report the share that is done to; None where there is no terminal.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.show.tables import plain_table, under_heading
+from fourbar.show.tables import make_plain_table, write_table
 from fourbar.studies.ratio import Fit, GearRatio
 
 SCHEMA = "fourbar-ratio/1"
@@ -14,12 +14,14 @@ ROWS = 36
 """Intervals of the range that the table shows."""
 
 
-def printed(title: str, found: GearRatio) -> str:
+def write_tables(title: str, found: GearRatio) -> str:
     """Write both tables, and the numbers to copy."""
     columns = (np.degrees(found.theta_2), found.omega_ratio, found.torque_ratio, found.reflected_inertia)
-    rows = [[_number(of[i]) for of in columns] for i in range(0, len(columns[0]), max(1, len(columns[0]) // ROWS))]
+    rows = [
+        [_write_number(of[i]) for of in columns] for i in range(0, len(columns[0]), max(1, len(columns[0]) // ROWS))
+    ]
     heads = ("theta_2 (deg)", "omega_4/omega_2", "torque on 4 by that on 2", "reflected inertia (kg m^2)")
-    text = under_heading(title, [], plain_table(heads, rows))
+    text = write_table(title, [], make_plain_table(heads, rows))
     most = float(np.abs(found.torque).max())
     lines = [f"theta_4 as a polynomial of theta_2: greatest errors (largest torque on the input: {most:.6g} N m)"]
     of_fits = (
@@ -31,18 +33,18 @@ def printed(title: str, found: GearRatio) -> str:
         "of the largest",
         "at (deg)",
     )
-    errors = plain_table(of_fits, [_row(each, most) for each in found.fits], left=("held by",))
-    return text.rstrip("\n") + "\n\n" + under_heading("", lines, errors, after=["", *_to_copy(found.fits)])
+    errors = make_plain_table(of_fits, [_write_row(each, most) for each in found.fits], left=("held by",))
+    return text.rstrip("\n") + "\n\n" + write_table("", lines, errors, after=["", *_write_elements(found.fits)])
 
 
-def _row(fit: Fit, most: float) -> list[str]:
+def _write_row(fit: Fit, most: float) -> list[str]:
     held = "URDF, SDF, MuJoCo" if fit.degree == 1 else "MuJoCo"
     row = [str(fit.degree), held, f"{math.degrees(fit.angle.value):.4g}", f"{fit.speed.value:.4g}"]
     share = f"{100.0 * fit.torque.value / most:.3g} %" if most else "-"
     return [*row, f"{fit.torque.value:.4g}", share, f"{math.degrees(fit.torque.theta_2):.2f}"]
 
 
-def _to_copy(fits: tuple[Fit, ...]) -> list[str]:
+def _write_elements(fits: tuple[Fit, ...]) -> list[str]:
     """Write the elements of URDF, SDF and MJCF; joints read theta_2 and theta_4."""
     one, best = fits[0], fits[-1]
     multiplier, reference = one.theta_4[1], one.about
@@ -57,11 +59,11 @@ def _to_copy(fits: tuple[Fit, ...]) -> list[str]:
     ]
 
 
-def _number(value: float) -> str:
+def _write_number(value: float) -> str:
     return f"{value:.6g}" if math.isfinite(value) else "-"
 
 
-def json_text(title: str, found: GearRatio) -> str:
+def write_json(title: str, found: GearRatio) -> str:
     """One object, SI and rad."""
 
     def fit(each: Fit) -> dict[str, Any]:

@@ -11,9 +11,9 @@ import numpy as np
 from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS
 from fourbar.scene import Scene
-from fourbar.show.progress import running
-from fourbar.show.tables import plain_table
-from fourbar.solution import DEGREES, Array, Conversion, nulled, unit_in
+from fourbar.show.progress import show_running
+from fourbar.show.tables import make_plain_table
+from fourbar.solution import DEGREES, Array, Conversion, find_unit_in, null_nan
 from fourbar.studies.spread import BAND, PARTED, Spread, Tolerances, tolerances
 
 if TYPE_CHECKING:
@@ -26,56 +26,60 @@ MOST_RUNS = 5
 SCHEMA = "fourbar-tolerance/1"
 
 
-def shown_parts(found: Tolerances) -> list[str]:
+def list_shown_parts(found: Tolerances) -> list[str]:
     """Torque and magnitudes of pin forces, or where the scene states no speed the angles; and its own points."""
     own = [f"{point.name}_{letter}" for point in found.scene.points for letter in "xy"]
     drive = [name for name in (COUPLE.value, LINE.value) if name in found.spreads]
     return [*([*drive, *(f"|{name}|" for name in PIN_FORCES)] if drive else ["theta_3", "theta_4"]), *own]
 
 
-def part_unit(part: str) -> str:
+def find_part_unit(part: str) -> str:
     """Of a quantity, a magnitude, or a component of a point, which may be called v or a."""
     unit: str = UNITS.get(part.strip("|"), "m")
     return unit
 
 
-def heading(found: Tolerances, units: Conversion = DEGREES) -> list[str]:
+def write_heading(found: Tolerances, units: Conversion = DEGREES) -> list[str]:
     """Write the lines above the table."""
     lines = [
-        *counted(found, units),
+        *describe_counts(found, units),
         "each quantity at the position where its first-order worst case (worst) is largest; sigma is the standard",
         "deviation of the samples; the variance there is due to",
     ]
-    for part in shown_parts(found):
-        if (at := worst_position(found.spreads[part])) is not None and (most := _most(found, found.spreads[part], at)):
+    for part in list_shown_parts(found):
+        if (at := find_worst_position(found.spreads[part])) is not None and (
+            most := _name_largest(found, found.spreads[part], at)
+        ):
             lines.append(f"  {part}: {most}")
     return lines
 
 
-def counted(found: Tolerances, units: Conversion = DEGREES) -> list[str]:
+def describe_counts(found: Tolerances, units: Conversion = DEGREES) -> list[str]:
     """Say what was tried, what of it has no answer, and where first order and samples part."""
     n = len(found.theta_2)
     count = f"{len(found.scene.tolerances)} tolerance" + ("s" if len(found.scene.tolerances) > 1 else "")
     lines = [f"{count}, {found.samples} samples (seed {found.seed}), {n} positions"]
     if found.invalid:
-        lines.append(f"{_share(found.invalid, found)} have an impossible dimension, such as a length below 0")
+        lines.append(f"{_write_share(found.invalid, found)} have an impossible dimension, such as a length below 0")
     if found.apart:
-        lines.append(f"{_share(found.apart, found)} do not assemble at some position at which the nominal linkage does")
-    lines += [line for part in shown_parts(found) if (line := parted(found, part, units))]
+        lines.append(
+            f"{_write_share(found.apart, found)} do not assemble at some position at which the nominal linkage does"
+        )
+    lines += [line for part in list_shown_parts(found) if (line := describe_parted(found, part, units))]
     return lines
 
 
-def _share(count: int, found: Tolerances) -> str:
+def _write_share(count: int, found: Tolerances) -> str:
     return f"{count} of {found.samples} samples ({100.0 * count / found.samples:.3g} %)"
 
 
-def parted(found: Tolerances, part: str, units: Conversion = DEGREES) -> str:
+def describe_parted(found: Tolerances, part: str, units: Conversion = DEGREES) -> str:
     """Say where first order and samples differ; empty where they do not."""
     spread = found.spreads[part]
     where = np.flatnonzero(spread.parted)
     if not where.size:
         return ""
-    unit, factor = unit_in("rad", units)
+    unit, factor = find_unit_in("rad", units)
     runs = np.split(where, np.flatnonzero(np.diff(where) > 1) + 1)
     ends = [" to ".join(f"{factor * found.theta_2[i]:.6g}" for i in dict.fromkeys((run[0], run[-1]))) for run in runs]
     places = ", ".join(ends[:MOST_RUNS]) + (", ..." if len(ends) > MOST_RUNS else "")
@@ -85,30 +89,30 @@ def parted(found: Tolerances, part: str, units: Conversion = DEGREES) -> str:
     )
 
 
-def worst_position(spread: Spread) -> int | None:
+def find_worst_position(spread: Spread) -> int | None:
     """Index of the largest first-order worst case; None where no position has one."""
     return int(np.nanargmax(spread.worst)) if np.isfinite(spread.worst).any() else None
 
 
-def table(found: Tolerances, units: Conversion = DEGREES) -> "Table":
+def make_table(found: Tolerances, units: Conversion = DEGREES) -> "Table":
     """One row for each quantity."""
-    angle_unit, of_angle = unit_in("rad", units)
+    angle_unit, of_angle = find_unit_in("rad", units)
     heads = ("", "\nunit", f"theta_2\n{angle_unit}", "\nnominal", "\nsigma", f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %")
     rows = []
-    for part in shown_parts(found):
+    for part in list_shown_parts(found):
         spread = found.spreads[part]
-        if (at := worst_position(spread)) is None:
+        if (at := find_worst_position(spread)) is None:
             continue
         columns = (spread.nominal, spread.deviation, spread.low, spread.high, spread.least, spread.greatest)
-        unit, factor = unit_in(part_unit(part), units)
+        unit, factor = find_unit_in(find_part_unit(part), units)
         numbers = [f"{factor * column[at]:.6g}" for column in columns]
         numbers[1] = f"{factor * spread.deviation[at]:.3g}"
         angle = f"{of_angle * found.theta_2[at]:.6g}"
         rows.append([part, unit, angle, *numbers, f"{factor * spread.worst[at]:.3g}"])
-    return plain_table((*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0)
+    return make_plain_table((*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0)
 
 
-def _most(found: Tolerances, spread: Spread, at: int) -> str:
+def _name_largest(found: Tolerances, spread: Spread, at: int) -> str:
     """Name the two tolerances with the largest shares of the variance."""
     shares, total = spread.shares[:, at], float(spread.shares[:, at].sum())
     if not total > 0.0:
@@ -117,14 +121,14 @@ def _most(found: Tolerances, spread: Spread, at: int) -> str:
     return ", ".join(f"{100.0 * shares[i] / total:.0f} % {found.scene.tolerances[i].key}" for i in order)
 
 
-def embedded_tolerances(scene: Scene, places: list[float]) -> dict[str, Any]:
+def collect_tolerances(scene: Scene, places: list[float]) -> dict[str, Any]:
     """Collect what a page shows of them at places of its axis: deviations from the nominal, shares of the variance.
 
     A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so.
     """
     given: dict[str, Any] = {scene.motion.names[0]: np.array(places)}
     positions = scene if scene.motion.law else replace(scene, motion=replace(scene.motion, **given))
-    shown = nullcontext() if scene.motion.free is not None else running("the samples of the tolerances are solved")
+    shown = nullcontext() if scene.motion.free is not None else show_running("the samples of the tolerances are solved")
     try:
         with shown as progress:
             found = tolerances(positions, PAGE_SAMPLES, progress=progress)
@@ -136,29 +140,29 @@ def embedded_tolerances(scene: Scene, places: list[float]) -> dict[str, Any]:
         return [float(f"{x:.{digits}g}") if math.isfinite(x) else None for x in values[at].tolist()]
 
     parts: dict[str, Any] = {}
-    for part in shown_parts(found):
+    for part in list_shown_parts(found):
         spread = found.spreads[part]
         ends = {name: getattr(spread, name) - spread.nominal for name in ("low", "high", "least", "greatest")}
         away = {**ends, "worst": spread.worst, "deviation": spread.deviation}
         with np.errstate(all="ignore"):
             shares = spread.shares / spread.shares.sum(axis=0)
         parts[part] = {
-            "unit": part_unit(part),
+            "unit": find_part_unit(part),
             "nominal": short(spread.nominal, 9),
             **{name: short(values, 4) for name, values in away.items()},
             "shares": [short(share, 3) for share in shares],
         }
-    return {"lines": counted(found), "keys": [each.key for each in scene.tolerances], "parts": parts}
+    return {"lines": describe_counts(found), "keys": [each.key for each in scene.tolerances], "parts": parts}
 
 
-def json_text(found: Tolerances) -> str:
+def write_json(found: Tolerances) -> str:
     """One object, SI and rad; arrays over the positions, null where there is no value."""
     keys = [tolerance.key for tolerance in found.scene.tolerances]
     rows: dict[str, Any] = {}
     for part, spread in found.spreads.items():
-        own: dict[str, Any] = {name: nulled(array) for name, array in spread._asdict().items() if name != "shares"}
-        own["first_order"] = nulled(spread.first_order)
-        own["shares"] = {key: nulled(share) for key, share in zip(keys, spread.shares, strict=True)}
+        own: dict[str, Any] = {name: null_nan(array) for name, array in spread._asdict().items() if name != "shares"}
+        own["first_order"] = null_nan(spread.first_order)
+        own["shares"] = {key: null_nan(share) for key, share in zip(keys, spread.shares, strict=True)}
         own["parted"] = spread.parted.tolist()
         rows[part] = own
     document = {

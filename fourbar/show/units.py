@@ -1,7 +1,7 @@
 """The units in which results are shown: a list such as "mm N N.mm deg", or "imperial"."""
 
 from fourbar.errors import InputError
-from fourbar.quantities.units import factor_to, to_si
+from fourbar.quantities.units import find_factor, to_si
 from fourbar.solution import SI, Conversion
 
 ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
@@ -28,7 +28,7 @@ def units(text: str) -> Conversion:
         raise InputError("units", text, ALLOWED)
     stated: dict[str, str] = {}
     for name in PRESETS.get(text.casefold(), text).replace(",", " ").split():
-        why = {unit: _refusal(name, unit) for unit in STATED}
+        why = {unit: _explain_refusal(name, unit) for unit in STATED}
         unit = next((unit for unit in STATED if not why[unit]), None)
         if unit is None or unit in stated:
             hint = next((f"; {word}" for reason in why.values() if (word := reason.partition("; ")[2])), "")
@@ -41,10 +41,10 @@ def units(text: str) -> Conversion:
     return {unit: (name, to_si(f"1 {unit}", name)) for unit, name in stated.items()} or SI
 
 
-def _refusal(name: str, unit: str) -> str:
+def _explain_refusal(name: str, unit: str) -> str:
     """Why a name is no unit for another one; empty where it is."""
     try:
-        factor_to(unit, name)
+        find_factor(unit, name)
     except InputError as error:
         return error.allowed.rpartition("; must convert")[0].replace('"1 ', '"')
     return ""

@@ -14,8 +14,8 @@ from fourbar.scene.motion import BRANCH_NAMES
 BRANCHES = {**BRANCH_NAMES, 0: "both"}
 
 
-def type_lines(linkage: FourBar, unit: str = " m") -> Iterator[str]:
-    """Write the type of a linkage, the condition that decides it, what turns, and `mobility_lines`."""
+def write_type(linkage: FourBar, unit: str = " m") -> Iterator[str]:
+    """Write the type of a linkage, the condition that decides it, what turns, and `write_mobility`."""
     found = classify(linkage)
     relation = "<" if found.surplus > 0.0 else ">" if found.surplus < 0.0 else "="
     outer = min(linkage.lengths) + max(linkage.lengths)
@@ -23,10 +23,10 @@ def type_lines(linkage: FourBar, unit: str = " m") -> Iterator[str]:
     yield f"s + l = {outer:.6g}{unit} {relation} p + q = {sum(linkage.lengths) - outer:.6g}{unit}"
     yield "bars that turn fully: " + (", ".join(BAR_NAMES[number] for number in found.turning) or "none")
     if found.barker is not None:  # a structure does not move
-        yield from mobility_lines(linkage)
+        yield from write_mobility(linkage)
 
 
-def type_json(linkage: FourBar) -> str:
+def write_type_json(linkage: FourBar) -> str:
     """Write the type as JSON: SI and radians, null where there is nothing; positions as `LimitPosition` has them."""
     found = classify(linkage)
     document: dict[str, object] = {
@@ -49,9 +49,13 @@ def type_json(linkage: FourBar) -> str:
     return json.dumps(document, allow_nan=False)
 
 
-def mobility_lines(linkage: FourBar) -> Iterator[str]:
+def write_mobility(linkage: FourBar) -> Iterator[str]:
     """Line by line; angles in deg, digits as far as a drawing needs them."""
-    swings = [f"{BAR_NAMES[bar]} {_deg(swing(linkage, bar))}" for bar in MOVING_BARS if not turns_fully(linkage, bar)]
+    swings = [
+        f"{BAR_NAMES[bar]} {_write_degrees(swing(linkage, bar))}"
+        for bar in MOVING_BARS
+        if not turns_fully(linkage, bar)
+    ]
     if swings:
         yield f"bars that swing: {', '.join(swings)}"
     limits = [(bar, limit) for bar in MOVING_BARS for limit in limit_positions(linkage, bar)]
@@ -64,17 +68,18 @@ def mobility_lines(linkage: FourBar) -> Iterator[str]:
         angles = "".join(f"{math.degrees(angle):10.4f}" for angle in limit[:3])
         yield f"{what:<34}{angles}  {BRANCHES[limit.branch]}"
     if points := change_points(linkage):
-        yield f"change points: theta_2 = {' and '.join(_deg(point) for point in points)}"
+        yield f"change points: theta_2 = {' and '.join(_write_degrees(point) for point in points)}"
     found = transmission_extremes(linkage)
     yield (
-        f"angle between coupler and output: {_deg(found.least)} at theta_2 = {_deg(found.theta_2_least)} "
-        f"to {_deg(found.greatest)} at {_deg(found.theta_2_greatest)}"
+        f"angle between coupler and output: {_write_degrees(found.least)} "
+        f"at theta_2 = {_write_degrees(found.theta_2_least)} "
+        f"to {_write_degrees(found.greatest)} at {_write_degrees(found.theta_2_greatest)}"
     )
     if found.worst > 0.0:
-        yield f"smallest transmission angle: {_deg(found.worst)}"
+        yield f"smallest transmission angle: {_write_degrees(found.worst)}"
     if (ratio := time_ratio(linkage)) is not None:
         yield f"slower stroke of the output over the faster, at constant omega_2: {ratio:.4f}"
 
 
-def _deg(angle: float) -> str:
+def _write_degrees(angle: float) -> str:
     return f"{math.degrees(angle):.4f} deg"

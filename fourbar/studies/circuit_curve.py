@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, bodies
+from fourbar.effects.actions import Actions, list_bodies
 from fourbar.errors import NotAssembledError
 from fourbar.evaluation.case import Case
-from fourbar.formulas.circuits import circuit_of, circuits
+from fourbar.formulas.circuits import circuits, find_circuit
 from fourbar.formulas.closed_curve import on_curve, transmission
 from fourbar.formulas.mobility import TURN, change_points, turns_fully
 from fourbar.formulas.motion import State
@@ -38,9 +38,9 @@ class RestPosition(NamedTuple):
     """+1 or -1; 0 at a limit of theta_2, where the two meet."""
 
 
-def generalised_force(scene: Scene, terms: tuple[Any, ...], state: State) -> Any:
+def compute_generalised_force(scene: Scene, terms: tuple[Any, ...], state: State) -> Any:
     """Compute Q of loads and effects, by the parameter that the state's coefficients belong to."""
-    actions = Actions(state, bodies(scene.linkage, terms))
+    actions = Actions(state, list_bodies(scene.linkage, terms))
     for term in terms:
         term.act(actions, state)
     return actions.work()[0]
@@ -92,7 +92,7 @@ class CircuitCurve:
         self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
         self.ratios = self.case.path.lengths
         """The lengths by a unit near them, of which no product leaves the range of doubles."""
-        number = circuit_of(linkage, at.theta_2, at.branch)
+        number = find_circuit(linkage, at.theta_2, at.branch)
         if (number < 0).all():
             raise NotAssembledError(
                 f"motion.{scene.motion.names[0]}: the linkage assembles at none of the positions requested"
@@ -158,13 +158,13 @@ class CircuitCurve:
 
     def force(self, points: Array) -> Array:
         """Q of all but dry friction, by the curve's parameter."""
-        return np.broadcast_to(generalised_force(self.scene, self.case.terms, self.state(points)), len(points))
+        return np.broadcast_to(compute_generalised_force(self.scene, self.case.terms, self.state(points)), len(points))
 
     def slope(self, points: Array) -> Array:
         """dQ/ds."""
         k = self.state(points).k
         psi, mu = (Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True))
-        Q = generalised_force(self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu))
+        Q = compute_generalised_force(self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu))
         return np.broadcast_to(Q.slopes[0], len(points)) if isinstance(Q, Sloped) else np.zeros(len(points))
 
     def size(self, points: Array) -> Array:

@@ -14,21 +14,21 @@ from fourbar.effects.effect import SolvedFriction
 from fourbar.effects.numbers import OF_SCENE
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
-from fourbar.evaluation.stages import kinematics, of_command
+from fourbar.evaluation.stages import list_kinematics, name_of_command
 from fourbar.formulas.arithmetic import polar
 from fourbar.formulas.path import Path
-from fourbar.formulas.position import HalfAngle, Position, parallel_pairs, with_parallel_pairs
+from fourbar.formulas.position import HalfAngle, Position, find_parallel_pairs, put_parallel_pairs
 from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
-from fourbar.scene.stroke import triangle
-from fourbar.solution import Array, Solution, parts, values_of
+from fourbar.scene.stroke import find_triangle
+from fourbar.solution import Array, Solution, find_values, split_parts
 from fourbar.solve import solve
-from fourbar.studies.keys import SceneNumber, at_place, command_key, entries, placed
-from fourbar.studies.sloped import Sloped, slopes, values
-from fourbar.writing import between, data_frame, html_table, listed
+from fourbar.studies.keys import SceneNumber, command_key, list_entries, read_place, replace_place
+from fourbar.studies.sloped import Sloped, take_slopes, take_values
+from fourbar.writing import list_names, make_data_frame, make_html, write_between
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -61,7 +61,7 @@ class Sensitivity:
 
         Raises InputError for a quantity or a key that is not known here.
         """
-        whole = self._whole(quantity)
+        whole = self._find_whole(quantity)
         if not isinstance(key, str) or key not in self.keys:
             raise InputError("sensitivity", key, "is not known here; known: " + ", ".join(self.keys))
         found: Array = self.by[whole][list(self.keys).index(key)]
@@ -75,9 +75,9 @@ class Sensitivity:
 
     def value(self, quantity: str) -> Array:
         """Return the quantity itself, or a component or magnitude of it; InputError as `of`."""
-        whole = self._whole(quantity)
-        found: Array = values_of(self.solution, whole)
-        return found if quantity == whole else parts(whole, found)[quantity]
+        whole = self._find_whole(quantity)
+        found: Array = find_values(self.solution, whole)
+        return found if quantity == whole else split_parts(whole, found)[quantity]
 
     def to_pandas(self) -> "DataFrame":
         """One row for each number and position: its key, theta_2, status, and d(quantity)/d(key), SI and rad.
@@ -85,23 +85,23 @@ class Sensitivity:
         Raises DependencyError where pandas is not installed.
         """
         n = len(self.status)
-        slopes_of = {part: array for name, rows in self.by.items() for part, array in parts(name, rows).items()}
+        slopes_of = {part: array for name, rows in self.by.items() for part, array in split_parts(name, rows).items()}
         columns = {part: rows.ravel() for part, rows in slopes_of.items() if not part.startswith("|")}
         size = {f"|{name}|": np.ravel([self.of(f"|{name}|", key) for key in self.keys]) for name in PIN_FORCES
                 if name in self.by}  # fmt: skip
         first = {"key": np.repeat(list(self.keys), n), "theta_2": np.tile(self.solution.theta_2, len(self.keys)),
                  "status": self.status * len(self.keys)}  # fmt: skip
-        return data_frame(first | columns | size)
+        return make_data_frame(first | columns | size)
 
-    def _whole(self, quantity: str) -> str:
+    def _find_whole(self, quantity: str) -> str:
         """Return the quantity of which one is asked, or a component or the magnitude; InputError for any other."""
         if isinstance(quantity, str):
             for name in (quantity, quantity.strip("|"), quantity[:-2]):
-                if name in self.by and (name == quantity or quantity in parts(name, self.by[name])):
+                if name in self.by and (name == quantity or quantity in split_parts(name, self.by[name])):
                     return name
         raise InputError("sensitivity", quantity, "is not known here; known: " + ", ".join(self.by))
 
-    def _rows(self) -> list[tuple[str, str, str]]:
+    def _list_rows(self) -> list[tuple[str, str, str]]:
         """By quantity the numbers that change it most, by 1 % of themselves, angles by 1 deg, and that change."""
         rows = []
         names = [*(name for name in ("torque", "theta_3", "theta_4") if name in self.by), *PIN_FORCES]
@@ -112,7 +112,7 @@ class Sensitivity:
                 step = np.radians(1.0) if entry.unit == "rad" else 0.01 * abs(number)
                 changes[key] = step * np.max(own[np.isfinite(own)], initial=0.0)
             most = sorted((key for key in changes if changes[key] > 0.0), key=lambda key: -changes[key])[:3]
-            rows.append((part, between(self.value(part)), ", ".join(f"{key} {changes[key]:.3g}" for key in most)))
+            rows.append((part, write_between(self.value(part)), ", ".join(f"{key} {changes[key]:.3g}" for key in most)))
         return rows
 
     def _title(self) -> str:
@@ -121,12 +121,12 @@ class Sensitivity:
 
     def __repr__(self) -> str:
         """Say in ten lines what it holds."""
-        rows = [f"{part}, {value}: changes most with {most or 'nothing'}" for part, value, most in self._rows()]
-        return "\n".join([self._title(), *rows, listed("quantities", self.by)])
+        rows = [f"{part}, {value}: changes most with {most or 'nothing'}" for part, value, most in self._list_rows()]
+        return "\n".join([self._title(), *rows, list_names("quantities", self.by)])
 
     def _repr_html_(self) -> str:
-        return html_table(self._title(), ("", "value", "changes most by 1 % of a number, of an angle by 1 deg, with"),
-                          self._rows())  # fmt: skip
+        return make_html(self._title(), ("", "value", "changes most by 1 % of a number, of an angle by 1 deg, with"),
+                          self._list_rows())  # fmt: skip
 
 
 def sensitivity(scene: Scene) -> Sensitivity:
@@ -151,12 +151,12 @@ def sensitivity(scene: Scene) -> Sensitivity:
     theta = command_key(scene)
     if isinstance(scene.motion.angle, FromLimit):
         raise InputError(theta, scene.motion.angle, "has no sensitivities: the limit moves with the lengths")
-    at, solution, known = command(scene), solve(scene), entries(scene)
+    at, solution, known = command(scene), solve(scene), list_entries(scene)
     moving = at.speed is not None
-    known = {key: entry for key, entry in known.items() if moving or _of_position(key)}
+    known = {key: entry for key, entry in known.items() if moving or _is_of_position(key)}
     keys = {theta: SceneNumber((), OF_SCENE[scene.motion.names[0]])} | known
     most = np.nan if at.stroke is None else float(at.stroke.max())
-    numbers = [most if key == theta else at_place(scene, entry.place) for key, entry in keys.items()]
+    numbers = [most if key == theta else read_place(scene, entry.place) for key, entry in keys.items()]
     forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")
     names = [
         name
@@ -167,19 +167,19 @@ def sensitivity(scene: Scene) -> Sensitivity:
     ]
     names += [f"{start}{p.name}" for p in scene.points for start in (OF_POINTS if moving else ("",))]
     p = len(keys)
-    by = {name: np.full((p, *values_of(solution, name).shape), np.nan) for name in names}
+    by = {name: np.full((p, *find_values(solution, name).shape), np.nan) for name in names}
     status = np.array(STATUS_NAMES, dtype="<U16")[solution.status_code]
     with np.errstate(all="ignore"):
         _, decided = Case.of(scene, at.bar).half_angle(at.angle, None)
         status[decided] = STATUS_NAMES[SINGULAR]  # on a limit: so near that doubles cannot tell the factors from zero
         regular = np.flatnonzero(~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)]))
-        seeded = _seeded(scene, keys)
+        seeded = _seed(scene, keys)
         for start in range(0, len(regular), AT_ONCE):
             index = regular[start : start + AT_ONCE]
-            found, held = _derivatives(seeded, keys, at, index, by.keys(), moving)
+            found, held = _compute_derivatives(seeded, keys, at, index, by.keys(), moving)
             status[index[held & (solution.status_code[index] == OK)]] = AT_REST
             for name, number in found.items():
-                own = np.broadcast_to(slopes(number), (p, len(index)))
+                own = np.broadcast_to(take_slopes(number), (p, len(index)))
                 if by[name].ndim == 3:
                     by[name][:, index, 0], by[name][:, index, 1] = own.real, own.imag
                 else:
@@ -189,7 +189,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     return Sensitivity(scene, solution, keys, np.array(numbers, dtype=float), status.tolist(), by)
 
 
-def _of_position(key: str) -> bool:
+def _is_of_position(key: str) -> bool:
     """Whether positions depend on a number; the rest comes in with the motion."""
     return key.startswith(("lengths", "points", "drive")) or ".centre." in key
 
@@ -215,10 +215,10 @@ class _Sliding(PinFriction):
         senses, per_unit = {pin: actions.sense(pin) for pin in names}, self.per_unit(actions, eliminate)
         force = [getattr(pins, PIN_FORCE[pin]) for pin in names]
         by = [[getattr(per_unit[q], PIN_FORCE[pin]) for q in names] for pin in names]
-        shape = values(pins.F12).shape
+        shape = take_values(pins.F12).shape
 
         def plain(number: Any) -> Any:
-            z = np.broadcast_to(values(number), shape)
+            z = np.broadcast_to(take_values(number), shape)
             return np.stack([z.real, z.imag], axis=-1) if np.iscomplexobj(z) else z
 
         C = np.stack([np.stack([plain(c) for c in row], axis=1) for row in by], axis=1)
@@ -230,10 +230,10 @@ class _Sliding(PinFriction):
             total = force[row]
             for column in range(len(names)):
                 total = total + by[row][column] * x[:, column]
-            gaps.append(slopes(arms[pin] * np.abs(total)))
+            gaps.append(take_slopes(arms[pin] * np.abs(total)))
             unit = total.values / np.abs(total.values)
             for column in range(len(names)):
-                own = values(by[row][column])
+                own = take_values(by[row][column])
                 J[:, row, column] = k[:, row] * (unit.conjugate() * own).real
         rows = np.stack([np.broadcast_to(gap, (gap.shape[0], len(x))) for gap in gaps])  # (pins, p, n)
         solvable = found.number == 0
@@ -245,7 +245,7 @@ class _Sliding(PinFriction):
         return SolvedFriction(eliminate(actions))
 
 
-def differentiable(scene: Scene) -> Scene:
+def make_differentiable(scene: Scene) -> Scene:
     """Replace the scene's effects by some that compute their derivatives too."""
     twins: dict[Any, Any] = {
         Gravity: lambda own: _Directed(own.magnitude, own.angle),
@@ -254,21 +254,23 @@ def differentiable(scene: Scene) -> Scene:
     return replace(scene, effects=tuple(twins.get(type(own), lambda own: own)(own) for own in scene.effects))
 
 
-def _seeded(scene: Scene, keys: dict[str, SceneNumber]) -> Scene:
+def _seed(scene: Scene, keys: dict[str, SceneNumber]) -> Scene:
     """Give every number of the scene its own unit slope; what it leaves out carries that of its length too."""
-    scene = differentiable(scene)
+    scene = make_differentiable(scene)
     for index, (key, entry) in enumerate(keys.items()):
         if not key.startswith("motion."):
-            scene = placed(scene, entry.place, at_place(scene, entry.place) + unit_slope(index, len(keys)))
+            scene = replace_place(
+                scene, entry.place, read_place(scene, entry.place) + make_unit_slope(index, len(keys))
+            )
     return scene
 
 
-def unit_slope(index: int, count: int) -> Sloped:
+def make_unit_slope(index: int, count: int) -> Sloped:
     """Zero, with the slope 1 by one of the variables."""
     return Sloped(0.0, np.eye(count)[:, index : index + 1])
 
 
-def _derivatives(
+def _compute_derivatives(
     scene: Scene, keys: dict[str, SceneNumber], at: Command, index: NDArray[np.intp], names: KeysView[str], moving: bool
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
     """Compute the quantities at some positions, with their slopes; and where dry friction holds a pin at rest."""
@@ -277,7 +279,7 @@ def _derivatives(
     def seeded(key: str, number: Any) -> Any:
         number = np.broadcast_to(np.asarray(0.0 if number is None else number, dtype=float), at.angle.shape)[index]
         if key in place:
-            return number + unit_slope(place[key], len(keys))
+            return number + make_unit_slope(place[key], len(keys))
         return Sloped(number, np.zeros((len(keys), 1)))
 
     numbers = (at.angle, at.speed, at.acceleration)
@@ -287,19 +289,19 @@ def _derivatives(
         seeded(f"motion.{name}", number) for name, number in zip(scene.motion.names, numbers, strict=True)
     )
     if at.stroke is not None:
-        turned = triangle(scene.linkage, scene.drive).turned(q, speed, acceleration, scene.motion.side)
+        turned = find_triangle(scene.linkage, scene.drive).turned(q, speed, acceleration, scene.motion.side)
         q, speed, acceleration, lever = turned
     case, branch = Case.of(scene, at.bar), at.branch[index].astype(float)
-    position = _position(case.path, q, branch)
+    position = _compute_position(case.path, q, branch)
     state = case.state(case.path, q, position, branch, speed, acceleration, moving=moving)
-    found = kinematics(case, state, names) | of_command(case, position, state, q)
+    found = list_kinematics(case, state, names) | name_of_command(case, position, state, q)
     if at.stroke is not None:
         found |= {"theta_2": state.theta_2, "condition": found["condition"] * lever}
     held = np.zeros(len(index), dtype=bool)
     if moving:
         actions = Actions(state, case.bodies)
         for pin in {pin for term in case.terms for pin in term.dry_pins}:
-            held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (values(speed) == 0.0)
+            held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (take_values(speed) == 0.0)
         dynamics = case.dynamics(state, acceleration)
         found |= {**dynamics.pins._asdict(), case.names.value: dynamics.drive}
         found["power"] = dynamics.drive * case.drive_speed(state)
@@ -307,7 +309,7 @@ def _derivatives(
     return {name: found[name] for name in names}, held
 
 
-def _position(path: Path, q: Any, branch: Array) -> Position:
+def _compute_position(path: Path, q: Any, branch: Array) -> Position:
     """Compute the positions, whose directions have the slopes of sines and cosines.
 
     Those of the tangent of a half angle, which has no bound, lose every digit half a turn from where it is zero.
@@ -319,7 +321,7 @@ def _position(path: Path, q: Any, branch: Array) -> Position:
         s, k = -k, s
     sloped = (s * s, k * k, s * k, E1 + 4.0 * a * d * (k * k), E2 + 4.0 * a * d * (s * s))
     plain = path.half_angle(q)
-    half = HalfAngle(*(Sloped(values(x), slopes(same)) for x, same in zip(plain, sloped, strict=True)))
+    half = HalfAngle(*(Sloped(take_values(x), take_slopes(same)) for x, same in zip(plain, sloped, strict=True)))
     at = path.position(q, half, branch)
-    at = at._replace(u2=Sloped(values(at.u2), slopes(polar(1.0, q))))
-    return with_parallel_pairs(at, *parallel_pairs(path.lengths, half, branch)) if path.may_stay_parallel else at
+    at = at._replace(u2=Sloped(take_values(at.u2), take_slopes(polar(1.0, q))))
+    return put_parallel_pairs(at, *find_parallel_pairs(path.lengths, half, branch)) if path.may_stay_parallel else at

@@ -16,17 +16,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import bodies
-from fourbar.errors import DependencyError, InputError, LimitError, expect, installing
+from fourbar.effects.actions import list_bodies
+from fourbar.errors import DependencyError, InputError, LimitError, expect, say_install
 from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Loop, close_loop
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES
 from fourbar.scene import Scene, command
-from fourbar.studies.derivatives import differentiable
-from fourbar.studies.interval import interval, require, require_all
-from fourbar.studies.keys import at_place, entries, left_out, with_numbers
+from fourbar.studies.derivatives import make_differentiable
+from fourbar.studies.interval import find_interval, require, require_all
+from fourbar.studies.keys import is_left_out, list_entries, read_place, replace_numbers
 from fourbar.studies.sloped import Sloped
 
 BITS = 128
@@ -107,7 +107,7 @@ def extremes(scene: Scene, quantities: Sequence[str] = ()) -> Extremes:
     try:
         import flint
     except ImportError:
-        raise DependencyError(f"Guaranteed extremes need python-flint: {installing('exact')}") from None
+        raise DependencyError(f"Guaranteed extremes need python-flint: {say_install('exact')}") from None
     expect("scene", scene, Scene)
     expect("quantities", quantities, list, tuple)
     for name in quantities:
@@ -136,16 +136,16 @@ class _Search:
         from flint import arb
 
         self.arb, self.scene, self.boxes = arb, scene, 0
-        known = entries(scene)
+        known = list_entries(scene)
         self.reach = {tolerance.key: tolerance.reach for tolerance in scene.tolerances}
         for key in self.reach:
-            if key not in known or left_out(scene, known[key]):
+            if key not in known or is_left_out(scene, known[key]):
                 raise InputError(f"tolerances.{key}", self.reach[key], "is no number that the scene states")
         self.keys = [key for key in known if key in self.reach]
-        self.parts, self.distance = interval(scene)
+        self.parts, self.distance = find_interval(scene)
         self.branch = float(command(scene).branch[0])
         require_all(scene, self.parts)
-        start = [(a, b) for low, high in self.parts for a, b in _halves(np.linspace(low, high, FIRST + 1))]
+        start = [(a, b) for low, high in self.parts for a, b in _halve(np.linspace(low, high, FIRST + 1))]
         self.start = np.array(start)
         self.at_start: tuple[dict[str, Sloped], dict[str, Sloped]] | None = None
 
@@ -169,12 +169,12 @@ class _Search:
         """
         self.boxes += len(theta_2)
         numbers = {
-            key: self.number(key, at_place(self.scene, entry.place), moved)
-            for key, entry in entries(self.scene).items()
-            if not left_out(self.scene, entry)
+            key: self.number(key, read_place(self.scene, entry.place), moved)
+            for key, entry in list_entries(self.scene).items()
+            if not is_left_out(self.scene, entry)
         }
         still = {key: number for key, number in numbers.items() if not key.startswith("motion.")}
-        scene = with_numbers(differentiable(self.scene), still)
+        scene = replace_numbers(make_differentiable(self.scene), still)
         by_theta = np.zeros((1 + len(self.keys), 1), dtype=object)
         by_theta[0] = 1
         q, link = Sloped(theta_2, by_theta), scene.linkage
@@ -190,7 +190,7 @@ class _Search:
         at = close_loop(lengths, u1, u2, half, self.branch)
         terms = (*scene.loads, *scene.effects)
         path = Path(2, lengths, theta_1, u1)
-        case = Case(link, lengths, bodies(link, terms), terms, scene.drive_bar, path, drive=scene.drive)
+        case = Case(link, lengths, list_bodies(link, terms), terms, scene.drive_bar, path, drive=scene.drive)
         acceleration = numbers["motion.alpha_2"]
         state = case.state(path, q, at, self.branch, numbers["motion.omega_2"], acceleration)
         found = case.dynamics(state, acceleration)
@@ -202,7 +202,7 @@ class _Search:
         """Evaluate the quantities over the boxes and all tolerances, and at the centres without any."""
         if boxes is self.start and self.at_start is not None:  # every search begins with them
             return self.at_start
-        centre, radius = _centred(boxes)
+        centre, radius = _centre(boxes)
         wide = np.array([self.arb(x, r) for x, r in zip(centre, radius, strict=True)], dtype=object)
         points, off = np.array([self.arb(x) for x in centre], dtype=object), np.zeros((len(self.keys), len(boxes)))
         found = self.evaluate(wide, None), self.evaluate(points, off)
@@ -213,7 +213,7 @@ class _Search:
     def extreme(self, name: str, sign: int) -> Extreme:
         """Find the greatest (+1) or least (-1) value, enclosed and rounded outwards."""
         arb, of = self.arb, "sine" if name == "transmission" else name
-        if of == "sine" and _lowest(sign, self.over(self.start)[1][of]).max() * sign > 0.5:
+        if of == "sine" and _bound_below(sign, self.over(self.start)[1][of]).max() * sign > 0.5:
             of, sign = "cosine", -sign  # near a right angle it has the digits
         low, high, where = self.enclosed(of, sign)
         if name not in DRIVES:
@@ -234,17 +234,17 @@ class _Search:
         scale = sign / unit
         best, where, closed, size = -math.inf, math.nan, -math.inf, 0.0
         while len(boxes):
-            centre, radius = _centred(boxes)
+            centre, radius = _centre(boxes)
             over, nominal = (found[name] for found in self.over(boxes))
-            found = _lowest(scale, nominal)
+            found = _bound_below(scale, nominal)
             size = max([size, *np.abs(found[np.isfinite(found)])])
             bounds = [self._bound(scale, over, nominal, i, r) for i, r in enumerate(radius)]
             top, settled = np.array([bound[0] for bound in bounds]), np.array([bound[1] for bound in bounds])
             if self.keys and (tried := np.flatnonzero(top > max(best, found.max()))).size:
                 slopes = np.broadcast_to(nominal.slopes, (1 + len(self.keys), len(boxes)))[1:, tried]
-                corner = np.array([[sign * math.copysign(1.0, _mid(s)) for s in row] for row in slopes])
+                corner = np.array([[sign * math.copysign(1.0, _find_middle(s)) for s in row] for row in slopes])
                 points = np.array([self.arb(x) for x in centre[tried]], dtype=object)
-                found[tried] = np.fmax(found[tried], _lowest(scale, self.evaluate(points, corner)[name]))
+                found[tried] = np.fmax(found[tried], _bound_below(scale, self.evaluate(points, corner)[name]))
             if found.max() > best:
                 best, where = float(found.max()), float(centre[int(found.argmax())])
                 size = max(size, abs(best))
@@ -256,7 +256,7 @@ class _Search:
                 at = math.degrees(float(centre[~np.isfinite(top)][0]))
                 why = "it has a pole there, or within the tolerances, or linkages that do not assemble"
                 raise LimitError(f"{name} has no bound at theta_2 = {at:.6g} deg: {why}")
-            boxes = np.array([half for box in boxes[~done] for half in _halves(np.linspace(box[0], box[1], 3))])
+            boxes = np.array([half for box in boxes[~done] for half in _halve(np.linspace(box[0], box[1], 3))])
         reached, proven = unit * best, unit * max(closed, best)
         return (reached, proven, where) if sign > 0 else (-proven, -reached, where)
 
@@ -271,7 +271,7 @@ class _Search:
         return top, by_angle < NEGLIGIBLE * sum(by_tolerance)
 
 
-def _lowest(scale: Any, of: Sloped) -> NDArray[np.float64]:
+def _bound_below(scale: Any, of: Sloped) -> NDArray[np.float64]:
     """Bound the values, scaled, from below; -inf where no bound is certain."""
     found = np.array([_below(scale * value) for value in of.values])
     return np.where(np.isfinite(found), found, -math.inf)
@@ -288,15 +288,15 @@ def _above(ball: Any) -> float:
     return -_below(-ball)
 
 
-def _centred(boxes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _centre(boxes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Centres, and radii that reach both ends."""
     centre = boxes.mean(axis=1)
     return centre, np.nextafter(np.maximum(boxes[:, 1] - centre, centre - boxes[:, 0]), math.inf)
 
 
-def _mid(ball: Any) -> float:
+def _find_middle(ball: Any) -> float:
     return float(ball.mid()) if hasattr(ball, "mid") else float(ball)
 
 
-def _halves(ends: Any) -> list[tuple[float, float]]:
+def _halve(ends: Any) -> list[tuple[float, float]]:
     return list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))

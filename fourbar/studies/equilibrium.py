@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fourbar.errors import expect
 from fourbar.formulas.circuits import Circuit, circuits
 from fourbar.formulas.closed_curve import on_curve, transmission
-from fourbar.formulas.mobility import MARGIN, TURN, default_range, turns_fully
+from fourbar.formulas.mobility import MARGIN, TURN, choose_range, turns_fully
 from fourbar.formulas.position import Loop
 from fourbar.formulas.torque import inertia
 from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
@@ -27,13 +27,20 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import DEFAULT_STEPS
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar.studies.circuit_curve import SAMPLES, Array, CircuitCurve, RestPosition, generalised_force, of_input
-from fourbar.studies.derivatives import differentiable
-from fourbar.studies.holding import HALVINGS, CircuitRange, holds, lies_in, moves, ranges
+from fourbar.studies.circuit_curve import (
+    SAMPLES,
+    Array,
+    CircuitCurve,
+    RestPosition,
+    compute_generalised_force,
+    of_input,
+)
+from fourbar.studies.derivatives import make_differentiable
+from fourbar.studies.holding import HALVINGS, CircuitRange, holds, is_inside, list_ranges, moves
 from fourbar.studies.interval import KNOWN
-from fourbar.studies.keys import at_place, entries, left_out, with_numbers
+from fourbar.studies.keys import is_left_out, list_entries, read_place, replace_numbers
 from fourbar.studies.sloped import Sloped
-from fourbar.studies.zeros import AT_CHANGE_POINT, Zeros, zeros
+from fourbar.studies.zeros import AT_CHANGE_POINT, Zeros, find_zeros
 
 A_JUMP = 1e-6
 """Of the sum of the absolute terms: a torsion spring wound by half a turn makes Q jump, which is no zero."""
@@ -95,24 +102,24 @@ def equilibrium(scene: Scene) -> Equilibria:
     expect("scene", scene, Scene)
     with np.errstate(all="ignore"):
         curve = CircuitCurve(scene)
-        level = [each for each in ranges(curve, curve.level, np.empty((0, 2))) if each.samples > A_RANGE]
+        level = [each for each in list_ranges(curve, curve.level, np.empty((0, 2))) if each.samples > A_RANGE]
         samples = curve.samples()
         idle = curve.level(samples)
         result = Zeros(np.empty((0, 2)), np.empty((0, 2)), True)
         if not idle.all():
-            proof = _proven(curve, samples[idle])
-            result = proof if proof is not None and proof.complete else _sign_changes(curve, samples)
+            proof = _prove_zeros(curve, samples[idle])
+            result = proof if proof is not None and proof.complete else _find_sign_changes(curve, samples)
         points = curve.sorted(np.concatenate([result.found, result.undecided]))
         held: list[CircuitRange] = []
         if any(term.dry_pins for term in curve.case.terms):
-            held = ranges(curve, partial(holds, curve), points)
+            held = list_ranges(curve, partial(holds, curve), points)
         found = []
         for point in points:
             undecided = any(np.array_equal(point, each) for each in result.undecided)
-            around = next((each.ends for each in held if lies_in(curve, point, each)), None)
-            found.append(_described(curve, point, around, undecided=undecided))
+            around = next((each.ends for each in held if is_inside(curve, point, each)), None)
+            found.append(_describe(curve, point, around, undecided=undecided))
         singular = tuple(curve.place(np.array(point)) for point in curve.singular)
-        positions = _at_rest(scene, curve.circuit)
+        positions = _solve_at_rest(scene, curve.circuit)
         psi = positions.theta_2 - curve.theta_1
         sense = moves(curve, np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1))
         sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
@@ -120,18 +127,18 @@ def equilibrium(scene: Scene) -> Equilibria:
         return Equilibria(tuple(found), flat, result.complete, singular, ends, positions, sense)
 
 
-def _at_rest(scene: Scene, circuit: Circuit) -> Solution:
+def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
     """Solve the scene's positions at rest; of a single one, or a released linkage, those of the circuit."""
     at = of_input(scene)
     if len(at.theta_2) == 1:
-        low, high = default_range(scene.linkage) if turns_fully(scene.linkage) else circuit.theta_2
+        low, high = choose_range(scene.linkage) if turns_fully(scene.linkage) else circuit.theta_2
         margin = 0.0 if turns_fully(scene.linkage) else min(MARGIN, 0.25 * (high - low))
         theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
         at = Command(theta_2, np.full(theta_2.shape, at.branch[0], dtype=np.int8), 0.0, 0.0)
     return solve(scene, "force", at=Command(at.theta_2, at.branch, 0.0, 0.0, at.remainder))
 
 
-def _described(
+def _describe(
     curve: CircuitCurve, point: Array, held: tuple[RestPosition, RestPosition] | None, *, undecided: bool
 ) -> Equilibrium:
     """Describe an equilibrium by theta_2, at a limit by theta_4."""
@@ -145,7 +152,7 @@ def _described(
     return Equilibrium(curve.place(point), stable, f"theta_{bar}", slope, J, frequency, held)
 
 
-def _sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
+def _find_sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
     """Find the zeros between samples at which Q changes its sign."""
     idle = curve.level(points)
     points = points[~idle | np.roll(idle, 1) | np.roll(idle, -1)]  # but for a zero that falls on a sample
@@ -169,7 +176,7 @@ def _sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
     return Zeros(found[~level], found[level], False)
 
 
-def _proven(curve: CircuitCurve, idle: Array) -> Zeros | None:
+def _prove_zeros(curve: CircuitCurve, idle: Array) -> Zeros | None:
     """All zeros of Q on the circuit; None where ball arithmetic or an effect's form in it is missing.
 
     Between two change points, where signs of psi and mu tell the ways of moving apart, Q may be zero throughout: a load
@@ -188,21 +195,21 @@ def _proven(curve: CircuitCurve, idle: Array) -> Zeros | None:
     for term in (*scene.loads, *acting):
         if term.key not in KNOWN or getattr(term, "table", None) is not None:
             return None
-    scene = differentiable(replace(scene, effects=acting))
+    scene = make_differentiable(replace(scene, effects=acting))
     still = np.zeros((2, 1), dtype=object)
     numbers = {
-        key: Sloped(np.array([arb(at_place(scene, entry.place))], dtype=object), still)
-        for key, entry in entries(scene).items()
-        if not key.startswith("motion.") and not left_out(scene, entry)
+        key: Sloped(np.array([arb(read_place(scene, entry.place))], dtype=object), still)
+        for key, entry in list_entries(scene).items()
+        if not key.startswith("motion.") and not is_left_out(scene, entry)
     }
-    exact = with_numbers(scene, numbers)
+    exact = replace_numbers(scene, numbers)
     d, a, b, c = exact.linkage.lengths
     lengths, theta_1 = Loop(d, a, b, c, 0.0, 0.0), exact.linkage.ground_angle
     terms = (*exact.loads, *exact.effects)
 
     def force(psi: Any, mu: Any) -> Sloped:
         seeded = (Sloped(x, np.array([[i == 0], [i == 1]], dtype=object) * 1) for i, x in enumerate((psi, mu)))
-        Q: Sloped = generalised_force(exact, terms, on_curve(lengths, theta_1, *seeded))
+        Q: Sloped = compute_generalised_force(exact, terms, on_curve(lengths, theta_1, *seeded))
         return Q
 
     turn, both = (-math.pi, math.pi), len(circuits(scene.linkage)) == 1
@@ -224,6 +231,6 @@ def _proven(curve: CircuitCurve, idle: Array) -> Zeros | None:
 
     before, ctx.prec = ctx.prec, 128
     try:
-        return zeros(curve.ratios, force, (psi, mu), wanted, curve.singular)
+        return find_zeros(curve.ratios, force, (psi, mu), wanted, curve.singular)
     finally:
         ctx.prec = before

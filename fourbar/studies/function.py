@@ -6,16 +6,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, expect, installing
-from fourbar.evaluation.case import Case, undecided
-from fourbar.evaluation.stages import kinematics, of_command
+from fourbar.errors import DependencyError, InputError, expect, say_install
+from fourbar.evaluation.case import Case, find_undecided
+from fourbar.evaluation.stages import list_kinematics, name_of_command
 from fourbar.formulas.arithmetic import namespace
 from fourbar.formulas.mobility import change_points
 from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, STAGE_OF, is_scalar
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
-from fourbar.studies.keys import at_place, command_key, entries, refusal, with_numbers
+from fourbar.studies.keys import command_key, list_entries, read_place, refuse_key, replace_numbers
 
 NO_DIGIT_LEFT, UNDECIDED = 8.0, 16.0
 """Times the spacing of the numbers at 1: of |sin mu|, and of what decides whether the loop closes, as `solve` has them
@@ -69,32 +69,32 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
             expect(name, each, str)
         if len(set(names)) < len(names) or not names:
             raise InputError(name, names, "must be one or more, each once")
-    known, theta, motion = entries(scene), command_key(scene), scene.motion
+    known, theta, motion = list_entries(scene), command_key(scene), scene.motion
     for key in keys:
         if key not in (*known, theta):
-            raise refusal(key, "a key", [*known, theta])
+            raise refuse_key(key, "a key", [*known, theta])
     _refuse_untraceable(scene, keys)
-    wanted = _wanted(scene, quantities, keys)
+    wanted = _list_stages(scene, quantities, keys)
     stated = None if theta in keys else command(scene)
     shape = () if stated is None or isinstance(motion.angle, float) else stated.angle.shape
 
     def of_numbers(*values: Any) -> dict[str, Any]:
-        given = _given(keys, values, shape)
+        given = _check_given(keys, values, shape)
         xp, zero, numbers, holds = given.xp, given.zero, {}, True
         with np.errstate(all="ignore"):
             for key, value in given.values.items():
                 entry = known.get(key)
                 inside = xp.isfinite(value) if entry is None else entry.holds(value)
-                own = None if entry is None else at_place(scene, entry.place)
+                own = None if entry is None else read_place(scene, entry.place)
                 holds, numbers[key] = holds & inside, xp.where(inside, value, 1.0 if own is None else own)
-            q, changed = numbers.pop(theta, None), with_numbers(scene, numbers)
+            q, changed = numbers.pop(theta, None), replace_numbers(scene, numbers)
             speed, acceleration = changed.motion.speed, changed.motion.acceleration
             if stated is not None:
-                q = _like(stated.angle.reshape(shape), given)
+                q = _make_like(stated.angle.reshape(shape), given)
                 if motion.law is not None:
-                    speed, acceleration = (_like(x, given) for x in (stated.speed, stated.acceleration))
+                    speed, acceleration = (_make_like(x, given) for x in (stated.speed, stated.acceleration))
             case, moved = Case.of(changed, motion.bar), (0.0 if speed is None else speed, acceleration)
-            found, ok = _evaluated(case, q + zero, float(motion.branch), moved, given, wanted)
+            found, ok = _evaluate(case, q + zero, float(motion.branch), moved, given, wanted)
             ok = ok & holds
             parts = {
                 name: (found[name] + zero,) if is_scalar(name) else (found[name].real + zero, found[name].imag + zero)
@@ -106,7 +106,7 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     return of_numbers
 
 
-def _evaluated(
+def _evaluate(
     case: Case, q: Any, branch: float, motion: tuple[Any, Any], given: Given, wanted: dict[str, str]
 ) -> tuple[dict[str, Any], Any]:
     """Evaluate quantities, and where they have a value; elsewhere they are finite, as in their derivatives.
@@ -120,12 +120,12 @@ def _evaluated(
     least = NO_DIGIT_LEFT * given.eps * square
     ok = (half.outer > 0.0) & (half.inner > 0.0) & (half.outer * half.inner > least * least)
     for factor, constant, trig in ((half.outer, lengths.E1, half.kk), (half.inner, lengths.E2, half.ss)):
-        ok = ok & ~undecided(factor, constant, size * (trig + turned), part)
+        ok = ok & ~find_undecided(factor, constant, size * (trig + turned), part)
     half = half._replace(outer=xp.where(ok, half.outer, square), inner=xp.where(ok, half.inner, square))
     stages = set(wanted.values())
     at = path.position(q, half, branch)
     state = case.state(path, q, at, branch, speed, acceleration, moving=stages != {"position"})
-    found = kinematics(case, state, wanted.keys()) | of_command(case, at, state, q)
+    found = list_kinematics(case, state, wanted.keys()) | name_of_command(case, at, state, q)
     if "force" in stages:
         done = case.dynamics(state, acceleration)
         found |= {**done.pins._asdict(), case.names.value: done.drive, "power": done.drive * case.drive_speed(state)}
@@ -138,14 +138,14 @@ def _evaluated(
     return found, ok
 
 
-def _given(keys: Sequence[str], values: Sequence[Any], positions: tuple[int, ...]) -> Given:
+def _check_given(keys: Sequence[str], values: Sequence[Any], positions: tuple[int, ...]) -> Given:
     """Check the values, and make arrays of one library of them."""
     if len(values) != len(keys):
         raise InputError("values", f"{len(values)} of them", f"must be {len(keys)}, one for each of {', '.join(keys)}")
     arrays = {key: value for key, value in zip(keys, values, strict=True) if not _is_plain(value)}
     found: dict[Any, str] = {}
     for key, value in arrays.items():
-        found.setdefault(_library(key, value), key)
+        found.setdefault(_find_library(key, value), key)
     if len(found) > 1:
         raise InputError("values", [f"{key} of {xp.__name__}" for xp, key in found.items()], "must be of one library")
     xp: Any = next(iter(found), np)
@@ -161,7 +161,7 @@ def _given(keys: Sequence[str], values: Sequence[Any], positions: tuple[int, ...
     zero = xp.zeros_like(xp.broadcast_to(xp.astype(first, kind) * 0.0, shape))
     like = Given({}, xp, zero, float(xp.finfo(kind).eps))
     for key, value in zip(keys, values, strict=True):
-        like.values[key] = value if key in arrays else _like(value, like)
+        like.values[key] = value if key in arrays else _make_like(value, like)
     return like
 
 
@@ -170,17 +170,17 @@ def _is_plain(value: Any) -> bool:
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
-def _like(value: Any, given: Given) -> Any:
+def _make_like(value: Any, given: Given) -> Any:
     """Make numbers of Python or NumPy an array like the others."""
     return given.xp.asarray(value, dtype=given.zero.dtype)
 
 
-def _library(key: str, value: Any) -> Any:
+def _find_library(key: str, value: Any) -> Any:
     """Return the functions of an array's library; an InputError for what the formulas do not take."""
     try:
         xp = namespace(value)
     except ModuleNotFoundError:
-        raise DependencyError(f"array-api-compat is needed for arrays of this library: {installing('jax')}") from None
+        raise DependencyError(f"array-api-compat is needed for arrays of this library: {say_install('jax')}") from None
     if xp is np and not isinstance(value, np.ndarray):
         raise InputError(key, value, "must be a number or an array of numbers")
     if not hasattr(xp, "complex64"):
@@ -192,7 +192,7 @@ def _library(key: str, value: Any) -> Any:
     return xp
 
 
-def _wanted(scene: Scene, quantities: Iterable[str], keys: Sequence[str]) -> dict[str, str]:
+def _list_stages(scene: Scene, quantities: Iterable[str], keys: Sequence[str]) -> dict[str, str]:
     """Return the stages of the quantities asked for."""
     others = OF_LINE if scene.drive is None else (COUPLE.value,)
     stages = {name: stage for name, stage in STAGE_OF.items() if name not in {*NEVER, *others}}

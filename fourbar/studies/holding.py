@@ -27,7 +27,7 @@ class CircuitRange(NamedTuple):
     """How many are in it."""
 
 
-def with_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
+def add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
     """Q with what friction does against a motion that begins to one side; -inf or inf where it jams that motion."""
     state, result = curve.state(points), np.empty(len(points))
     along = np.abs(state.k.h2) >= np.abs(state.k.h4)  # the torque that balances Q, on the bar that turns faster
@@ -43,19 +43,19 @@ def with_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
 
 def holds(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
     """Whether friction holds."""
-    return (with_friction(curve, points, 1) <= 0.0) & (with_friction(curve, points, -1) >= 0.0)
+    return (add_friction(curve, points, 1) <= 0.0) & (add_friction(curve, points, -1) >= 0.0)
 
 
 def moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
     """How positions begin to move: +1 as theta_2 grows, -1 as it falls, 0 they stay."""
     state = curve.state(points)
-    ahead, back = with_friction(curve, points, 1), with_friction(curve, points, -1)
+    ahead, back = add_friction(curve, points, 1), add_friction(curve, points, -1)
     level = NOTHING * curve.size(points)
     sense = np.where(ahead > level, 1, np.where(back < -level, -1, 0))
     return np.asarray(sense * np.sign(state.k.h2), dtype=np.int8)
 
 
-def ranges(curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]], known: Array) -> list[CircuitRange]:
+def list_ranges(curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]], known: Array) -> list[CircuitRange]:
     """List the ranges within the sweep in which something holds, row by row; it holds at the points known."""
     result = []
     own_tau, own_row = curve.tau(known)
@@ -76,8 +76,8 @@ def ranges(curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]], kno
         if len(starts) and stops[0] < starts[0]:
             stops = np.roll(stops, -1)
         following = tau[(stops + 1) % len(tau)]
-        begin = _edge(there, tau[starts], np.remainder(tau[starts] - tau[starts - 1], TURN), -1.0)
-        end = _edge(there, tau[stops], np.remainder(following - tau[stops], TURN), 1.0)
+        begin = _find_edge(there, tau[starts], np.remainder(tau[starts] - tau[starts - 1], TURN), -1.0)
+        end = _find_edge(there, tau[stops], np.remainder(following - tau[stops], TURN), 1.0)
         for low, high, count in zip(begin, end, (stops - starts) % len(tau) + 1, strict=True):
             one, other = (curve.place(point) for point in curve.point(np.array([low, high]), branch))
             if curve.full and other.theta_2 < one.theta_2:
@@ -88,13 +88,13 @@ def ranges(curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]], kno
     return result
 
 
-def lies_in(curve: CircuitCurve, point: Array, of: CircuitRange) -> bool:
+def is_inside(curve: CircuitCurve, point: Array, of: CircuitRange) -> bool:
     """Whether a point lies in a range."""
     tau, row = curve.tau(point[None])
     return bool(row[0] == of.row and np.remainder(tau[0] - of.low, TURN) <= of.width)
 
 
-def _edge(held: Callable[[Array], NDArray[np.bool_]], tau: Array, gap: Array, sense: float) -> Array:
+def _find_edge(held: Callable[[Array], NDArray[np.bool_]], tau: Array, gap: Array, sense: float) -> Array:
     """Find where a range ends, between a place that is held and the next one, which is not."""
     low, high = np.zeros(tau.shape), gap
     for _ in range(HALVINGS):

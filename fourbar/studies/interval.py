@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import InputError, LimitError
-from fourbar.formulas.mobility import TURN, change_points, intervals, limit_positions, turns_fully
+from fourbar.formulas.mobility import TURN, change_points, find_intervals, limit_positions, turns_fully
 from fourbar.quantities import NOT_ASSEMBLED
 from fourbar.scene import Scene, command, require_input
 from fourbar.solve import solve
-from fourbar.studies.keys import at_place, entries
+from fourbar.studies.keys import list_entries, read_place
 from fourbar.studies.study import vary
 
 DISTANCE = math.radians(1.0)
@@ -43,7 +43,7 @@ def require(scene: Scene) -> None:
             raise InputError(key, term.key, f"its extremes cannot be guaranteed; those with {allowed} can")
 
 
-def interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:
+def find_interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:
     """Return the input's full interval without what lies within DISTANCE of its limits and of poles of the torque."""
     linkage, first = scene.linkage, float(command(scene).theta_2[0])
     psi = first - linkage.ground_angle
@@ -54,7 +54,7 @@ def interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:
     else:
         every = [
             (low + TURN * turn, high + TURN * turn)
-            for low, high in intervals(linkage)
+            for low, high in find_intervals(linkage)
             for turn in (math.floor((first - low) / TURN),)
         ]
         start, stop = next(((low, high) for low, high in every if low <= first <= high), every[0])
@@ -87,9 +87,9 @@ def require_all(scene: Scene, parts: tuple[tuple[float, float], ...]) -> None:
         return
     corners = np.array(list(itertools.product((-1.0, 1.0), repeat=len(given))))
     off = np.concatenate([corners, np.random.default_rng(0).uniform(-1.0, 1.0, (TRIED, len(given)))]).T
-    known, first = entries(scene), scene.linkage.ground_angle
+    known, first = list_entries(scene), scene.linkage.ground_angle
     values: dict[str, Any] = {
-        tolerance.key: at_place(scene, known[tolerance.key].place) + tolerance.reach * part
+        tolerance.key: read_place(scene, known[tolerance.key].place) + tolerance.reach * part
         for tolerance, part in zip(given, off, strict=True)
     }
     along = [first + 0.5 * TURN * turn for turn in range(-4, 5)]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fourbar.effects.numbers import ANY, AT_LEAST_ZERO, OF_EFFECT, POSITIVE, ROWS, unit_of
+from fourbar.effects.numbers import ANY, AT_LEAST_ZERO, OF_EFFECT, POSITIVE, ROWS, find_unit
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import namespace, polar
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
@@ -39,23 +39,23 @@ class SceneNumber(NamedTuple):
         return namespace(values).isfinite(values) & low
 
 
-def _entry(key: str, place: Place, bound: str = ANY) -> dict[str, SceneNumber]:
+def _make_entry(key: str, place: Place, bound: str = ANY) -> dict[str, SceneNumber]:
     """Make the entry of a number."""
-    unit = unit_of(key)
+    unit = find_unit(key)
     assert unit is not None, key
     return {key: SceneNumber(place, unit, bound)}
 
 
-def _pair(key: str, place: Place, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, SceneNumber]:
+def _make_pair(key: str, place: Place, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, SceneNumber]:
     """Make the two entries of a magnitude with its angle."""
-    return _entry(f"{key}.0", (*place, names[0])) | _entry(f"{key}.1", (*place, names[1]))
+    return _make_entry(f"{key}.0", (*place, names[0])) | _make_entry(f"{key}.1", (*place, names[1]))
 
 
-def _of_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
+def _list_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of an effect under its key, at its place."""
     numbers = OF_EFFECT.get(effect.key, {})
     if effect.key == "gravity":
-        return _pair(key, place, ("magnitude", "angle"))
+        return _make_pair(key, place, ("magnitude", "angle"))
     if effect.key in ROWS:
         field = ROWS[effect.key]
         return {
@@ -69,44 +69,44 @@ def _of_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     for index in range(len(effect.springs)):
         spring, own = f"{key}.{index}", (*place, "springs", index)
         found |= {f"{spring}.{name}": SceneNumber((*own, name), *of) for name, of in numbers.items()}
-        found |= _of_ends(spring, own)
+        found |= _list_ends(spring, own)
     return found
 
 
-def _of_ends(key: str, place: Place) -> dict[str, SceneNumber]:
+def _list_ends(key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of both ends of a line between two bars."""
     one, other = (
-        _pair(f"{key}.{name}.at", (*place, end), ("distance", "angle"))
+        _make_pair(f"{key}.{name}.at", (*place, end), ("distance", "angle"))
         for name, end in (("from", "start"), ("to", "end"))
     )
     return one | other
 
 
-def entries(scene: Scene) -> dict[str, SceneNumber]:
+def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     """List the numbers of a scene that a study varies, lengths first, by key; what is commanded is not among them."""
-    found = _entry("lengths.ground", ("linkage", "ground"), POSITIVE)
+    found = _make_entry("lengths.ground", ("linkage", "ground"), POSITIVE)
     bars = [BAR_NAMES[number] for number in MOVING_BARS]
     for name in bars:
-        found |= _entry(f"lengths.{name}", ("linkage", name, "length"), POSITIVE)
-    found |= _entry("lengths.ground_angle", ("linkage", "ground_angle"))
+        found |= _make_entry(f"lengths.{name}", ("linkage", name, "length"), POSITIVE)
+    found |= _make_entry("lengths.ground_angle", ("linkage", "ground_angle"))
     for name in bars:
         for number in ("mass", "inertia"):
-            found |= _entry(f"bars.{name}.{number}", ("linkage", name, number), AT_LEAST_ZERO)
-        found |= _pair(f"bars.{name}.centre", ("linkage", name, "centre"))
+            found |= _make_entry(f"bars.{name}.{number}", ("linkage", name, number), AT_LEAST_ZERO)
+        found |= _make_pair(f"bars.{name}.centre", ("linkage", name, "centre"))
     if scene.motion.law is None:
         for name in scene.motion.names[1:]:
-            found |= _entry(f"motion.{name}", ("motion", name))
+            found |= _make_entry(f"motion.{name}", ("motion", name))
     if scene.drive is not None:
-        found |= _of_ends("drive", ("drive",))
+        found |= _list_ends("drive", ("drive",))
     for index, load in enumerate(scene.loads):
         if load.force is not None:
-            found |= _pair(f"loads.{index}.force", ("loads", index, "force"))
-            found |= _pair(f"loads.{index}.at", ("loads", index, "at"))
-        found |= _entry(f"loads.{index}.moment", ("loads", index, "moment"))
+            found |= _make_pair(f"loads.{index}.force", ("loads", index, "force"))
+            found |= _make_pair(f"loads.{index}.at", ("loads", index, "at"))
+        found |= _make_entry(f"loads.{index}.moment", ("loads", index, "moment"))
     for index, point in enumerate(scene.points):
-        found |= _pair(f"{point.key}.from_pin", ("points", index, "from_pin"))
+        found |= _make_pair(f"{point.key}.from_pin", ("points", index, "from_pin"))
     for index, effect in enumerate(scene.effects):
-        found |= _of_effect(effect, f"effects.{effect.key}", ("effects", index))
+        found |= _list_effect(effect, f"effects.{effect.key}", ("effects", index))
     return found
 
 
@@ -115,7 +115,7 @@ def command_key(scene: Scene) -> str:
     return f"motion.{scene.motion.names[0]}"
 
 
-def refusal(key: str, value: object, known: list[str]) -> InputError:
+def refuse_key(key: str, value: object, known: list[str]) -> InputError:
     """Make the error for a key that a study cannot vary."""
     expect("key", key, str)
     inner = [name for name in known if name.startswith(f"{key}.")]
@@ -148,7 +148,7 @@ class ManyBars(Bar):
 LEFT_OUT = "is left out of the scene and follows the length; state it to give it a tolerance"
 
 
-def left_out(scene: Scene, entry: SceneNumber) -> bool:
+def is_left_out(scene: Scene, entry: SceneNumber) -> bool:
     """Whether a number is one that the scene leaves to a uniform bar."""
     if entry.place[0] != "linkage" or len(entry.place) < 3:
         return False
@@ -156,7 +156,7 @@ def left_out(scene: Scene, entry: SceneNumber) -> bool:
     return getattr(bar, str(entry.place[2])) is None
 
 
-def at_place(whole: Any, place: Place) -> Any:
+def read_place(whole: Any, place: Place) -> Any:
     """Read the number at a place; what a bar leaves out is that of a uniform one."""
     for name in place:
         if isinstance(name, int):
@@ -168,30 +168,30 @@ def at_place(whole: Any, place: Place) -> Any:
     return whole
 
 
-def with_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
+def replace_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
     """Copy the scene with some of its numbers replaced, by key."""
-    known, changed = entries(scene), scene
+    known, changed = list_entries(scene), scene
     for key, number in numbers.items():
-        changed = placed(changed, known[key].place, number)
+        changed = replace_place(changed, known[key].place, number)
     return changed
 
 
-def placed(whole: Any, place: Place, values: Any) -> Any:
+def replace_place(whole: Any, place: Place, values: Any) -> Any:
     """Copy with one number replaced; what a constructor checks is not checked again."""
     if not place:
         return values
     name, *rest = place
     if isinstance(name, int):
-        parts = [placed(part, tuple(rest), values) if i == name else part for i, part in enumerate(whole)]
+        parts = [replace_place(part, tuple(rest), values) if i == name else part for i, part in enumerate(whole)]
         return tuple(parts)
     if isinstance(whole, tuple):  # a named one
         named: Any = whole
-        return named._replace(**{name: placed(getattr(named, name), tuple(rest), values)})
+        return named._replace(**{name: replace_place(getattr(named, name), tuple(rest), values)})
     old = getattr(whole, name)
     if isinstance(whole, Bar) and name == "centre" and old is None:
         old = whole.mass_centre
     new = object.__new__(ManyBars if isinstance(whole, Bar) else type(whole))
     for field in fields(whole):
-        value = placed(old, tuple(rest), values) if field.name == name else getattr(whole, field.name)
+        value = replace_place(old, tuple(rest), values) if field.name == name else getattr(whole, field.name)
         object.__setattr__(new, field.name, value)
     return new

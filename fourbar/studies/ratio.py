@@ -25,7 +25,7 @@ from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Sweep
 from fourbar.solution import Array
 from fourbar.solve import solve
-from fourbar.studies.interval import interval
+from fourbar.studies.interval import find_interval
 
 MOST = 4
 """Degree of MuJoCo's `polycoef`; URDF and SDF hold 1."""
@@ -95,7 +95,7 @@ def ratio(scene: Scene, degree: int = MOST) -> GearRatio:
     for term in scene.effects:
         if term.loaded_pins:
             raise InputError(f"effects.{term.key}", term.key, "needs pin forces, which a mimic joint does not have")
-    at = _over_range(scene)
+    at = _list_positions(scene)
     low, high = float(at.theta_2.min()), float(at.theta_2.max())
     for point in change_points(scene.linkage) if scene.motion.through == "sign" else ():
         if math.ceil((low - point) / TURN) <= math.floor((high - point) / TURN):
@@ -111,9 +111,9 @@ def ratio(scene: Scene, degree: int = MOST) -> GearRatio:
         case = case.started(Command(at.theta_2[0], at.branch[0], 0.0, 0.0)) if scene.counts_turns else case
         state = case.at(at)
         h4 = np.broadcast_to(state.k.h4, at.theta_2.shape)
-        torque = _torque(case, state, at.alpha_2)
+        torque = _compute_torque(case, state, at.alpha_2)
         fits = tuple(
-            _fitted(case, state, at, (solution.theta_3 - at.theta_2, solution.theta_4), torque, each)
+            _fit_polynomials(case, state, at, (solution.theta_3 - at.theta_2, solution.theta_4), torque, each)
             for each in range(1, degree + 1)
         )
         J = sum(inertia(case.lengths.a, case.bodies, state.at, state.k))
@@ -121,7 +121,7 @@ def ratio(scene: Scene, degree: int = MOST) -> GearRatio:
         return GearRatio(at.theta_2, h4, through, np.broadcast_to(J, h4.shape), torque, fits)
 
 
-def _over_range(scene: Scene) -> Command:
+def _list_positions(scene: Scene) -> Command:
     """Positions of the range, with the scene's speed and acceleration; at rest where it states none."""
     at = command(scene)
     if at.commanded != "theta_2":
@@ -139,12 +139,12 @@ def _over_range(scene: Scene) -> Command:
         if low == high:
             raise InputError("motion.theta_2", scene.motion.theta_2, "must sweep over a range")
     else:
-        low, high = interval(replace(scene, drive_bar=2, drive=None))[0][0]
+        low, high = find_interval(replace(scene, drive_bar=2, drive=None))[0][0]
     at = command(replace(scene, motion=replace(scene.motion, theta_2=Sweep(low, high, SAMPLES), free=None)))
     return at._replace(speed=scene.motion.speed or 0.0)
 
 
-def _torque(case: Case, state: State, alpha_2: Any) -> Array:
+def _compute_torque(case: Case, state: State, alpha_2: Any) -> Array:
     """Compute the torque on the input, by virtual work; the state need not close the loop."""
     actions = Actions(state, case.bodies)
     for term in case.terms:
@@ -154,7 +154,9 @@ def _torque(case: Case, state: State, alpha_2: Any) -> Array:
     return np.broadcast_to(inertial - actions.work()[0], np.shape(state.theta_2))
 
 
-def _fitted(case: Case, state: State, at: Command, angles: tuple[Array, Array], torque: Array, degree: int) -> Fit:
+def _fit_polynomials(
+    case: Case, state: State, at: Command, angles: tuple[Array, Array], torque: Array, degree: int
+) -> Fit:
     """Fit polynomials whose greatest error is less than twice the least one, and compare them with the loop."""
     low, high = float(at.theta_2.min()), float(at.theta_2.max())
     about, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -169,7 +171,7 @@ def _fitted(case: Case, state: State, at: Command, angles: tuple[Array, Array], 
     k = Coefficients(1.0, h3, h4, -h23, h4 - h3, 0.0, joint_A.deriv(2)(x), output.deriv(2)(x))
     u3, u4 = (np.exp(1j * angle) for angle in (at.theta_2 + joint_A(x), output(x)))
     mimic = state._replace(at=state.at._replace(u3=u3, u4=u4), k=k, moving=rates(k, state.speed, at.alpha_2))
-    off = (output(x) - angles[1], h4 - state.k.h4, _torque(case, mimic, at.alpha_2) - torque)
+    off = (output(x) - angles[1], h4 - state.k.h4, _compute_torque(case, mimic, at.alpha_2) - torque)
     worst = [int(np.argmax(np.abs(each))) for each in off]
     errors = (Error(float(abs(each[i])), float(at.theta_2[i])) for each, i in zip(off, worst, strict=True))
     padded = [tuple(np.pad(p.coef, (0, degree + 1 - len(p.coef))).tolist()) for p in (output, joint_A)]

@@ -66,15 +66,18 @@ class Undecided:
 
     def of_one(self, x: Any, y: Any) -> "Sloped":
         """Of two forms of one number, whose slopes are those of either."""
-        return self._chosen(x, y, _hull(slopes(x), slopes(y)))
+        return self._choose(x, y, _hull(take_slopes(x), take_slopes(y)))
 
-    def _chosen(self, x: Any, y: Any, unknown: Any) -> "Sloped":
+    def _choose(self, x: Any, y: Any, unknown: Any) -> "Sloped":
         """Both sides where it is undecided, with these slopes."""
-        pairs = (values(x), values(y), _hull(values(x), values(y))), (slopes(x), slopes(y), unknown)
+        pairs = (
+            (take_values(x), take_values(y), _hull(take_values(x), take_values(y))),
+            (take_slopes(x), take_slopes(y), unknown),
+        )
         return Sloped(*(np.where(self.holds, one, np.where(self.fails, other, both)) for one, other, both in pairs))
 
     def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: Any) -> Any:
-        return _by_name(function, args, options)
+        return _find_by_name(function, args, options)
 
 
 def decided(holds: Any, fails: Any) -> Any:
@@ -133,9 +136,9 @@ class Sloped(NDArrayOperatorsMixin):
             return sloped._compared(other, function)
         if function is np.conjugate:
             return self.conjugate()
-        plain = [values(x) for x in given]
+        plain = [take_values(x) for x in given]
         if self.values.dtype == object:
-            plain = [_complex_ball(x) if isinstance(x, complex) else x for x in plain]
+            plain = [_make_complex_ball(x) if isinstance(x, complex) else x for x in plain]
         if function is np.absolute:
             size = np.absolute(plain[0])
             along = conjugate(plain[0]) / size
@@ -151,41 +154,41 @@ class Sloped(NDArrayOperatorsMixin):
         return Sloped(found, sum(by * x.slopes for by, x in zip(partial, given, strict=True) if isinstance(x, Sloped)))
 
     def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: Any) -> Any:
-        return _by_name(function, args, options)
+        return _find_by_name(function, args, options)
 
 
-def _by_name(function: Any, args: Sequence[Any], options: Any) -> Any:
+def _find_by_name(function: Any, args: Sequence[Any], options: Any) -> Any:
     return NotImplemented if function not in FUNCTIONS or options else FUNCTIONS[function](*args)
 
 
-def _complex_ball(z: complex) -> Any:
+def _make_complex_ball(z: complex) -> Any:
     """Make a complex constant for numbers that are balls, which accept none of Python's."""
     from flint import acb
 
     return acb(z)
 
 
-def values(number: Any) -> Any:
+def take_values(number: Any) -> Any:
     """Without the derivatives."""
     return number.values if isinstance(number, Sloped) else number
 
 
-def slopes(number: Any) -> Any:
+def take_slopes(number: Any) -> Any:
     """Return the derivatives; of a constant 0."""
     return number.slopes if isinstance(number, Sloped) else 0.0
 
 
-def _by_entry(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def _apply_by_entry(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Of an array; of one of objects, entry by entry."""
     each = np.frompyfunc(function, 1, 1)
     return lambda z: each(z) if z.dtype == object else function(z)
 
 
-real, imag = _by_entry(lambda z: z.real), _by_entry(lambda z: z.imag)
-conjugate = _by_entry(lambda z: z.conjugate() if hasattr(z, "conjugate") else z)
+real, imag = _apply_by_entry(lambda z: z.real), _apply_by_entry(lambda z: z.imag)
+conjugate = _apply_by_entry(lambda z: z.conjugate() if hasattr(z, "conjugate") else z)
 
 
-def _union(x: Any, y: Any) -> Any:
+def _unite(x: Any, y: Any) -> Any:
     """Return the least ball that holds two."""
     from flint import acb, arb
 
@@ -193,13 +196,13 @@ def _union(x: Any, y: Any) -> Any:
     return kind(x).union(kind(y))
 
 
-_hull = np.frompyfunc(_union, 2, 1)
+_hull = np.frompyfunc(_unite, 2, 1)
 
 
-def _where(mask: Any, x: Any, y: Any) -> Sloped:
+def _choose_where(mask: Any, x: Any, y: Any) -> Sloped:
     if isinstance(mask, Undecided):  # there it may jump
-        return mask._chosen(x, y, math.nan)
-    return Sloped(np.where(mask, values(x), values(y)), np.where(mask, slopes(x), slopes(y)))
+        return mask._choose(x, y, math.nan)
+    return Sloped(np.where(mask, take_values(x), take_values(y)), np.where(mask, take_slopes(x), take_slopes(y)))
 
 
 def _angle(z: Any) -> Any:
@@ -207,7 +210,7 @@ def _angle(z: Any) -> Any:
 
 
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
-    np.where: _where,
+    np.where: _choose_where,
     np.angle: _angle,
     np.searchsorted: lambda points, x, side: np.searchsorted(points, x.values, side),
     np.any: lambda x: bool(x.differs(0.0).any()),

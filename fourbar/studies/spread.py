@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Scene, command
-from fourbar.solution import Array, parts, values_of
+from fourbar.solution import Array, find_values, split_parts
 from fourbar.solve import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
-from fourbar.studies.keys import LEFT_OUT, at_place, command_key, entries, left_out, refusal
+from fourbar.studies.keys import LEFT_OUT, command_key, is_left_out, list_entries, read_place, refuse_key
 from fourbar.studies.study import Study, vary
-from fourbar.writing import between, data_frame, extent, html_table, listed
+from fourbar.writing import describe_extent, list_names, make_data_frame, make_html, write_between
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -92,13 +92,13 @@ class Tolerances:
         columns = {name: np.ravel([getattr(spread, name) for spread in self.spreads.values()]) for name in names}
         shares = {f"share of {tolerance.key}": np.ravel([spread.shares[k] for spread in self.spreads.values()])
                   for k, tolerance in enumerate(self.scene.tolerances)}  # fmt: skip
-        return data_frame(first | columns | shares)
+        return make_data_frame(first | columns | shares)
 
     def _title(self) -> str:
         tried = f"{self.samples} samples (seed {self.seed}), {self.apart} of them do not assemble somewhere"
-        return f"Tolerances {self.scene.title!r}: {extent(self.theta_2)}, {tried}"
+        return f"Tolerances {self.scene.title!r}: {describe_extent(self.theta_2)}, {tried}"
 
-    def _rows(self) -> list[tuple[str, str, str, str]]:
+    def _list_rows(self) -> list[tuple[str, str, str, str]]:
         """By quantity its nominal values, and the largest standard deviation and worst case."""
         shown = [name for name in ("torque", "theta_3", "theta_4", *(f"|{name}|" for name in PIN_FORCES))
                  if name in self.spreads]  # fmt: skip
@@ -106,18 +106,19 @@ class Tolerances:
         for name in shown:
             spread = self.spreads[name]
             largest = (np.max(x[np.isfinite(x)], initial=0.0) for x in (spread.deviation, spread.worst))
-            rows.append((name, between(spread.nominal), *(f"{x:.3g}" for x in largest)))
+            rows.append((name, write_between(spread.nominal), *(f"{x:.3g}" for x in largest)))
         return rows  # type: ignore[return-value]
 
     def __repr__(self) -> str:
         """Say in ten lines what it holds."""
         rows = [
-            f"{name}, {value}: sigma up to {sigma}, worst case {worst}" for name, value, sigma, worst in self._rows()
+            f"{name}, {value}: sigma up to {sigma}, worst case {worst}"
+            for name, value, sigma, worst in self._list_rows()
         ]
-        return "\n".join([self._title(), *rows, listed("quantities", self.spreads)])
+        return "\n".join([self._title(), *rows, list_names("quantities", self.spreads)])
 
     def _repr_html_(self) -> str:
-        return html_table(self._title(), ("", "nominal", "largest sigma", "largest worst case"), self._rows())
+        return make_html(self._title(), ("", "nominal", "largest sigma", "largest worst case"), self._list_rows())
 
 
 def tolerances(
@@ -149,26 +150,28 @@ def tolerances(
         raise InputError("tolerances", None, 'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"')
     if progress is not None:
         progress(0.0)
-    found, study = sensitivity(scene), _members(scene, samples, seed)
+    found, study = sensitivity(scene), _make_members(scene, samples, seed)
     n = len(found.solution)
     names = list(found.by)
-    values = {name: parts(name, found.value(name)) for name in names}
-    spreads = {part: _of_first_order(found, part) for name, own in values.items() for part in own}
+    values = {name: split_parts(name, found.value(name)) for name in names}
+    spreads = {part: _compute_first_order(found, part) for name, own in values.items() for part in own}
     without, gone = np.zeros(n, dtype=np.intp), np.zeros(len(study), dtype=bool)
     nominal_closes = found.solution.status_code != NOT_ASSEMBLED
-    for columns, extra in _columns(study, scene, samples, nominal_closes):
-        own = replace(study, at=study.at._replace(**{name: _piece(x, extra) for name, x in study.at._asdict().items()}))
+    for columns, extra in _list_blocks(study, scene, samples, nominal_closes):
+        own = replace(
+            study, at=study.at._replace(**{name: _take_piece(x, extra) for name, x in study.at._asdict().items()})
+        )
         width = columns.stop - columns.start
         solution = solve(own)
         code = solution.status_code[:, -width:]
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
         for name in names:
-            number = values_of(solution, name)[:, -width:]
+            number = find_values(solution, name)[:, -width:]
             if name.startswith("theta_"):  # each member counts its turns from its own first position
                 turns = np.rint((number - values[name][name][columns]) / (2 * np.pi))
                 number = number - 2 * np.pi * turns
-            for part, sampled in parts(name, number).items():
+            for part, sampled in split_parts(name, number).items():
                 _fill(spreads[part], columns, sampled)
         if progress is not None:
             progress(columns.stop / n)
@@ -176,29 +179,29 @@ def tolerances(
     return Tolerances(scene, samples, seed, found.solution.theta_2, spreads, without, int(gone.sum()), invalid)
 
 
-def _members(scene: Scene, samples: int, seed: int) -> Study:
+def _make_members(scene: Scene, samples: int, seed: int) -> Study:
     """Make the linkages of the samples."""
     try:
         from scipy.stats import norm, qmc
     except ImportError:
-        raise DependencyError(f"SciPy is needed for tolerances: {installing('dynamics')}") from None
-    known, numbers = entries(scene), dict[str, Any]()
+        raise DependencyError(f"SciPy is needed for tolerances: {say_install('dynamics')}") from None
+    known, numbers = list_entries(scene), dict[str, Any]()
     drawn = qmc.Sobol(len(scene.tolerances), seed=seed).random_base2(max(1, (samples - 1).bit_length()))[:samples]
     for tolerance, column in zip(scene.tolerances, drawn.T, strict=True):
         if tolerance.key not in known:
-            raise refusal(tolerance.key, tolerance.width, list(known))
+            raise refuse_key(tolerance.key, tolerance.width, list(known))
         entry = known[tolerance.key]
-        if left_out(scene, entry):
+        if is_left_out(scene, entry):
             raise InputError(tolerance.key, tolerance.width, LEFT_OUT)
         inside = np.clip(column, 0.5 / samples, 1.0 - 0.5 / samples)
         change = norm.ppf(inside) if tolerance.sigma else 2.0 * column - 1.0
-        numbers[tolerance.key] = at_place(scene, entry.place) + tolerance.width * change
+        numbers[tolerance.key] = read_place(scene, entry.place) + tolerance.width * change
     if scene.motion.law is None:
         numbers[command_key(scene)] = command(scene).places
     return vary(scene, numbers)
 
 
-def _columns(
+def _list_blocks(
     study: Study, scene: Scene, samples: int, closes: NDArray[np.bool_]
 ) -> Iterator[tuple[slice, NDArray[np.intp]]]:
     """Blocks of positions, and their indices: after that at which the motion begins where an effect counts from it."""
@@ -210,11 +213,11 @@ def _columns(
         yield columns, np.array([*begins, *range(columns.start, columns.stop)])
 
 
-def _piece(value: Any, index: NDArray[np.intp]) -> Any:
+def _take_piece(value: Any, index: NDArray[np.intp]) -> Any:
     return value[:, index] if np.ndim(value) == 2 and value.shape[1] > 1 else value
 
 
-def _of_first_order(found: Sensitivity, part: str) -> Spread:
+def _compute_first_order(found: Sensitivity, part: str) -> Spread:
     """Compute the nominal and the first-order figures of a part of a quantity; the samples' are still to come."""
     scene, nominal = found.scene, found.value(part)
     slopes = np.array([found.of(part, tolerance.key) for tolerance in scene.tolerances])

@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.numbers import unit_of
+from fourbar.effects.numbers import find_unit
 from fourbar.errors import InputError, expect
-from fourbar.evaluation.blocks import each, evaluation, is_compiled, keep, positions_at_once
+from fourbar.evaluation.blocks import choose_block_size, choose_evaluation, evaluate_parts, is_compiled, keep
 from fourbar.evaluation.case import BLOCK, Case
 from fourbar.evaluation.stages import FORCE
-from fourbar.formulas.mobility import on_smooth_path
-from fourbar.formulas.position import lengths_read_from, loop
-from fourbar.linkage import in_unit
+from fourbar.formulas.mobility import follow_smooth_path
+from fourbar.formulas.position import loop, reorder_lengths
+from fourbar.linkage import convert_to_unit
 from fourbar.quantities import ANGLES, INVALID, NOT_ASSEMBLED
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.stroke import triangle
+from fourbar.scene.stroke import find_triangle
 from fourbar.solution import Array, Solution
-from fourbar.solve import arrays, requested, solved, unwrap_angles
-from fourbar.studies.keys import COMMAND_KEYS, command_key, entries, placed, refusal, with_numbers
-from fourbar.writing import extent, listed
+from fourbar.solve import find_requested, make_arrays, make_solution, unwrap_angles
+from fourbar.studies.keys import COMMAND_KEYS, command_key, list_entries, refuse_key, replace_numbers, replace_place
+from fourbar.writing import describe_extent, list_names
 
 if TYPE_CHECKING:
     from fourbar.effects import Effect
@@ -50,38 +50,38 @@ class Study:
 
     def __repr__(self) -> str:
         """Say what varies."""
-        return f"Study {self.scene.title!r}: {extent(self.at.angle)}\n" + listed("varied", self.values)
+        return f"Study {self.scene.title!r}: {describe_extent(self.at.angle)}\n" + list_names("varied", self.values)
 
     def solved(
         self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0, compiled: bool | None = None
     ) -> Solution:
         """Return what `fourbar.solve` does for a study: every quantity as (m, n) or (m, n, 2)."""
         at, shape = self.at, self.at.angle.shape
-        wanted, names = requested(self.scene, shape, at, stage, out)
-        result = arrays(names, shape, out)
+        wanted, names = find_requested(self.scene, shape, at, stage, out)
+        result = make_arrays(names, shape, out)
         code = np.zeros(shape, dtype=np.uint8)
         with np.errstate(all="ignore"):
-            whole = Case.of(self._members(slice(0, 1), 1, self.scene), at.bar)
+            whole = Case.of(self._make_members(slice(0, 1), 1, self.scene), at.bar)
         quick = is_compiled(whole, wanted, code.size, compiled)
-        size = BLOCK if quick else positions_at_once(wanted)
+        size = BLOCK if quick else choose_block_size(wanted)
 
         def evaluate(rows: slice) -> None:
-            begins = self._started(rows) if wanted >= FORCE else self.scene
-            for columns in _parts(shape[1], size):
+            begins = self._make_started(rows) if wanted >= FORCE else self.scene
+            for columns in _split(shape[1], size):
                 block = (rows.stop - rows.start, columns.stop - columns.start)
-                case = Case.of(self._members(rows, block[1], begins), at.bar)._replace(side=side)
-                where = self._command(rows, columns)
-                run = evaluation(quick and not case.path.may_stay_parallel)
+                case = Case.of(self._make_members(rows, block[1], begins), at.bar)._replace(side=side)
+                where = self._list_command(rows, columns)
+                run = choose_evaluation(quick and not case.path.may_stay_parallel)
                 found = run(case, where, (...,), wanted, names)
                 keep(case, found, result, code, (rows, columns), block)
             unwrap_angles({name: result[name][rows] for name in ("theta_2", *ANGLES) if name in result}, at.bar)
 
-        each(evaluate, list(_parts(len(self), max(1, size // shape[1]))), at_once=quick)
+        evaluate_parts(evaluate, list(_split(len(self), max(1, size // shape[1]))), at_once=quick)
         code[np.isnan(at.angle)] = NOT_ASSEMBLED  # the cylinder cannot have the stroke
         code[self.invalid] = INVALID
         for array in result.values():
             array[self.invalid] = np.nan
-        solution, linkage = solved(self.scene, at, code, result), self.scene.linkage
+        solution, linkage = make_solution(self.scene, at, code, result), self.scene.linkage
         length, angle = (self.values.get(f"lengths.{name}") for name in ("ground", "ground_angle"))
         solution.ground = (
             linkage.ground if length is None else length[:, None],
@@ -89,34 +89,34 @@ class Study:
         )
         return solution
 
-    def _command(self, rows: slice, columns: slice) -> Command:
+    def _list_command(self, rows: slice, columns: slice) -> Command:
         """List some positions of some members, one after the other, (k,)."""
         count = columns.stop - columns.start
 
         def flat(value: Any) -> Any:
             if np.ndim(value) != 2:
                 return value
-            return _repeated(value[rows, 0], count) if value.shape[1] == 1 else value[rows, columns].ravel()
+            return _repeat(value[rows, 0], count) if value.shape[1] == 1 else value[rows, columns].ravel()
 
         return Command(*(flat(value) for value in self.at))
 
-    def _members(self, rows: slice, count: int, scene: Scene) -> Scene:
+    def _make_members(self, rows: slice, count: int, scene: Scene) -> Scene:
         """Make the scene of some members whose numbers are arrays, each repeated for `count` positions."""
-        scene = with_numbers(scene, {key: _repeated(values[rows], count) for key, values in self.values.items()})
-        for index, turns in _turns(scene.effects).items():
-            scene = placed(scene, ("effects", index, "turns"), tuple(_repeated(turn, count) for turn in turns))
+        scene = replace_numbers(scene, {key: _repeat(values[rows], count) for key, values in self.values.items()})
+        for index, turns in _find_turns(scene.effects).items():
+            scene = replace_place(scene, ("effects", index, "turns"), tuple(_repeat(turn, count) for turn in turns))
         return scene
 
-    def _started(self, rows: slice) -> Scene:
+    def _make_started(self, rows: slice) -> Scene:
         """Make the scene with effects that begin where each member's motion does: where it first assembles."""
         if not self.scene.counts_turns:
             return self.scene
         count = rows.stop - rows.start
         first = np.full(count, -1)
-        for columns in _parts(self.at.angle.shape[1], BLOCK):
+        for columns in _split(self.at.angle.shape[1], BLOCK):
             width = columns.stop - columns.start
-            half, _ = Case.of(self._members(rows, width, self.scene), self.at.bar).half_angle(
-                self._command(rows, columns).angle, None
+            half, _ = Case.of(self._make_members(rows, width, self.scene), self.at.bar).half_angle(
+                self._list_command(rows, columns).angle, None
             )
             assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(count, width)
             here = (first < 0) & assembled.any(axis=1)
@@ -126,23 +126,23 @@ class Study:
         one_branch = np.ptp(self.at.branch[rows], axis=1) == 0
         at = Command(np.where(one_branch, angle, np.nan), self.at.branch[rows, 0], 0.0, 0.0, bar=self.at.bar)
         scene = self.scene
-        counted = Case.of(self._members(rows, 1, scene), at.bar).started(at).terms[len(scene.loads) :]
-        for index, turns in _turns(counted).items():
-            scene = placed(scene, ("effects", index, "turns"), turns)
+        counted = Case.of(self._make_members(rows, 1, scene), at.bar).started(at).terms[len(scene.loads) :]
+        for index, turns in _find_turns(counted).items():
+            scene = replace_place(scene, ("effects", index, "turns"), turns)
         return scene
 
 
-def _turns(effects: "Iterable[Effect]") -> dict[int, Any]:
+def _find_turns(effects: "Iterable[Effect]") -> dict[int, Any]:
     """Of the effects that know where the motion begins, by their index: the whole turns of each of their pins."""
     found = {index: getattr(effect, "turns", None) for index, effect in enumerate(effects)}
     return {index: turns for index, turns in found.items() if turns is not None}
 
 
-def _repeated(values: Array, count: int) -> Array:
+def _repeat(values: Array, count: int) -> Array:
     return values if count == 1 else np.repeat(values, count)
 
 
-def _parts(size: int, most: int) -> Iterator[slice]:
+def _split(size: int, most: int) -> Iterator[slice]:
     return (slice(start, min(start + most, size)) for start in range(0, size, most))
 
 
@@ -172,9 +172,9 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     expect("values", values, Mapping)
     if scene.motion.free is not None:
         raise InputError("motion.free", "a free motion", "is integrated for one linkage; a study prescribes theta_2")
-    known, theta = entries(scene), command_key(scene)
-    given = {key: _numbers(key, value, [*known, theta]) for key, value in values.items()}
-    angles = _angles(scene, given, theta)
+    known, theta = list_entries(scene), command_key(scene)
+    given = {key: _read_numbers(key, value, [*known, theta]) for key, value in values.items()}
+    angles = _read_angles(scene, given, theta)
     sizes = {key: array.size for key, array in given.items() if key != theta and array.size != 1}
     if angles.shape[0] != 1:
         sizes[theta] = angles.shape[0]
@@ -198,41 +198,41 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     if scene.motion.law is not None:
         speed, acceleration = (np.broadcast_to(value, angle.shape) for value in (speed, acceleration))
     if scene.motion.stroke is not None:
-        varied = with_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
-        own, stroke = triangle(varied.linkage, varied.drive), angle
+        varied = replace_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
+        own, stroke = find_triangle(varied.linkage, varied.drive), angle
         angle, speed, acceleration, lever = own.turned(stroke, speed, acceleration, scene.motion.side)
-    branch = _branches(scene, numbers, angles if stroke is None else angle, m)
+    branch = _find_branches(scene, numbers, angles if stroke is None else angle, m)
     at = Command(angle, branch, speed, acceleration, bar=scene.motion.bar, stroke=stroke, lever=lever)
     return Study(scene, numbers, invalid, at)
 
 
-def _branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:
+def _find_branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:
     """Return the branch of each position, (m, n); only a member with a change point can follow a path through it."""
     motion, shape = scene.motion, (m, angles.shape[1])
     own = {key: array for key, array in numbers.items() if key in LENGTHS}
     if motion.through == "follow" and not own and len(angles) == 1:
-        return np.broadcast_to(on_smooth_path(scene.linkage, angles[0], motion.branch, motion.bar), shape)
+        return np.broadcast_to(follow_smooth_path(scene.linkage, angles[0], motion.branch, motion.bar), shape)
     branch = np.full(shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
-        lengths = with_numbers(scene, own).linkage.lengths
-        _, _, _, _, E1, E2 = loop(*lengths_read_from(motion.bar, lengths))
+        lengths = replace_numbers(scene, own).linkage.lengths
+        _, _, _, _, E1, E2 = loop(*reorder_lengths(motion.bar, lengths))
         size = NEAR_A_CHANGE_POINT * sum(lengths) ** 2
         for member in np.flatnonzero(np.broadcast_to((np.abs(E1) <= size) | (np.abs(E2) <= size), (m,))):
-            linkage = with_numbers(scene, {key: float(array[member]) for key, array in own.items()}).linkage
-            branch[member] = on_smooth_path(linkage, angles[member % len(angles)], motion.branch, motion.bar)
+            linkage = replace_numbers(scene, {key: float(array[member]) for key, array in own.items()}).linkage
+            branch[member] = follow_smooth_path(linkage, angles[member % len(angles)], motion.branch, motion.bar)
     return branch
 
 
-def _numbers(key: str, value: Any, known: list[str]) -> Array:
+def _read_numbers(key: str, value: Any, known: list[str]) -> Array:
     """Return the array given for a key, (m,) or (1,); the angles as they are."""
     if key not in known:
-        raise refusal(key, _shown(value), known)
+        raise refuse_key(key, _shorten(value), known)
     try:
-        array = np.asarray(in_unit(key, value, unit_of(key) or "1"))
+        array = np.asarray(convert_to_unit(key, value, find_unit(key) or "1"))
     except ValueError:  # rows of different lengths
         raise InputError(key, "a ragged list", "must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or array.size == 0:
-        raise InputError(key, _shown(value), "must be an array of numbers, at least one")
+        raise InputError(key, _shorten(value), "must be an array of numbers, at least one")
     most = 2 if key in COMMAND_KEYS else 1
     if array.ndim > most:
         allowed = "must have the shape (n,) or (m, n)" if most == 2 else "must have the shape (m,)"
@@ -240,12 +240,12 @@ def _numbers(key: str, value: Any, known: list[str]) -> Array:
     return array.astype(float)
 
 
-def _shown(value: Any) -> object:
+def _shorten(value: Any) -> object:
     """Shorten a value to what one line shows."""
     return f"{type(value).__name__} of shape {value.shape}" if isinstance(value, np.ndarray) else value
 
 
-def _angles(scene: Scene, given: Mapping[str, Array], key: str) -> Array:
+def _read_angles(scene: Scene, given: Mapping[str, Array], key: str) -> Array:
     """Commanded angles of all members, (1, n) or (m, n)."""
     motion = scene.motion
     if key in given:

@@ -49,7 +49,7 @@ class Zeros(NamedTuple):
     """Whether there are no others, but for those nearer than AT_CHANGE_POINT to a change point."""
 
 
-def zeros(
+def find_zeros(
     lengths: Loop,
     function: Callable[[Any, Any], Sloped],
     domain: tuple[tuple[float, float], tuple[float, float]],
@@ -78,9 +78,9 @@ def zeros(
     undecided: list[Array] = []
     evaluated = 0
     while len(centres):
-        kept = _closes(lengths, centres, radii) & inside(centres, radii)
+        kept = _may_close(lengths, centres, radii) & inside(centres, radii)
         for point in change_points:
-            kept &= ~(np.abs(_wrapped(centres - point)) + radii < AT_CHANGE_POINT).all(axis=1)
+            kept &= ~(np.abs(_wrap(centres - point)) + radii < AT_CHANGE_POINT).all(axis=1)
         centres, radii = centres[kept], radii[kept]
         evaluated += len(centres)
         if evaluated > MANY:
@@ -88,7 +88,7 @@ def zeros(
         split = np.zeros(len(centres), dtype=bool)
         newton = _Newton(own, function, centres, 2.0 * radii)
         for i, (at, r) in enumerate(zip(centres, radii, strict=True)):
-            if newton.without_zero(i, r) or any(_within(at, r, *each[1:]) for each in solved):
+            if newton.without_zero(i, r) or any(_is_inside(at, r, *each[1:]) for each in solved):
                 continue
             step = newton.step(i)
             if step is not None and any(
@@ -96,8 +96,8 @@ def zeros(
             ):
                 continue
             if step is not None and all(_holds(x, 2.0 * w, z) for z, x, w in zip(step, at, r, strict=True)):
-                zero = _polished(own, function, step)
-                if not any(_within(zero, np.zeros(2), *each[1:]) for each in solved):
+                zero = _polish(own, function, step)
+                if not any(_is_inside(zero, np.zeros(2), *each[1:]) for each in solved):
                     solved.append((zero, at, 2.0 * r))
             elif r.max() < FINEST:
                 undecided.append(at)
@@ -108,10 +108,10 @@ def zeros(
         centres = (centres[split][:, None] + halves).reshape(-1, 2)
         radii = np.repeat(0.5 * radii[split] * (1.0 + MARGIN), 4, axis=0)
     found = np.array([each[0] for each in solved]).reshape(-1, 2)
-    return Zeros(found, _apart(np.array(undecided).reshape(-1, 2)), True)
+    return Zeros(found, _separate(np.array(undecided).reshape(-1, 2)), True)
 
 
-def _closes(lengths: Loop, centres: Array, radii: Array) -> NDArray[np.bool_]:
+def _may_close(lengths: Loop, centres: Array, radii: Array) -> NDArray[np.bool_]:
     """Where the loop may close in a box: |g(c)| is no more than its greatest slopes allow."""
     d, a, b, c = lengths[:4]
     slope = np.minimum(np.abs(np.sin(centres)) + radii, 1.0) * [a * d, b * c]
@@ -156,7 +156,7 @@ class _Newton:
         return psi, mu
 
 
-def _polished(lengths: Loop, function: Callable[[Any, Any], Sloped], step: tuple[Any, Any]) -> Array:
+def _polish(lengths: Loop, function: Callable[[Any, Any], Sloped], step: tuple[Any, Any]) -> Array:
     """Return the zero in a step that holds it."""
     at = np.array([[float(z.mid()) for z in step]])
     for _ in range(STEPS):
@@ -171,20 +171,20 @@ def _holds(centre: float, radius: float, ball: Any) -> bool:
     return abs(float(ball.mid()) - centre) + float(ball.rad()) < radius * (1.0 - MARGIN)
 
 
-def _within(at: Array, r: Array, centre: Array, radius: Array) -> bool:
+def _is_inside(at: Array, r: Array, centre: Array, radius: Array) -> bool:
     """Whether a box lies inside another, whole turns apart or not."""
-    return bool((np.abs(_wrapped(at - centre)) + r <= radius * (1.0 - MARGIN)).all())
+    return bool((np.abs(_wrap(at - centre)) + r <= radius * (1.0 - MARGIN)).all())
 
 
-def _wrapped(angle: Any) -> Any:
+def _wrap(angle: Any) -> Any:
     """Wrap angles into half a turn."""
     return angle - 2.0 * PI * np.rint(angle / (2.0 * PI))
 
 
-def _apart(points: Array) -> Array:
+def _separate(points: Array) -> Array:
     """One of each group of neighbouring points: its middle."""
     groups: list[list[Array]] = []
     for point in points:
-        near = [g for g in groups if any((np.abs(_wrapped(point - each)) < 8.0 * FINEST).all() for each in g)]
+        near = [g for g in groups if any((np.abs(_wrap(point - each)) < 8.0 * FINEST).all() for each in g)]
         groups = [g for g in groups if all(g is not one for one in near)] + [[point, *(p for g in near for p in g)]]
     return np.array([np.mean(group, axis=0) for group in groups]).reshape(-1, 2)

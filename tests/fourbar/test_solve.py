@@ -19,7 +19,7 @@ from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
-from fourbar.show.page_data import page_data
+from fourbar.show.page_data import collect_page_data
 from fourbar.show.plot import draw
 from fourbar.solution import Solution
 from fourbar.solve import solve
@@ -238,7 +238,7 @@ def test_analyze_says_it_in_every_form(changes: dict[str, Any], words: str, tmp_
         assert status(["analyze", str(file), "--csv"]) == HOLDS
         lines, errors = capfd.readouterr()
         assert [line.split(",")[0] for line in lines.splitlines()[1:]] == [name] * 5 and errors == ""
-        assert page_data(fourbar.load(file), {})["branches"]["1"]["status"].count(name) >= 5
+        assert collect_page_data(fourbar.load(file), {})["branches"]["1"]["status"].count(name) >= 5
 
 
 def test_analyze_refuses_a_speed_without_a_square_in_one_line(tmp_path: Path, capfd: Any) -> None:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.linkage import Bar
-from fourbar.mjcf import RECIPE, mjcf
-from fourbar.mjcf.document import load_ratio
+from fourbar.mjcf import RECIPE, write_mjcf
+from fourbar.mjcf.document import compute_load_ratio
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.answer import Answer
@@ -31,8 +31,8 @@ from fourbar_validation.engines.limits import (
 from fourbar_validation.engines.mujoco import simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.inverse import MujocoTree
-from fourbar_validation.scenes.hard_families import loads, sweep_of
-from fourbar_validation.scenes.hard_linkages import at, dressed, linkage_of, with_bars
+from fourbar_validation.scenes.hard_families import scale_loads, sweep_turn
+from fourbar_validation.scenes.hard_linkages import draw_linkage, dress, replace_bars, set_angles
 from fourbar_validation.scenes.random import DrawnType
 
 
@@ -52,15 +52,15 @@ def _simulated(scene: Scene) -> Answer:
 
 def _near_toggle(sine: float) -> bool:
     """Whether a sweep that ends where |sin mu| has this value is followed without an alarm."""
-    d, a, b, c = linkage_of(DrawnType.TRIPLE_ROCKER, 1)
+    d, a, b, c = draw_linkage(DrawnType.TRIPLE_ROCKER, 1)
     cosine = -math.sqrt(1.0 - sine * sine)
     squared = b * b + c * c - 2.0 * b * c * cosine
     psi = math.acos((d * d + a * a - squared) / (2.0 * d * a))
-    return not _simulated(at(dressed((d, a, b, c), 1), np.linspace(psi - 0.5, psi, 20))).alarms
+    return not _simulated(set_angles(dress((d, a, b, c), 1), np.linspace(psi - 0.5, psi, 20))).alarms
 
 
 def _base() -> Scene:
-    return sweep_of(dressed((0.3, 0.1, 0.25, 0.22)))
+    return sweep_turn(dress((0.3, 0.1, 0.25, 0.22)))
 
 
 def _at_speed(omega_2: float) -> Scene:
@@ -73,8 +73,8 @@ def _crank_acceleration(value: float) -> bool:
 
 
 def _loaded(ratio: float) -> bool:
-    (_, scene), *_ = loads(exponents=(3,))
-    times = ratio / load_ratio(scene)
+    (_, scene), *_ = scale_loads(exponents=(3,))
+    times = ratio / compute_load_ratio(scene)
     heavier = tuple(
         replace(load, force=load.force and (load.force[0] * times, load.force[1]), moment=load.moment * times)
         for load in scene.loads
@@ -87,7 +87,7 @@ def _compiles(inertia: float) -> bool:
     base = _base()
     bar: Bar = base.linkage.output
     try:
-        MujocoTree(with_bars(base, output=replace(bar, inertia=inertia)))
+        MujocoTree(replace_bars(base, output=replace(bar, inertia=inertia)))
     except ValueError:
         return False
     return True
@@ -96,8 +96,8 @@ def _compiles(inertia: float) -> bool:
 def _centre_kept(r: float) -> bool:
     """Whether the compiled MJCF places a mass centre at this distance from its pin where it was put."""
     base = _base()
-    scene = with_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
-    return ClosedLoop(mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False)).keeps_centre("output")
+    scene = replace_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
+    return ClosedLoop(write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False)).keeps_centre("output")
 
 
 def _proximal(mu: float) -> bool:

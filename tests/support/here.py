@@ -27,4 +27,4 @@ def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
         for number, items in chunks:
             yield number, [function(item) for item in items]
 
-    monkeypatch.setattr(workers, "over_processes", over_none)
+    monkeypatch.setattr(workers, "apply_over_processes", over_none)

@@ -28,7 +28,7 @@ from fourbar_validation.cli import COMMANDS, group
 from fourbar_validation.cli import status as harness
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.lab.effects.work import EFFECTS
-from fourbar_validation.scenes.suites import suite_file
+from fourbar_validation.scenes.suites import read_suite
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -240,7 +240,7 @@ def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
 
 
 def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
-    suite = suite_file(GALLERY / "suite.txt")
+    suite = read_suite(GALLERY / "suite.txt")
     names = [suite.name(index) for index in range(len(suite))]
     assert names == sorted(path.stem for path in GALLERY.glob("*.toml")) and len(names) == 8
     for name in names:

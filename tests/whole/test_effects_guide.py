@@ -18,7 +18,7 @@ from fourbar.errors import InputError, LimitError
 from fourbar.files import dump, loads
 from fourbar.files import effects as in_files
 from fourbar.files.effects import REGISTRY
-from fourbar.mjcf import mjcf
+from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.effects import MJCF_OF, NO_MJCF
 from fourbar.scene import Scene, command
 from fourbar.solve import solve
@@ -116,7 +116,7 @@ def test_mjcf_has_no_row_of_the_example_and_refuses_it(latch: Any) -> None:
     found = refusals(guide_scene(), SIMULATED)
     assert found.keys() == {"mujoco-simulated"} and "'latch'" in found["mujoco-simulated"]
     with pytest.raises(LimitError, match="'latch'"):
-        mjcf(guide_scene())
+        write_mjcf(guide_scene())
 
 
 def test_without_its_row_nothing_is_judged_by_another_scale(latch: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,9 +201,9 @@ def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
 
 NEED_NO_LINE = {
     *("docs/api.md", "docs/examples/effects-cost.md"),
-    "validation/fourbar_validation/lab/stress/mutation/specimens.py",
+    "validation/fourbar_validation/lab/stress/mutation/fault_scenes.py",
 }
-"""Where every effect is named and a new one need not be: written by a program, or what faults are planted in."""
+"""Where every effect is named and a new one need not be: written by a program, or what faults are injected into."""
 
 
 def test_the_guide_names_every_file_that_names_every_effect() -> None:

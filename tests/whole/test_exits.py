@@ -215,12 +215,12 @@ def test_an_option_that_makes_another_command_may_stand_anywhere(capsys: pytest.
 def test_a_figure_that_no_erratum_explains_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
     assert VALIDATION(["published"]) == HOLDS
     wrong = PublishedFigure("2.4 positions", "1 theta3_1", "167.877224", 167.8)
-    monkeypatch.setattr("fourbar_validation.published.check.figures", lambda: iter([wrong]))
+    monkeypatch.setattr("fourbar_validation.published.comparison.list_figures", lambda: iter([wrong]))
     assert VALIDATION(["published"]) == FAILED
 
 
 def test_no_figure_at_all_is_status_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr("fourbar_validation.published.check.figures", lambda: iter([]))
+    monkeypatch.setattr("fourbar_validation.published.comparison.list_figures", lambda: iter([]))
     assert VALIDATION(["published"]) == FAILED
     assert "Nothing was compared" in capsys.readouterr().out
 

@@ -12,7 +12,7 @@ import pytest
 import fourbar
 import fourbar_validation.run.run
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
-from fourbar.mjcf import mjcf
+from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command, Scene
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
@@ -22,11 +22,11 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.memory import WORKER_MEMORY
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.summary import Summary
-from fourbar_validation.report.terminal import table
+from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run import pool
 from fourbar_validation.run.run import RunOptions, run
-from fourbar_validation.run.selection import chosen
-from fourbar_validation.scenes.suites import LARGEST_LIST, suite_file
+from fourbar_validation.run.selection import choose_witnesses
+from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
 
@@ -44,7 +44,7 @@ HOSTILE = {
 }
 STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 """Control characters, but for the ends of lines."""
-EXACT = chosen("free-body")
+EXACT = choose_witnesses("free-body")
 
 
 def scene_text(title: str) -> str:
@@ -88,7 +88,7 @@ def test_reports_hold_hostile_text_as_text(
     assert "<script>" not in markdown
     assert "\n# heading" not in markdown
     assert not re.search(r"(?<!\\)\]\(", markdown)
-    table(summary, out)
+    print_table(summary, out)
     shown = capsys.readouterr().out
     assert "[bold red]" in shown
     for name, where in (("terminal", shown), ("markdown", markdown), ("html", html)):
@@ -99,7 +99,7 @@ def test_reports_hold_hostile_text_as_text(
 
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_mjcf_holds_a_hostile_title_as_an_attribute(kind: str) -> None:
-    root = ET.fromstring(mjcf(crank_rocker(title=HOSTILE[kind])))
+    root = ET.fromstring(write_mjcf(crank_rocker(title=HOSTILE[kind])))
     assert root.tag == "mujoco"
     assert not STEERING.search(root.attrib["model"])
     assert not root.findall(".//script")
@@ -197,7 +197,7 @@ LISTS = [
 
 @pytest.mark.parametrize(("what", "name", "text"), LISTS, ids=[case[0] for case in LISTS])
 def test_a_suite_file_lists_scenes_from_its_own_folder(what: str, name: str, text: str, tmp_path: Path) -> None:
-    suite = suite_file(listed(tmp_path, text, name))
+    suite = read_suite(listed(tmp_path, text, name))
     assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
 
 
@@ -217,7 +217,7 @@ BAD_LISTS = [
 @pytest.mark.parametrize(("what", "text", "words"), BAD_LISTS, ids=[case[0] for case in BAD_LISTS])
 def test_a_bad_suite_file_is_one_line(what: str, text: str | bytes, words: str, tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
-        suite_file(listed(tmp_path, text))
+        read_suite(listed(tmp_path, text))
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -225,17 +225,17 @@ def test_a_bad_suite_file_is_one_line(what: str, text: str | bytes, words: str, 
 @pytest.mark.parametrize("text", ["scenes = 3", "scenes = [3]", "scene = []", "scenes = [", "scenes = " + "[" * 9999])
 def test_a_bad_suite_in_toml_is_one_line(text: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"suite\.toml"):
-        suite_file(listed(tmp_path, text, "suite.toml"))
+        read_suite(listed(tmp_path, text, "suite.toml"))
 
 
 def test_the_pattern_of_a_suite_does_not_take_the_suite_itself(tmp_path: Path) -> None:
-    suite = suite_file(listed(tmp_path, 'scenes = ["*.toml"]', "suite.toml"))
+    suite = read_suite(listed(tmp_path, 'scenes = ["*.toml"]', "suite.toml"))
     assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
 
 
 def test_a_worker_carries_only_its_own_scenes(tmp_path: Path) -> None:
-    suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
-    (job,) = pool.jobs(suite, [1], (), False)
+    suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
+    (job,) = pool.make_jobs(suite, [1], (), False)
     assert job.name == "b" and len(job.suite) == 1
 
 
@@ -251,7 +251,7 @@ class Greedy:
 
 
 def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    suite = suite_file(listed(tmp_path, "a.toml\nb.toml\n"))
+    suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
     greedy = Witness("greedy", Greedy, EQUIVALENCE)
     list(run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False)))

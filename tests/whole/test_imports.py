@@ -89,7 +89,7 @@ def test_each_engine_is_imported_under_its_own_name_alone(path: Path) -> None:
     assert not {name for name in names if name.partition(".")[0] == "tests"}
     for engine, its_name in ENGINES.items():
         if any(name.partition(".")[0] == engine for name in names):
-            assert {"engines", "subjects"} & {path.parent.name, path.parent.parent.name}
+            assert {"engines", "simulators"} & {path.parent.name, path.parent.parent.name}
             assert its_name in path.relative_to(ROOT).as_posix()
 
 

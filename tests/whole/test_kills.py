@@ -24,15 +24,15 @@ from fourbar_validation.compare.rows import FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import added, workers
 from fourbar_validation.engines.witnesses import Witness
-from fourbar_validation.report.machine import CODE, build, code, modules
+from fourbar_validation.report.machine import CODE, build, hash_modules, name_code
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import pool
 from fourbar_validation.run.run import Collected, RunOptions, run
-from fourbar_validation.run.selection import chosen
+from fourbar_validation.run.selection import choose_witnesses
 from fourbar_validation.run.store import RunningError, Store
 from fourbar_validation.scenes.random import DrawnType
-from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, scene_files
+from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, read_scene_files
 from tests.support.here import judge_here
 from tests.support.unlucky import Few, Unlucky, dies_at_first
 
@@ -46,7 +46,7 @@ SMALL = f"import fourbar_validation.run.run as run; run.CHUNK = {{False: {IN_A_C
 HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
 PROGRAM = ("-m", "validation") if FULL else ("-c", SMALL + HARNESS)
 TYPES = tuple(DrawnType)
-EXACT = chosen("free-body")
+EXACT = choose_witnesses("free-body")
 
 
 def judge_all(
@@ -62,7 +62,7 @@ def judge_all(
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
     hangs = 2.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))  # s; a busy machine is given longer
-    moody = added.named(["tests.support.unlucky:Moody"], ())
+    moody = added.read_witnesses(["tests.support.unlucky:Moody"], ())
     judge_all(Few(), tmp_path / "run", (*EXACT, *moody), seconds=hangs)
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
     failing = {(row.scene, row.engine): row.reason for row in rows if row.verdict == FAILS}
@@ -113,7 +113,7 @@ def test_workers_that_die_with_nothing_to_do_are_on_nobodys_account(
     for life in range(lives):
         (tmp_path / "lives" / str(life)).touch()
     monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
-    monkeypatch.setattr(workers, "ready", dies_at_first)
+    monkeypatch.setattr(workers, "prepare_worker", dies_at_first)
     monkeypatch.setattr(workers, "POOLS", pools)
     if lives > pools:
         with pytest.raises(workers.NoWorkersError, match="what is finished is kept"):
@@ -149,7 +149,7 @@ def test_two_runs_into_one_folder_refuse_each_other(tmp_path: Path) -> None:
 
 
 def test_another_suite_or_code_does_not_resume_the_parts_of_this_one(tmp_path: Path) -> None:
-    one = {"scenes": "one", **code()}
+    one = {"scenes": "one", **name_code()}
     for identity, kept, note in (
         (one, 0, []),
         (one, 1, []),
@@ -172,7 +172,7 @@ def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
     ):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-        hashes.append(modules(tmp_path / "fourbar", tmp_path / "harness"))
+        hashes.append(hash_modules(tmp_path / "fourbar", tmp_path / "harness"))
     assert len(set(hashes)) == 3 and hashes[2] == hashes[3] == hashes[4]
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
     read = project["tool"]["setuptools"]["package-data"]["fourbar"]  # what is only shown decides no number
@@ -322,14 +322,14 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(motion: s
     path = tmp_path / "long.toml"
     path.write_text(f"{lengths}{masses}[motion]\n{motion % (MOST_POSITIONS - 1)}\n")
     a_second = AS_LONG_AS if key == "motion.free" else 0
-    assert scene_files([path]).positions == MOST_POSITIONS + a_second
+    assert read_scene_files([path]).positions == MOST_POSITIONS + a_second
     path.write_text(f"{lengths}{masses}[motion]\n{motion % MOST_POSITIONS}\n")
     with pytest.raises(InputError, match=rf"{key}.steps = {MOST_POSITIONS}: must be below {MOST_POSITIONS} in a run"):
-        scene_files([path])
+        read_scene_files([path])
 
 
 def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging() -> None:
-    assert pool.longest(Files((), 50_000)) > 20 * pool.longest(Random(1, 0, TYPES))
+    assert pool.find_longest(Files((), 50_000)) > 20 * pool.find_longest(Random(1, 0, TYPES))
 
 
 class Blunders:
@@ -360,7 +360,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr(pool, "judge_job", noting)
     monkeypatch.setattr("fourbar_validation.report.summary.PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "PICTURED", 3)
-    monkeypatch.setattr(fourbar_validation.run.run, "html", lambda *_, **__: "")
+    monkeypatch.setattr(fourbar_validation.run.run, "write_html", lambda *_, **__: "")
     blunders = Witness("blunders", Blunders, EQUIVALENCE)
     *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), RunOptions(drawn=False))
     assert not drawn and not any(record.figure for record in without.shown)  # type: ignore[union-attr]

@@ -23,7 +23,7 @@ JUDGED_BY = {
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: actions cones effect flywheel friction gravity load "
     "numbers pin_friction pins torsion viscous",
-    "fourbar/edit/test_session.py": "fourbar/edit: answer document dragging exports",
+    "fourbar/edit/test_session.py": "fourbar/edit: reply document dragging exports",
     "fourbar/edit/test_server.py": "fourbar/edit: witness",
     "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
@@ -50,8 +50,9 @@ JUDGED_BY = {
     "validation/engines/mujoco/test_picture.py": "fourbar/mjcf: appearance",
     # a comparison is tested by witnesses with given answers
     "validation/run/test_judge.py": "validation/compare: answer compare effects rows; "
-    "validation/run: answers command formulas pictures question run",
-    "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limits transmission",
+    "validation/run: answers command identities pictures question run",
+    "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limit_positions "
+    "transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
     "validation/engines/test_engines.py": "validation/engines: balls description drake exudyn exudyn_elements limits "
     "loaded loop opensim pinocchio prediction tree witnesses; validation/scenes: random; "
@@ -62,35 +63,37 @@ JUDGED_BY = {
     "validation/compare: nearby; validation/engines: exact; validation/engines/mujoco: shipped; "
     "validation/report: hard_page",
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives led monitor motions runner",
-    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls changes equilibria files variants",
+    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls sensitivities equilibria files "
+    "variants",
     "validation/run/test_released.py": "validation/engines: pinocchio_forward; validation/engines/mujoco: released",
     "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
     "validation/run: printed",
-    "validation/check/test_model.py": "validation/check: causes differences screen; "
+    "validation/check/test_mjcf.py": "validation/check: causes differences screen; "
     "validation/engines: memory; validation/engines/mujoco: attached corrections describe guess theirs topology",
-    "validation/published/test_published.py": "validation/published: check figures program textbook "
+    "validation/published/test_published.py": "validation/published: comparison figures program textbook "
     "thesis_dynamics thesis_positions thirteen; validation/lab: ladder",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "
     "history_page record render scenes steps times; validation/report: junit; validation/run: elsewhere",
     "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
     "templating",
     # studies: each through its command
-    "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c limits timed",
+    "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c "
+    "speed_limits timed",
     "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families "
     "libraries slopes tally",
     "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
     "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: code_mutants harness",
-    "validation/lab/stress/mutation/test_planted.py": "validation/lab/stress/mutation: planting specimens",
-    "validation/lab/cost/test_cost.py": "validation/lab/cost: curves formulas laws orders pictures study; "
-    "validation/advise: errors; validation/engines/mujoco: one_state",
+    "validation/lab/stress/mutation/test_faults.py": "validation/lab/stress/mutation: fault_scenes injection",
+    "validation/lab/cost/test_cost.py": "validation/lab/cost: series formulas laws orders pictures study; "
+    "validation/advise: worst_errors; validation/engines/mujoco: one_state",
     "validation/advise/test_advise.py": "validation/advise: matters; validation/lab/cost: exhaustive measure; "
-    "validation/run: dial; validation/engines/mujoco: trial",
+    "validation/run: required_error; validation/engines/mujoco: trial",
     "validation/lab/effects/test_cost.py": "validation/lab/effects: table work; validation/engines/mujoco: stepping",
     # simulators that need not be there: their scripts run where they are installed
-    "validation/lab/subjects/test_subjects.py": "validation/lab/subjects: drake_sap examine exudyn_simulated "
+    "validation/lab/simulators/test_simulators.py": "validation/lab/simulators: drake_sap examine exudyn_simulated "
     "genesis_rigid gradients motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco "
     "pinocchio_simulated pybullet standing work",
-    "validation/lab/subjects/test_versions.py": "validation/lab/subjects: releases versions_page",
+    "validation/lab/simulators/test_versions.py": "validation/lab/simulators: releases versions_page",
 }
 """Modules without a test of their name, folder by folder, and the test that says when one of them is wrong."""
 

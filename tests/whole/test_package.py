@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from fourbar.cli import status
-from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, DependencyError, installing
+from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, DependencyError, say_install
 from fourbar.files import save
 from fourbar_validation.cli import status as harness
 from fourbar_validation.places import import_path
@@ -90,7 +90,7 @@ def test_extras_of_extras_are_named_one_by_one(monkeypatch: pytest.MonkeyPatch) 
     """No index of packages has `fourbar[plot]`."""
     monkeypatch.setattr("fourbar.errors.__file__", "/nowhere/fourbar/errors.py")
     for extra in ("validation", "all"):
-        line = installing(extra)
+        line = say_install(extra)
         assert "fourbar" not in line and all(name in line for name in ("mujoco>=", "pin>=", "python-flint>="))
 
 

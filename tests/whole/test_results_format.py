@@ -19,12 +19,12 @@ from fourbar_validation.engines.hard_suite import HARD_WITNESSES
 from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, WORK
 from fourbar_validation.regression.change import WHOLE
-from fourbar_validation.regression.record import ACCEPTED, baseline
-from fourbar_validation.run.answers import statements
+from fourbar_validation.regression.record import ACCEPTED, find_baseline
+from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.judge import CHECKS
 from fourbar_validation.run.released import ENGINES, FULL
 from fourbar_validation.run.run import RunOptions, run
-from fourbar_validation.run.selection import chosen
+from fourbar_validation.run.selection import choose_witnesses
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
@@ -37,7 +37,7 @@ NOT_QUANTITIES = (
 )
 OF_A_SCENE = ("assembled", "undecided", "torque_inertia", "drive_force_inertia")
 """Of every engine, besides what it says of positions and of the linkage."""
-SHIPPED_RUN = baseline(ACCEPTED)
+SHIPPED_RUN = find_baseline(ACCEPTED)
 TYPES = {"string": str, "double": float, "boolean": bool}
 
 
@@ -56,7 +56,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
             run(
                 Random(8, 1, tuple(DrawnType)),
                 folder / "results",
-                chosen("free-body"),
+                choose_witnesses("free-body"),
                 RunOptions(workers=1, drawn=False),
             )
         )
@@ -88,7 +88,7 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
     described = re.findall(r"^\| `([\w ]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
     linkage = uniform(2.0, 1.0, 2.0, 1.0)  # with change points
     scene, engine = Scene(linkage, Motion(Sweep(0.3, 1.0, 3), 1.0)), FreeBody()
-    stated = {row.quantity for row in statements("", scene, engine, engine.answer(scene, command(scene)))}
+    stated = {row.quantity for row in check_statements("", scene, engine, engine.answer(scene, command(scene)))}
     of_positions = {q.name for q in QUANTITIES}
     assert set(described) == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE}) - of_positions
     seen = {row.quantity for file in (results / "results", SHIPPED_RUN) for row in read_columns(file / "results.csv")}

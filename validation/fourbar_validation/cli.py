@@ -14,7 +14,7 @@ COMMANDS = {
     "compare": "fourbar_validation.regression.accept:compare",
     "history": "fourbar_validation.regression.accept:history",
     "check": "fourbar_validation.check:check",
-    "check-mjcf": "fourbar_validation.check.model:command",
+    "check-mjcf": "fourbar_validation.check.mjcf:command",
     "published": "fourbar_validation.lab.ladder:published",
     "cost": "fourbar_validation.lab.cost.cost:cost",
     "cost --effects": "fourbar_validation.lab.effects.cost:command",
@@ -25,13 +25,13 @@ COMMANDS = {
     "bench": "fourbar_validation.lab.stress.bench:bench",
     "fuzz": "fourbar_validation.lab.stress.fuzz.fuzz:fuzz",
     "fuzz --files": "fourbar_validation.lab.stress.mutants:fuzz_files",
-    "faults": "fourbar_validation.lab.stress.mutation.planted:command",
+    "faults": "fourbar_validation.lab.stress.mutation.faults:command",
     "faults --mutants": "fourbar_validation.lab.stress.mutation.harness:command",
-    "standing": "fourbar_validation.lab.subjects.standing:command",
-    "standing --findings": "fourbar_validation.lab.subjects.findings:command",
-    "standing --versions": "fourbar_validation.lab.subjects.versions:command",
+    "standing": "fourbar_validation.lab.simulators.standing:command",
+    "standing --findings": "fourbar_validation.lab.simulators.findings:command",
+    "standing --versions": "fourbar_validation.lab.simulators.versions:command",
     "write": "fourbar_validation.lab.models:models",
-    "write --problems": "fourbar_validation.lab.subjects.problems:command",
+    "write --problems": "fourbar_validation.lab.simulators.problems:command",
 }
 """By name, some with the option that makes another command of it, with options of its own."""
 RENAMED = {
@@ -60,7 +60,7 @@ class LazyGroup(click.Group):
         try:
             command: click.Command = resolve_name(COMMANDS[cmd_name])
         except ModuleNotFoundError as error:
-            return _unavailable(cmd_name, error)
+            return _stand_in(cmd_name, error)
         others = [f"`{name} --help`" for name in COMMANDS if name.startswith(f"{cmd_name} ")]
         command.epilog = f"See also {', '.join(others)}." if others else None
         return command
@@ -79,7 +79,7 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
 
-def _unavailable(name: str, missing: ModuleNotFoundError) -> click.Command:
+def _stand_in(name: str, missing: ModuleNotFoundError) -> click.Command:
     """Stand in for a command whose library is not installed: it is listed, and says so where it is called."""
 
     @click.command(name, help=f"Not available: {missing.name} is not installed.")

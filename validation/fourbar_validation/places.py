@@ -19,7 +19,7 @@ PROGRAM = "fourbar-validation" if CHECKOUT is None else "python -m validation"
 """How the harness is called here."""
 
 
-def checkout(what: str) -> Path:
+def find_checkout(what: str) -> Path:
     """Return the checkout; FourBarError, which says what needs one, where there is none."""
     if CHECKOUT is None:
         raise FourBarError(f"{what} needs a checkout of the repository; this is the installed package")

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.evaluation.case import Case, state_at
+from fourbar.evaluation.case import Case, compute_state
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import PIN_FORCES
-from fourbar.show.duty import driving, energies
+from fourbar.show.duty import compute_energies, read_drive
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,
@@ -22,16 +22,16 @@ from fourbar.show.plot.style import (
     FORCE_DASHES,
     INK,
     MUTED,
-    degree_ticks,
-    force_line,
-    largest,
-    legend_above,
-    length_unit,
-    number,
-    quantity,
-    unit_for,
+    choose_force_line,
+    choose_length_unit,
+    choose_unit,
+    find_greatest,
+    place_legend,
+    set_degree_ticks,
+    write_number,
+    write_quantity,
 )
-from fourbar.show.plot.view import View, point_vectors
+from fourbar.show.plot.view import View, collect_point_vectors
 from fourbar.solution import Array, Solution
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
 POLE_REASON = {2: "bars 3 and 4 collinear", 3: "ω₃ = 0", 4: "ω₄ = 0"}
 
 
-def bases(axes: "Axes", view: View) -> Array:
+def draw_axes(axes: "Axes", view: View) -> Array:
     """Draw the axis of the command or of time, positions that do not assemble shaded, the position drawn marked.
 
     Returns what the curves are drawn over.
@@ -62,7 +62,7 @@ def bases(axes: "Axes", view: View) -> Array:
         low, high = low - 1.0, high + 1.0
     axes.set_xlim(low, high)
     if axis.unit == "°":
-        degree_ticks(axes.xaxis, high - low)
+        set_degree_ticks(axes.xaxis, high - low)
     closed = np.flatnonzero(np.diff(np.concatenate([[False], ~view.sweep.assembled, [False]]).astype(int)))
     for first, after in closed.reshape(-1, 2):
         start = low if first == 0 else 0.5 * (over[first - 1] + over[first])
@@ -82,13 +82,13 @@ def note(view: View, text: str) -> None:
         view.notes.append(text)
 
 
-def poles(view: View) -> Indices:
+def find_poles(view: View) -> Indices:
     """Find indices i such that the determinant of the drive changes sign between positions i and i + 1."""
     s = view.sweep
     if view.scene.motion.free is not None:  # no drive, no pole
         return np.array([], dtype=np.intp)
     if view.scene.drive is not None:
-        case, state = Case.of(view.scene, s.at.bar), state_at(view.scene, s.at)
+        case, state = Case.of(view.scene, s.at.bar), compute_state(view.scene, s.at)
         with np.errstate(all="ignore"):
             sine = view.scene.drive.leverage(state, case.sines(state.at))[0]
         return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
@@ -97,14 +97,14 @@ def poles(view: View) -> Indices:
     return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
 
 
-def broken(values: Array, where: Indices) -> Array:
+def break_at_poles(values: Array, where: Indices) -> Array:
     """Copy a curve's values with NaN at the positions next to a pole, so that no line crosses it."""
     out = np.array(values, dtype=float)
     out[~np.isfinite(out)] = np.nan
     return np.insert(out, where + 1, np.nan)
 
 
-def limit_of(values: list[Array]) -> float | None:
+def choose_limit(values: list[Array]) -> float | None:
     """Choose the end of a clipped axis, or None where no value stands far outside the rest."""
     size = np.concatenate([np.abs(value[np.isfinite(value)]) for value in values])
     if size.size == 0:
@@ -117,45 +117,45 @@ def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None
     """End the axis short of what diverges, and say so; `unit` is that of SI."""
     if limit is None:
         return
-    factor, name_of_unit = unit_for(limit, unit, view.units)
+    factor, name_of_unit = choose_unit(limit, unit, view.units)
     lowest = min(float(np.nanmin(value)) for value in curves.values())
     axes.set_ylim(0.0 if lowest >= 0.0 else -limit * factor, limit * factor)
-    name, worst = max(curves.items(), key=lambda item: largest(item[1]))
+    name, worst = max(curves.items(), key=lambda item: find_greatest(item[1]))
     index = int(np.nanargmax(np.where(np.isfinite(worst), np.abs(worst), np.nan)))
     if abs(worst[index]) <= limit:
         return
     where = view.axis.words(view.sweep.at.places[index], 5) if view.time is None else f"t = {view.time[index]:.4g} s"
     note(
         view,
-        f"{what} clipped at {number(limit * factor)} {name_of_unit}; the largest evaluated, {name} = "
-        f"{quantity(worst[index], unit, view.units)}, is at {where}.",
+        f"{what} clipped at {write_number(limit * factor)} {name_of_unit}; the largest evaluated, {name} = "
+        f"{write_quantity(worst[index], unit, view.units)}, is at {where}.",
     )
 
 
 def draw_angles(axes: "Axes", view: View) -> None:
     """Those of the bars that are not the axis."""
-    over = bases(axes, view)
+    over = draw_axes(axes, view)
     bars = [bar for bar in MOVING_BARS if view.time is not None or f"theta_{bar}" != view.sweep.commanded]
     for bar in bars:
         values = np.degrees(getattr(view.sweep, f"theta_{bar}"))
         axes.plot(over, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\theta_{bar}$")
     shown = np.concatenate([np.degrees(getattr(other.sweep, f"theta_{bar}")) for other in view.alike for bar in bars])
-    degree_ticks(axes.yaxis, 1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9)
+    set_degree_ticks(axes.yaxis, 1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9)
     if len(bars) > 2:
         axes.set(ylabel=r"$\theta$ (°)", title="Angles of the bars")
     else:
         ylabel = ",\\ ".join(rf"\theta_{bar}" for bar in bars)
         axes.set(ylabel=f"${ylabel}$ (°)", title=f"Angles of {' and '.join(BAR_NAMES[bar] for bar in bars)}")
-    legend_above(axes)
+    place_legend(axes)
 
 
-def _rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: str) -> None:
+def _draw_rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: str) -> None:
     """Of the commanded bar (where it is not zero) and the other two."""
-    over, driven = bases(axes, view), view.sweep.at.bar
+    over, driven = draw_axes(axes, view), view.sweep.at.bar
     name = {"omega": "ω", "alpha": "α"}[letter]
     digits, others = {2: "₂", 3: "₃", 4: "₄"}, [bar for bar in MOVING_BARS if bar != driven]
     curves = {name + digits[bar]: getattr(view.sweep, f"{letter}_{bar}") for bar in others}
-    factor, shown_unit = unit_for(0.0, unit, view.units)
+    factor, shown_unit = choose_unit(0.0, unit, view.units)
     command = getattr(view.sweep, f"{letter}_{driven}")
     if np.any(command):
         axes.plot(over, factor * command, color=BAR_COLOURS[driven], lw=1.0, label=rf"$\{letter}_{driven}$")
@@ -163,23 +163,27 @@ def _rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: s
         axes.plot(over, factor * values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=rf"$\{letter}$ ({shown_unit})", title=title)
-    limit = limit_of([getattr(other.sweep, f"{letter}_{bar}") for other in view.alike for bar in others])
+    limit = choose_limit([getattr(other.sweep, f"{letter}_{bar}") for other in view.alike for bar in others])
     clip(axes, view, curves, limit, what, unit)
-    legend_above(axes)
+    place_legend(axes)
 
 
-draw_velocities = partial(_rates, letter="omega", unit="rad/s", title="Angular velocities", what="Angular velocity")
+draw_velocities = partial(
+    _draw_rates, letter="omega", unit="rad/s", title="Angular velocities", what="Angular velocity"
+)
 draw_accelerations = partial(
-    _rates, letter="alpha", unit="rad/s^2", title="Angular accelerations", what="Angular acceleration"
+    _draw_rates, letter="alpha", unit="rad/s^2", title="Angular accelerations", what="Angular acceleration"
 )
 
 
-def _of_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -> None:
+def _draw_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -> None:
     """Sizes at A, B, the mass centres and the scene's own points."""
-    over = bases(axes, view)
-    curves = {name: np.hypot(*vector.T) for name, vector in point_vectors(view.scene, view.sweep, letter).items()}
-    limit = limit_of(list(curves.values()))
-    factor, shown_unit = unit_for(limit or largest(*curves.values()), unit, view.units)
+    over = draw_axes(axes, view)
+    curves = {
+        name: np.hypot(*vector.T) for name, vector in collect_point_vectors(view.scene, view.sweep, letter).items()
+    }
+    limit = choose_limit(list(curves.values()))
+    factor, shown_unit = choose_unit(limit or find_greatest(*curves.values()), unit, view.units)
     looks = {"A": BAR_COLOURS[2], "B": BAR_COLOURS[4], **{f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS}}
     for (name, values), dashes in zip(curves.items(), cycle(("-", "--", "-.", ":")), strict=False):
         colour, width = looks.get(name, FORCE_COLOURS["F43"]), 2.0 if name in view.sweep.points else 1.2
@@ -187,21 +191,21 @@ def _of_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -> 
     axes.set_ylim(bottom=0.0)
     axes.set(ylabel=f"$|{letter}|$ ({shown_unit})", title=title)
     clip(axes, view, curves, limit, title, unit)
-    legend_above(axes, 6)
+    place_legend(axes, 6)
 
 
-draw_speeds = partial(_of_points, letter="v", unit="m/s", title="Speeds of points")
-draw_point_accelerations = partial(_of_points, letter="a", unit="m/s^2", title="Accelerations of points")
+draw_speeds = partial(_draw_points, letter="v", unit="m/s", title="Speeds of points")
+draw_point_accelerations = partial(_draw_points, letter="a", unit="m/s^2", title="Accelerations of points")
 
 
-def _of_drive(axes: "Axes", view: View, of: Callable[[Solution], Array], letter: str, unit: str, title: str) -> None:
+def _draw_drive(axes: "Axes", view: View, of: Callable[[Solution], Array], letter: str, unit: str, title: str) -> None:
     """Draw a quantity of the drive, with its poles."""
-    over, bar, where = bases(axes, view), view.scene.drive_bar, poles(view)
+    over, bar, where = draw_axes(axes, view), view.scene.drive_bar, find_poles(view)
     values, everywhere = of(view.sweep), [of(other.sweep) for other in view.alike]
-    limit = limit_of(everywhere)
-    factor, shown_unit = unit_for(limit or largest(*everywhere), unit, view.units)
+    limit = choose_limit(everywhere)
+    factor, shown_unit = choose_unit(limit or find_greatest(*everywhere), unit, view.units)
     symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
-    axes.plot(broken(over, where), factor * broken(values, where), color=INK, label=symbol)
+    axes.plot(break_at_poles(over, where), factor * break_at_poles(values, where), color=INK, label=symbol)
     for index in where:
         axes.axvline(0.5 * float(over[index] + over[index + 1]), color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
     if where.size:
@@ -214,59 +218,59 @@ def _of_drive(axes: "Axes", view: View, of: Callable[[Solution], Array], letter:
 
 def draw_drive(axes: "Axes", view: View) -> None:
     """Draw the torque or force of the drive."""
-    drive, bar = driving(view.sweep), view.scene.drive_bar
+    drive, bar = read_drive(view.sweep), view.scene.drive_bar
     title = f"Torque of the drive on bar {bar}" if bar else "Force of the drive"
-    _of_drive(axes, view, attrgetter(drive.keys.value), drive.symbol[0], drive.unit, title)
+    _draw_drive(axes, view, attrgetter(drive.keys.value), drive.symbol[0], drive.unit, title)
 
 
 def draw_power(axes: "Axes", view: View) -> None:
     """Draw the power of the drive."""
     bar = view.scene.drive_bar
-    _of_drive(
+    _draw_drive(
         axes, view, attrgetter("power"), "P", "W", f"Power of the drive on bar {bar}" if bar else "Power of the drive"
     )
 
 
 def draw_stroke(axes: "Axes", view: View) -> None:
     """Draw the stroke of a linear drive."""
-    over = bases(axes, view)
-    factor, unit = length_unit(max(view.scene.linkage.lengths), view.units)
+    over = draw_axes(axes, view)
+    factor, unit = choose_length_unit(max(view.scene.linkage.lengths), view.units)
     axes.plot(over, factor * view.sweep.stroke, color=INK)  # type: ignore[operator]
     axes.set(ylabel=f"stroke ({unit})", title="Stroke of the drive")
 
 
-def force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:
+def list_force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:
     """Magnitudes of pin forces, of every branch that shares the scales."""
     return [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in names]
 
 
 def draw_forces(axes: "Axes", view: View) -> None:
     """Magnitudes of the four pin forces."""
-    over = bases(axes, view)
+    over = draw_axes(axes, view)
     sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
-    everywhere = force_sizes(view)
-    limit = limit_of(everywhere)
-    factor, unit = unit_for(limit or largest(*everywhere), "N", view.units)
-    where = poles(view)
+    everywhere = list_force_sizes(view)
+    limit = choose_limit(everywhere)
+    factor, unit = choose_unit(limit or find_greatest(*everywhere), "N", view.units)
+    where = find_poles(view)
     for name, values in sizes.items():
-        axes.plot(broken(over, where), factor * broken(values, where), **force_line(name))
+        axes.plot(break_at_poles(over, where), factor * break_at_poles(values, where), **choose_force_line(name))
     axes.set_ylim(bottom=0.0)
     axes.set(ylabel=f"$|F|$ ({unit})", title="Pin forces")
     clip(axes, view, sizes, limit, "Pin forces", "N")
-    legend_above(axes)
+    place_legend(axes)
 
 
 def draw_energy(axes: "Axes", view: View) -> None:
     """Kinetic energy of a free motion, and the work that made it."""
-    over = bases(axes, view)
-    own = energies(view.scene, view.sweep)
-    shared = [energies(other.scene, other.sweep) for other in view.others] + [own]
-    most = largest(*(values for each in shared for values in (each.kinetic, *each.work.values())))
-    factor, unit = unit_for(most, "J", view.units)
+    over = draw_axes(axes, view)
+    own = compute_energies(view.scene, view.sweep)
+    shared = [compute_energies(other.scene, other.sweep) for other in view.others] + [own]
+    most = find_greatest(*(values for each in shared for values in (each.kinetic, *each.work.values())))
+    factor, unit = choose_unit(most, "J", view.units)
     axes.plot(over, factor * own.kinetic, color=INK, lw=2.2, label="kinetic energy")
     for (name, values), (colour, dashes) in zip(own.work.items(), cycle(WORKS), strict=False):
         axes.plot(over, factor * values, color=colour, ls=dashes, label=name.replace("_", " "))
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=f"energy ({unit})", title="Kinetic energy, and the work done")
-    legend_above(axes, 3)
+    place_legend(axes, 3)
     note(view, "The kinetic energy has grown by the work that loads and effects have done since the release.")

@@ -10,12 +10,21 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.scene import Scene
-from fourbar.show.between import between
+from fourbar.show.between import locate_between
 from fourbar.show.plot import curves, freebody, hodograph, linkage, studies
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.style import CAPTION, FORCE_COLOURS, TITLE, format_of, matplotlib_style, plain, rendered, save
+from fourbar.show.plot.style import (
+    CAPTION,
+    FORCE_COLOURS,
+    TITLE,
+    apply_style,
+    format_of,
+    render_figure,
+    save,
+    shorten_text,
+)
 from fourbar.show.plot.transmission import draw_transmission
-from fourbar.show.plot.view import View, common_position, on_branch, over_time, view, where_in_words
+from fourbar.show.plot.view import View, choose_common_position, is_over_time, make_view, set_branch, where_in_words
 from fourbar.show.tables import static
 from fourbar.solution import SI, Conversion, require_units
 
@@ -27,7 +36,7 @@ BRANCHES = ("one", "both")
 Painter = Callable[["SubFigure", View, Labels], None]
 
 
-def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
+def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     if not shown.moves:
         panels = figure.subplot_mosaic([["linkage", "angles"], ["linkage", "mu"]], width_ratios=[1.15, 1.0])
         linkage.draw_linkage(panels["linkage"], shown, labels)
@@ -55,7 +64,7 @@ def _overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
     draw_transmission(panels["mu"], shown)
 
 
-def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
+def _draw_kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
     del labels
     panels = figure.subplots(3 if shown.moves else 1, 1, squeeze=False)[:, 0]
     painters: tuple[Any, ...] = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
@@ -63,7 +72,7 @@ def _kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
         paint(axes, shown)
 
 
-def _points(figure: "SubFigure", shown: View, labels: Labels) -> None:
+def _draw_points(figure: "SubFigure", shown: View, labels: Labels) -> None:
     """Paths, speeds and accelerations of points."""
     panels = figure.subplot_mosaic([["linkage", "speeds"], ["linkage", "accelerations"]], width_ratios=[1.15, 1.0])
     linkage.draw_linkage(panels["linkage"], shown, labels, moving=True)
@@ -71,18 +80,18 @@ def _points(figure: "SubFigure", shown: View, labels: Labels) -> None:
     curves.draw_point_accelerations(panels["accelerations"], shown)
 
 
-def _single(paint: Callable[[Any, View], None]) -> Painter:
+def _draw_single(paint: Callable[[Any, View], None]) -> Painter:
     return lambda figure, shown, labels: paint(figure.subplots(), shown)
 
 
-def _hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
+def _draw_hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
     del labels
     panels = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
     for axes, name in zip(panels, FORCE_COLOURS, strict=True):
         hodograph.draw_hodograph(axes, shown, (name,))
 
 
-def _free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
+def _draw_free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
     here = shown.here
     if not np.isfinite(here.F12).all():  # type: ignore[arg-type]
         where = where_in_words(here)
@@ -91,30 +100,30 @@ def _free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 
 FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
-    "overview": (_overview, (11.7, 8.3), False),
+    "overview": (_draw_overview, (11.7, 8.3), False),
     "linkage": (lambda figure, *of: linkage.draw_linkage(figure.subplots(), *of), (5.6, 5.2), False),
     "coupler": (lambda figure, *of: linkage.draw_coupler_curves(figure.subplots(), *of), (5.6, 5.4), False),
-    "kinematics": (_kinematics, (5.6, 6.8), False),
-    "points": (_points, (11.0, 5.6), True),
-    "torque": (_single(curves.draw_drive), (5.6, 3.2), True),
-    "stroke": (_single(curves.draw_stroke), (5.6, 3.2), False),
-    "forces": (_single(curves.draw_forces), (5.6, 3.2), True),
-    "hodograph": (_hodographs, (6.4, 6.6), True),
-    "energy": (_single(curves.draw_energy), (5.6, 3.2), True),
-    "transmission": (_single(draw_transmission), (5.6, 3.2), False),
-    "freebody": (_free_bodies, (9.6, 4.6), True),
+    "kinematics": (_draw_kinematics, (5.6, 6.8), False),
+    "points": (_draw_points, (11.0, 5.6), True),
+    "torque": (_draw_single(curves.draw_drive), (5.6, 3.2), True),
+    "stroke": (_draw_single(curves.draw_stroke), (5.6, 3.2), False),
+    "forces": (_draw_single(curves.draw_forces), (5.6, 3.2), True),
+    "hodograph": (_draw_hodographs, (6.4, 6.6), True),
+    "energy": (_draw_single(curves.draw_energy), (5.6, 3.2), True),
+    "transmission": (_draw_single(draw_transmission), (5.6, 3.2), False),
+    "freebody": (_draw_free_bodies, (9.6, 4.6), True),
     "sensitivity": (studies.draw_influences, (9.6, 3.6), True),
 }
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
 
 
-def _painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
+def _choose_painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
     """Choose the painter and the size of a figure, where the scene has what it shows."""
     for key, value, allowed in (("figure", figure, tuple(FIGURES)), ("branches", branches, BRANCHES)):
         if not isinstance(value, str) or value not in allowed:
             raise InputError(key, value, "must be one of " + ", ".join(allowed))
     painter, size, dynamic = FIGURES[figure]
-    if dynamic and scene.motion.speed is None and not over_time(scene):
+    if dynamic and scene.motion.speed is None and not is_over_time(scene):
         raise InputError(
             f"motion.{scene.motion.names[1]}", None, f"is needed for the figure {figure!r}; {static(scene)}"
         )
@@ -134,17 +143,17 @@ class Drawing:
         self.figure = figure
 
     def _repr_svg_(self) -> str:
-        with matplotlib_style():
-            return rendered(self.figure, "svg").decode("utf-8")
+        with apply_style():
+            return render_figure(self.figure, "svg").decode("utf-8")
 
     def save(self, path: str | Path, file_format: str | None = None) -> None:
         """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
-        with matplotlib_style():
+        with apply_style():
             kind = format_of(path, file_format)
             save(self.figure, Path(path), kind)
 
 
-def drawn(
+def draw_figure(
     scene: Scene,
     figure: str = "overview",
     *,
@@ -154,24 +163,24 @@ def drawn(
     dimensions: bool = False,
 ) -> Drawing:
     """Draw a figure of a scene for a notebook: `Scene.plot`, which says the parameters."""
-    painter, size = _painter(scene, figure, branches)
+    painter, size = _choose_painter(scene, figure, branches)
     require_units(units)
     position = None if position is None else require("position", position)
-    with matplotlib_style():
-        scenes = [on_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
+    with apply_style():
+        scenes = [set_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
         if position is None and len(scenes) > 1:
-            position = common_position(scenes)
-        views = [view(each, position) for each in scenes]
+            position = choose_common_position(scenes)
+        views = [make_view(each, position) for each in scenes]
         for shown in views:
             shown.units, shown.dimensions = units, dimensions
             shown.others = [other for other in views if other is not shown]
             _look_between(shown)
-        return Drawing(_composed(painter, size, views))
+        return Drawing(_compose(painter, size, views))
 
 
 def _look_between(shown: View) -> None:
     """Add what stands between the positions of the sweep: jumps are drawn where they are, peaks to their height."""
-    if (found := between(shown.scene, shown.sweep)) is None:
+    if (found := locate_between(shown.scene, shown.sweep)) is None:
         return
     shown.sweep = found.solution
     if found.reversals:
@@ -191,15 +200,15 @@ def draw(
     ----------
     path : the file; its ending says which of svg, png and pdf is meant.
     file_format : svg, png or pdf where the path's ending does not say it.
-    figure, options : those of `drawn`.
+    figure, options : those of `draw_figure`.
 
-    Raises as `drawn` does, and InputError for another format.
+    Raises as `draw_figure` does, and InputError for another format.
     """
     format_of(path, file_format)
-    drawn(scene, figure, **options).save(path, file_format)
+    draw_figure(scene, figure, **options).save(path, file_format)
 
 
-def _composed(painter: Painter, size: tuple[float, float], views: list[View]) -> "Figure":
+def _compose(painter: Painter, size: tuple[float, float], views: list[View]) -> "Figure":
     """Compose the figure itself, laid out and labelled."""
     from matplotlib.figure import Figure
 
@@ -210,16 +219,16 @@ def _composed(painter: Painter, size: tuple[float, float], views: list[View]) ->
     labels = Labels()
     for part, shown in zip(parts, views, strict=True):
         painter(part, shown, labels)
-        heading = plain(shown.scene.title, 90) or "Four-bar linkage"
+        heading = shorten_text(shown.scene.title, 90) or "Four-bar linkage"
         part.suptitle(f"{heading} ({shown.branch_name} branch)" if len(views) > 1 else heading, **TITLE)
         if caption := textwrap.fill(" ".join(shown.notes), int(size[0] * 18.5)):
             part.supxlabel(caption, linespacing=1.35, **CAPTION)
-    _to_one_scale([part.axes for part in parts])
+    _share_limits([part.axes for part in parts])
     labels.settle(figure)
     return figure
 
 
-def _to_one_scale(columns: "list[list[Axes]]") -> None:
+def _share_limits(columns: "list[list[Axes]]") -> None:
     """Give the same panel of every branch the same limits; polar panels and free bodies share theirs already."""
     for panels in zip(*columns, strict=True):
         if len(panels) == 1 or panels[0].name == "polar" or not panels[0].axison:

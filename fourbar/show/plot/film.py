@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, installing
+from fourbar.errors import DependencyError, InputError, say_install
 from fourbar.scene import Scene
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage import draw_paths, path_legend
+from fourbar.show.plot.linkage import draw_paths, write_path_legend
 from fourbar.show.plot.mechanism import draw_mechanism, scale_of
-from fourbar.show.plot.style import TITLE, matplotlib_style, plain
-from fourbar.show.plot.view import View, view
-from fourbar.show.progress import counted
+from fourbar.show.plot.style import TITLE, apply_style, shorten_text
+from fourbar.show.plot.view import View, make_view
+from fourbar.show.progress import count_items
 from fourbar.solution import SI, Conversion
 from fourbar.writing import write_bytes
 
@@ -38,7 +38,7 @@ SHORTEST = 1.0
 """A motion through time shorter than this, s, is slowed down to be seen."""
 
 
-def _ffmpeg() -> str:
+def _find_ffmpeg() -> str:
     """Find the program: the machine's own, else the one that imageio-ffmpeg brings."""
     if (own := shutil.which("ffmpeg")) is not None:
         return own
@@ -47,7 +47,7 @@ def _ffmpeg() -> str:
 
         return str(get_ffmpeg_exe())
     except (ImportError, RuntimeError):
-        wanted = f"the program ffmpeg (or {installing('film')})"
+        wanted = f"the program ffmpeg (or {say_install('film')})"
         raise DependencyError(f"an .mp4 film needs {wanted}; .gif and .html do not") from None
 
 
@@ -67,21 +67,21 @@ def write_film(
     """
     if seconds is not None and not (math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= MAX_FRAMES):
         raise InputError("seconds", seconds, f"must be more than 0 and at most {MAX_FRAMES // FRAMES_PER_SECOND}")
-    with matplotlib_style():
+    with apply_style():
         import matplotlib as mpl
         from matplotlib.animation import FFMpegWriter, PillowWriter
 
         if kind == "mp4":
-            mpl.rcParams["animation.ffmpeg_path"] = _ffmpeg()
-        shown = view(scene)
+            mpl.rcParams["animation.ffmpeg_path"] = _find_ffmpeg()
+        shown = make_view(scene)
         shown.units = units
         if seconds is None:
             seconds = SWEEP_SECONDS
             if shown.time is not None:
                 duration = float(shown.time[-1] - shown.time[0])
                 seconds = min(max(duration, SHORTEST), MAX_FRAMES / FRAMES_PER_SECOND)
-        figure, move = _stage(shown, moving)
-        order = frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
+        figure, move = _make_stage(shown, moving)
+        order = choose_frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
         writer: Any = PillowWriter(fps=FRAMES_PER_SECOND)
         if kind == "mp4":
             # yuv420p needs even pixel numbers and is what browsers and slides play
@@ -90,7 +90,7 @@ def write_film(
             draft = Path(folder) / f"film.{kind}"
             try:
                 with writer.saving(figure, str(draft), DPI):
-                    for index in counted(order, f"{len(order)} frames"):
+                    for index in count_items(order, f"{len(order)} frames"):
                         move(index)
                         writer.grab_frame()
             except (subprocess.CalledProcessError, BrokenPipeError):
@@ -98,7 +98,7 @@ def write_film(
             write_bytes(path, draft.read_bytes())
 
 
-def frames(shown: View, count: int) -> list[int]:
+def choose_frames(shown: View, count: int) -> list[int]:
     """Choose the positions shown one after the other, by index: the segment that assembles around the one drawn."""
     closes, at = shown.sweep.assembled, shown.sweep.at
     here = int(np.argmin(np.abs(at.places - shown.here.at.places[0])))
@@ -112,7 +112,7 @@ def frames(shown: View, count: int) -> list[int]:
     return there + there[-2:0:-1]
 
 
-def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
+def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     """Make the figure, and the function that moves it to a position of the sweep."""
     from matplotlib.figure import Figure
 
@@ -120,9 +120,9 @@ def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     factor, unit, size = scale_of(shown)
     figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
     axes = figure.subplots()
-    figure.suptitle(plain(shown.scene.title, 70), **TITLE)
+    figure.suptitle(shorten_text(shown.scene.title, 70), **TITLE)
     draw_paths(axes, shown, Labels())
-    move_vectors = symbols.vectors(axes, shown, sweep, factor, size) if moving and shown.moves else None
+    move_vectors = symbols.draw_vectors(axes, shown, sweep, factor, size) if moving and shown.moves else None
     passing: list[Any] = []
 
     def put(index: int) -> Labels:
@@ -141,7 +141,7 @@ def _stage(shown: View, moving: bool) -> tuple["Figure", Any]:
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title="θ")
-    pad = path_legend(axes)
+    pad = write_path_legend(axes)
     figure.draw_without_rendering()
     axes.set_autoscale_on(False)  # nothing jumps from frame to frame
     figure.set_layout_engine(None)

@@ -9,14 +9,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import bodies
+from fourbar.effects.actions import list_bodies
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.mechanism import mass_centre, pin_name, plate
-from fourbar.show.plot.style import BAR_COLOURS, FORCE_COLOURS, HEADED, INK, MUTED, OPEN, force_name, quantity, unit_for
-from fourbar.show.plot.symbols import components, place_of
-from fourbar.show.plot.view import Recorder, View, one
+from fourbar.show.plot.mechanism import draw_mass_centre, draw_plate, pin_name
+from fourbar.show.plot.style import (
+    BAR_COLOURS,
+    FORCE_COLOURS,
+    HEADED,
+    INK,
+    MUTED,
+    OPEN,
+    choose_unit,
+    write_force_name,
+    write_quantity,
+)
+from fourbar.show.plot.symbols import place_of, split_components
+from fourbar.show.plot.view import Recorder, View, take_one
 from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
@@ -51,7 +61,7 @@ class Couple:
     moment: float
 
 
-def free_body(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
+def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
     """Every force and couple on a bar at the position drawn, d'Alembert's included: together they vanish."""
     where, turned = place_of(view.scene.linkage, view.here, 0, 1.0).pins, view.state().direction(bar)
     arrows: list[Arrow] = []
@@ -60,23 +70,23 @@ def free_body(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
         name = PIN_FORCE[pin]
         onto, shown = (1.0, name) if name[2] == str(bar) else (-1.0, f"F{name[2]}{name[1]}")
         force = onto * complex(*getattr(view.here, name)[0])
-        arrows.append(Arrow(force_name(shown), where[pin] - where[FIRST_PIN[bar]], force, FORCE_COLOURS[name]))
+        arrows.append(Arrow(write_force_name(shown), where[pin] - where[FIRST_PIN[bar]], force, FORCE_COLOURS[name]))
     if view.scene.drive_bar == bar and view.scene.motion.free is None:
         couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))  # type: ignore[index]
-    for text, recorder in _actions(view):
+    for text, recorder in _collect_actions(view):
         name = text.replace("#", str(bar))
         arrows += [Arrow(name, arm, force, INK) for b, force, arm in recorder.arrows if b == bar]
         couples += [Couple(name, m) for b, m in recorder.turns if b == bar]
     described = view.scene.linkage.bar(bar)
     inertia = -described.mass * complex(*getattr(view.here, f"a_G{bar}")[0])
-    arrows.append(Arrow(rf"$-m_{bar}\,a_{{G{bar}}}$", one(described.to_centre * turned), inertia, INK, True))
+    arrows.append(Arrow(rf"$-m_{bar}\,a_{{G{bar}}}$", take_one(described.to_centre * turned), inertia, INK, True))
     alpha = float(getattr(view.here, f"alpha_{bar}")[0])
-    carried = bodies(view.scene.linkage, view.scene.effects)[bar - 2]
+    carried = list_bodies(view.scene.linkage, view.scene.effects)[bar - 2]
     couples.append(Couple(rf"$-I_{bar}\,\alpha_{bar}$", -carried.I * alpha))
     return [a for a in arrows if a.force != 0.0], [c for c in couples if c.moment != 0.0]
 
 
-def _actions(view: View) -> Iterator[tuple[str, Recorder]]:
+def _collect_actions(view: View) -> Iterator[tuple[str, Recorder]]:
     """Collect loads and effects, each with what it puts on the bars."""
     state = view.state()
     if view.scene.drive is not None and view.scene.motion.free is None:
@@ -97,7 +107,7 @@ def _actions(view: View) -> Iterator[tuple[str, Recorder]]:
 
 def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     """Draw the three bars, each freed from its pins, with arrows to one scale, over the couples."""
-    freed = [(v, bar, *free_body(v, bar)) for v in view.alike for bar in MOVING_BARS]  # those of this view first
+    freed = [(v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS]  # those of this view first
     panels, below = figure.subplots(2, 3, height_ratios=[PANEL, LINE * max(len(couples) for *_, couples in freed)])
     biggest = max((abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0)
     longest = max(view.scene.linkage.bar(bar).length for bar in MOVING_BARS)
@@ -118,10 +128,10 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
 def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
     """Every point that a bar's panel has to show, from the bar's first pin, m."""
     described, u = view.scene.linkage.bar(bar), view.state().direction(bar)
-    points = [0.0j, one(described.length * u), one(described.to_centre * u)]
+    points = [0.0j, take_one(described.length * u), take_one(described.to_centre * u)]
     for arrow in arrows:
         points += [arrow.at, arrow.at + scale * arrow.force]
-    return np.array([components(point) for point in points])
+    return np.array([split_components(point) for point in points])
 
 
 def _draw_one(
@@ -136,7 +146,7 @@ def _draw_one(
 ) -> None:
     where = place_of(view.scene.linkage, view.here, 0, 1.0).pins
     along = where[ENDS[bar][1]] - where[ENDS[bar][0]]
-    end, middle = components(along), components(0.5 * along)
+    end, middle = split_components(along), split_components(0.5 * along)
     line = ([0.0, end[0]], [0.0, end[1]])
     axes.plot(*line, color=BAR_COLOURS[bar], lw=5.0, alpha=0.45, solid_capstyle="round", zorder=2)
     labels.keep_off(axes, (0.0, 0.0), end, width=5.0)
@@ -147,22 +157,22 @@ def _draw_one(
     for arrow in arrows:
         size = abs(arrow.force)
         if size < SHOWN * biggest:
-            short.append(f"{_words(arrow.text)} = {quantity(size, 'N', view.units)}")
+            short.append(f"{_write_plainly(arrow.text)} = {write_quantity(size, 'N', view.units)}")
             continue
-        plate(axes, bar, (0.0j, arrow.at, along), labels)
-        foot, tip = components(arrow.at), components(arrow.at + scale * arrow.force)
+        draw_plate(axes, bar, (0.0j, arrow.at, along), labels)
+        foot, tip = split_components(arrow.at), split_components(arrow.at + scale * arrow.force)
         look = {**HEADED, "color": arrow.colour, "mutation_scale": 9, "ls": "--" if arrow.dashed else "-"}
         axes.annotate("", xy=tip, xytext=foot, arrowprops=look, zorder=5, annotation_clip=False)
         labels.keep_off(axes, foot, tip)
-        labels.add(Label(axes, f"{arrow.text} = {quantity(size, 'N', view.units)}", tip, foot, arrow.colour, 7.5))
+        labels.add(Label(axes, f"{arrow.text} = {write_quantity(size, 'N', view.units)}", tip, foot, arrow.colour, 7.5))
     if short:
         note(view, f"Too short to draw on bar {bar}: {', '.join(short)}.")
     centre = view.scene.linkage.bar(bar)
     if centre.mass > 0.0:
-        G = one(centre.to_centre * view.state().direction(bar))
-        x, y = components(G)
-        plate(axes, bar, (0.0j, G, along), labels)
-        mass_centre(axes, (x, y), 6.0)
+        G = take_one(centre.to_centre * view.state().direction(bar))
+        x, y = split_components(G)
+        draw_plate(axes, bar, (0.0j, G, along), labels)
+        draw_mass_centre(axes, (x, y), 6.0)
         labels.add(Label(axes, f"$G_{bar}$", (x, y), middle, MUTED, 8.0, 3.0))
     reach = _reach(view, bar, arrows, scale)
     middle_of = 0.5 * (np.min(reach, axis=0) + np.max(reach, axis=0))
@@ -177,14 +187,14 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
     """One line each."""
     lines = []
     for each in couples:
-        size = quantity(abs(each.moment), "N m", view.units)
+        size = write_quantity(abs(each.moment), "N m", view.units)
         lines.append(f"{'↺' if each.moment > 0.0 else '↻'} {each.text} = {size}")
     axes.set_axis_off()
     look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45, "color": INK if lines else MUTED}
     axes.text(0.0, 1.0, "\n".join(lines) or "no couples", transform=axes.transAxes, **look)
 
 
-def _words(text: str) -> str:
+def _write_plainly(text: str) -> str:
     """Write a typeset name in plain letters, for the caption."""
     return re.sub(r"[$_{}]", "", text.replace("\\,", " ")).replace("-", "−")
 
@@ -193,7 +203,7 @@ def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) ->
     """Draw a round force as a length, under the first panel."""
     if scale == 0.0:
         return
-    factor, unit = unit_for(biggest, "N", units)
+    factor, unit = choose_unit(biggest, "N", units)
     step = 10.0 ** math.floor(math.log10(factor * biggest))
     round_force = next(m * step for m in (5.0, 2.0, 1.0) if 2.0 * m * step <= factor * biggest or m == 1.0) / factor
     x, y = axes.get_xlim()[0], axes.get_ylim()[0]

@@ -5,8 +5,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fourbar.show.plot.curves import broken, force_sizes, limit_of, note, poles
-from fourbar.show.plot.style import FORCE_COLOURS, MUTED, OPEN, force_line, force_name, largest, number, unit_for
+from fourbar.show.plot.curves import break_at_poles, choose_limit, find_poles, list_force_sizes, note
+from fourbar.show.plot.style import (
+    FORCE_COLOURS,
+    MUTED,
+    OPEN,
+    choose_force_line,
+    choose_unit,
+    find_greatest,
+    write_force_name,
+    write_number,
+)
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -28,12 +37,12 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
 
     forces = {name: getattr(view.sweep, name) for name in names}
     sizes = {name: np.hypot(*force.T) for name, force in forces.items()}
-    everywhere = force_sizes(view, names)
-    limit = limit_of(everywhere)
-    top = limit or 1.08 * largest(*everywhere) or 1.0
-    factor, unit = unit_for(top, "N", view.units)
-    where = poles(view)
-    over, every, apart = _spacing(view)
+    everywhere = list_force_sizes(view, names)
+    limit = choose_limit(everywhere)
+    top = limit or 1.08 * find_greatest(*everywhere) or 1.0
+    factor, unit = choose_unit(top, "N", view.units)
+    where = find_poles(view)
+    over, every, apart = _describe_spacing(view)
     marks = np.unique(np.round((over - over[0]) / every).astype(int))
     dots = [int(np.argmin(np.abs(over - over[0] - every * k))) for k in marks]
     for name, force in forces.items():
@@ -42,27 +51,27 @@ def draw_hodograph(axes: "PolarAxes", view: View, names: tuple[str, ...] = tuple
         known = np.isfinite(direction)
         direction[known] = np.unwrap(direction[known])
         size = np.where(sizes[name] <= top, sizes[name], np.nan) if limit else sizes[name]
-        axes.plot(broken(direction, where), factor * broken(size, where), **force_line(name))
+        axes.plot(break_at_poles(direction, where), factor * break_at_poles(size, where), **choose_force_line(name))
         axes.plot(direction[dots], factor * size[dots], "o", ms=2.8, color=FORCE_COLOURS[name], ls="none")
         first = int(np.argmax(np.isfinite(size)))
         start = {**OPEN, "mec": FORCE_COLOURS[name]}
         axes.plot(direction[[first]], factor * size[[first]], "o", ms=4.6, mew=1.1, zorder=5, **start)
-    if limit and largest(*sizes.values()) > limit:
-        note(view, f"Hodographs of {', '.join(names)} clipped at {number(factor * top)} {unit}.")
+    if limit and find_greatest(*sizes.values()) > limit:
+        note(view, f"Hodographs of {', '.join(names)} clipped at {write_number(factor * top)} {unit}.")
     axes.set_rlim(0.0, factor * top)
     axes.set_thetagrids(range(0, 360, 45))
     axes.tick_params(pad=0.5)
     many = 4 if factor * top < LONG_NUMBERS else 2
     ticks = MaxNLocator(many).tick_values(0.0, factor * top)
     axes.set_rticks([tick for tick in ticks if 0.0 < tick < 0.97 * factor * top])
-    axes.set_rlabel_position(_free_direction(list(forces.values())))
+    axes.set_rlabel_position(_find_free_direction(list(forces.values())))
     axes.tick_params(axis="y", labelsize=6.5, labelcolor=MUTED)
-    title = ", ".join(map(force_name, names)) if len(names) < 4 else "Hodographs of the pin forces"
+    title = ", ".join(map(write_force_name, names)) if len(names) < 4 else "Hodographs of the pin forces"
     axes.set_title(f"{title} ({unit})", pad=12)
     note(view, f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.")
 
 
-def _spacing(view: View) -> tuple[Array, float, str]:
+def _describe_spacing(view: View) -> tuple[Array, float, str]:
     """Say what the dots are evenly spaced in, by how much, and that in words."""
     axis = view.axis
     if axis.unit == "°":
@@ -73,7 +82,7 @@ def _spacing(view: View) -> tuple[Array, float, str]:
     return axis.values, every, f"{every:g}{axis.unit}"
 
 
-def _free_direction(forces: list[np.ndarray]) -> float:
+def _find_free_direction(forces: list[np.ndarray]) -> float:
     """Find the multiple of 22.5 deg that lies furthest from the curves."""
     directions = np.concatenate([np.arctan2(f[:, 1], f[:, 0])[np.isfinite(f).all(axis=1)] for f in forces])
     candidates = np.radians(np.arange(16) * 22.5)

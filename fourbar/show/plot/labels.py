@@ -82,7 +82,7 @@ class Labels:
         taken: list[tuple[Axes, Box]] = [(axes, text.get_window_extent(renderer).extents) for axes, text in texts]
         samples: dict[int, list[np.ndarray]] = {}
         for axes, points, width in self.lines:
-            own = _sampled(axes.transData.transform(points), per_point)
+            own = _sample_line(axes.transData.transform(points), per_point)
             samples.setdefault(id(axes), []).append(np.column_stack([own, np.full(len(own), width)]))
         for label in self.wanted:
             axes = label.axes
@@ -96,7 +96,7 @@ class Labels:
             away = math.atan2(y - sy, x - sx) if (x, y) != (sx, sy) else math.pi / 2
             dots = np.concatenate(samples[id(axes)]) if id(axes) in samples else np.empty((0, 3))
             boxes = [box for owner, box in taken if owner is axes]
-            centre = _spot((x, y), away, half, dots, boxes, per_point, label.dots_clear, _inside(axes))
+            centre = _choose_spot((x, y), away, half, dots, boxes, per_point, label.dots_clear, _find_panel(axes))
             taken.append((axes, (centre[0] - half[0], centre[1] - half[1], centre[0] + half[0], centre[1] + half[1])))
             to_data = axes.transData.inverted().transform
             text.set_position(tuple(to_data(centre)))
@@ -106,7 +106,7 @@ class Labels:
                 axes.plot(*zip(label.at, to_data(edge), strict=True), color=label.colour, lw=0.5, zorder=8.5, **look)
 
 
-def _inside(axes: "Axes") -> Box:
+def _find_panel(axes: "Axes") -> Box:
     """Return the panel in pixels."""
     box = axes.get_window_extent()
     return (box.x0, box.y0, box.x1, box.y1)
@@ -117,7 +117,7 @@ STEP, MARK = 3.0, 4.5
 RING = np.array([(math.cos(k * math.tau / 12), math.sin(k * math.tau / 12)) for k in range(12)])
 
 
-def _sampled(points: np.ndarray, per_point: float) -> np.ndarray:
+def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
     """Points along a polyline, or around a mark: a line that ends where it begins."""
     pieces, step = [], STEP * per_point
     for p, q in pairwise(points):
@@ -130,7 +130,7 @@ def _sampled(points: np.ndarray, per_point: float) -> np.ndarray:
     return np.concatenate(pieces) if pieces else np.empty((0, 2))
 
 
-def _spot(
+def _choose_spot(
     at: Point,
     away: float,
     half: Point,

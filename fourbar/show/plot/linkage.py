@@ -9,9 +9,17 @@ import numpy as np
 
 from fourbar.linkage import ENDS
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.mechanism import POINT, bar_name, draw_mechanism, pin_name, pins, scale_of, support
+from fourbar.show.plot.mechanism import (
+    POINT,
+    draw_mechanism,
+    draw_support,
+    locate_pins,
+    pin_name,
+    scale_of,
+    write_bar_name,
+)
 from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN
-from fourbar.show.plot.symbols import vectors
+from fourbar.show.plot.symbols import draw_vectors
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -28,37 +36,37 @@ COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
     """Draw the linkage at the position drawn, over the paths of its points; with velocities where it is `moving`."""
     factor, unit, size = scale_of(view)
-    where = pins(view, factor)
+    where = locate_pins(view, factor)
     draw_paths(axes, view, labels)
     if view.dimensions:
         at = tuple(0.5 * (a + b) for a, b in zip(where["O2"], where["O4"], strict=True))
-        labels.add(Label(axes, bar_name(view, 1), (at[0], at[1]), where["B"], MUTED, 9.0, 2.0))
+        labels.add(Label(axes, write_bar_name(view, 1), (at[0], at[1]), where["B"], MUTED, 9.0, 2.0))
     draw_mechanism(axes, view, view.here, 0, labels)
     if moving:
-        vectors(axes, view, view.here, factor, size)
+        draw_vectors(axes, view, view.here, factor, size)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
     title = f"Linkage at {view.at}, {view.branch_name} branch"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)
-    path_legend(axes)
+    write_path_legend(axes)
 
 
 def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
     """Draw what does not move: the paths of points, the ground line and its supports."""
     factor, _, size = scale_of(view)
-    for path, colour, dashes, name in paths(view):
+    for path, colour, dashes, name in list_paths(view):
         scaled = factor * path
         axes.plot(*scaled.T, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
         labels.keep_off(axes, *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]])
-    where = pins(view, factor)
+    where = locate_pins(view, factor)
     O2, O4 = where["O2"], where["O4"]
     axes.plot(*zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1)
     labels.keep_off(axes, O2, O4)
     for pin in (O2, O4):
-        support(axes, pin, size, labels)
+        draw_support(axes, pin, size, labels)
 
 
-def path_legend(axes: "Axes") -> float:
+def write_path_legend(axes: "Axes") -> float:
     """Write the legend of the paths above the drawing; return the distance of the title over it, typographic points."""
     legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.005), ncols=3)
     pad = 6.0 + 12.0 * math.ceil(len(legend.get_texts()) / 3)
@@ -66,7 +74,7 @@ def path_legend(axes: "Axes") -> float:
     return pad
 
 
-def paths(view: View) -> list[tuple[Array, str, Any, str]]:
+def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
     """Paths of A, B, mass centres (or the coupler's mid-point) and own points: (n, 2) in m, colour, dashes, name."""
     sweep = view.sweep
     massive = view.scene.linkage.coupler.mass > 0.0
@@ -87,8 +95,8 @@ def paths(view: View) -> list[tuple[Array, str, Any, str]]:
 def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     """Paths of the scene's own points of the coupler; where it has none, of points along its line and off it."""
     factor, unit, _ = scale_of(view)
-    where, names = pins(view, factor), [point.name for point in view.scene.points if point.bar == 3]
-    for (name, path), (colour, dashes) in zip(_coupler_points(view, names), cycle(COUPLER_CURVES), strict=False):
+    where, names = locate_pins(view, factor), [point.name for point in view.scene.points if point.bar == 3]
+    for (name, path), (colour, dashes) in zip(_list_coupler_points(view, names), cycle(COUPLER_CURVES), strict=False):
         lw = 1.8 if name in (*names, "0.5") else 1.1
         axes.plot(*(factor * path).T, color=colour, lw=lw, ls=dashes, label=name, zorder=3)
     faint: dict[str, Any] = {"color": MUTED, "alpha": 0.55, "solid_capstyle": "round", "zorder": 2}
@@ -113,7 +121,7 @@ def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     view.notes.append(f"The linkage is drawn at {view.at}.")
 
 
-def _coupler_points(view: View, names: list[str]) -> Iterator[tuple[str, Array]]:
+def _list_coupler_points(view: View, names: list[str]) -> Iterator[tuple[str, Array]]:
     """List the paths that are drawn of the coupler, each with its name."""
     sweep = view.sweep
     along = sweep.B - sweep.A

@@ -8,7 +8,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.scene import command
-from fourbar.show.influence import influences, largest_value, ranked, shown_quantities
+from fourbar.show.influence import find_largest, list_influences, list_shown, rank_numbers
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
     CAPTION,
@@ -16,17 +16,17 @@ from fourbar.show.plot.style import (
     FORCE_COLOURS,
     INK,
     TITLE,
-    degree_ticks,
+    apply_style,
+    choose_unit,
+    find_greatest,
     format_of,
-    largest,
-    matplotlib_style,
-    plain,
     save,
-    unit_for,
+    set_degree_ticks,
+    shorten_text,
 )
 from fourbar.show.plot.view import View, axis_of
-from fourbar.show.tolerances import part_unit, parted, shown_parts
-from fourbar.solution import SI, Conversion, unit_of
+from fourbar.show.tolerances import describe_parted, find_part_unit, list_shown_parts
+from fourbar.solution import SI, Conversion, find_unit
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.spread import BAND, Tolerances
 
@@ -59,62 +59,62 @@ def draw_tolerances(found: Tolerances, path: str | Path, units: Conversion = SI)
     kind = format_of(target)
     if len(found.theta_2) < 2:
         raise InputError(f"motion.{found.scene.motion.names[0]}", "one position", "a picture of bands needs a sweep")
-    with matplotlib_style():
+    with apply_style():
         from matplotlib.figure import Figure
 
-        parts = shown_parts(found)[:MOST_BANDS]
+        parts = list_shown_parts(found)[:MOST_BANDS]
         columns = (len(parts) + 2) // 2
         figure = Figure(figsize=(2.95 * columns, 5.6), layout="constrained")
         panels = figure.subplots(2, columns, squeeze=False).ravel()
         for axes, part in zip(panels, parts, strict=False):
-            _band(axes, found, part, units)
+            _draw_band(axes, found, part, units)
         for axes in panels[len(parts) + 1 :]:
             axes.set_axis_off()
-        _shares(panels[len(parts)], found, parts[0], units)
-        title = plain(found.scene.title, 80) or "Four-bar linkage"
+        _draw_shares(panels[len(parts)], found, parts[0], units)
+        title = shorten_text(found.scene.title, 80) or "Four-bar linkage"
         figure.suptitle(f"{title}: what the tolerances do ({found.samples} samples)", **TITLE)
         caption = (
             f"Deviation from the nominal. Filled: {BAND[0]:g} to {BAND[1]:g} % of the samples; thin: least and "
             "greatest sampled; dashed: first-order worst case."
         )
-        lines = [caption, *(line for part in parts if (line := parted(found, part)))]
+        lines = [caption, *(line for part in parts if (line := describe_parted(found, part)))]
         figure.supxlabel("\n".join(textwrap.fill(line, 52 * columns) for line in lines), **CAPTION)
         save(figure, target, kind)
 
 
-def _over(axes: "Axes", found: Tolerances, units: Conversion) -> Any:
+def _list_positions(axes: "Axes", found: Tolerances, units: Conversion) -> Any:
     over = axis_of(found.scene, command(found.scene), units)
     axes.set_xlim(over.values.min(), over.values.max())
     if over.unit == "°":
-        degree_ticks(axes.xaxis, 2.0 * float(np.ptp(over.values)))
+        set_degree_ticks(axes.xaxis, 2.0 * float(np.ptp(over.values)))
     axes.set_xlabel(f"{over.label} ({over.unit.strip()})")
     return over.values
 
 
-def _band(axes: "Axes", found: Tolerances, part: str, units: Conversion) -> None:
-    spread, over = found.spreads[part], _over(axes, found, units)
+def _draw_band(axes: "Axes", found: Tolerances, part: str, units: Conversion) -> None:
+    spread, over = found.spreads[part], _list_positions(axes, found, units)
     ends = [spread.low, spread.high, spread.least, spread.greatest]
     away = [end - spread.nominal for end in ends]
     sizes = np.abs(np.concatenate([*away, spread.worst]))
     sizes = sizes[np.isfinite(sizes)]
     most = 1.1 * float(np.percentile(sizes, OFF_SCALE)) if sizes.size else 0.0
-    factor, unit = unit_for(most, part_unit(part), units)
+    factor, unit = choose_unit(most, find_part_unit(part), units)
     colour = FORCE_COLOURS.get(part.strip("|"), INK)
     axes.fill_between(over, factor * away[0], factor * away[1], color=colour, alpha=0.35, lw=0.0)
     for line in away[2:]:
         axes.plot(over, factor * line, color=colour, lw=0.7)
     for sign in (1.0, -1.0):
         axes.plot(over, sign * factor * spread.worst, color=INK, lw=0.9, ls=(0, (4, 2)))
-    if sizes.size and largest(sizes) > 2.0 * most > 0.0:
+    if sizes.size and find_greatest(sizes) > 2.0 * most > 0.0:
         axes.set_ylim(-factor * most, factor * most)
     axes.axhline(0.0, color=INK, lw=0.6)
     axes.set(ylabel=f"deviation ({unit})", title=part)
 
 
-def _shares(axes: "Axes", found: Tolerances, part: str, units: Conversion) -> None:
+def _draw_shares(axes: "Axes", found: Tolerances, part: str, units: Conversion) -> None:
     from matplotlib.transforms import offset_copy
 
-    spread, over = found.spreads[part], _over(axes, found, units)
+    spread, over = found.spreads[part], _list_positions(axes, found, units)
     with np.errstate(all="ignore"):
         shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
     order = np.argsort(-np.nan_to_num(shares).sum(axis=1))
@@ -135,21 +135,21 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
     """One panel for each quantity over the same rows."""
     del labels
     found = sensitivity(shown.scene)
-    names = shown_quantities(found)[:MOST_PANELS]
-    keys = ranked(found, names)[:MOST_NUMBERS][::-1]
+    names = list_shown(found)[:MOST_PANELS]
+    keys = rank_numbers(found, names)[:MOST_NUMBERS][::-1]
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, name in zip(panels, names, strict=True):
-        changes = {row.key: abs(row.change) for row in influences(found, name)}
+        changes = {row.key: abs(row.change) for row in list_influences(found, name)}
         sizes = np.array([changes.get(key, 0.0) for key in keys])
-        factor, unit = unit_for(sizes.max(initial=0.0), unit_of(name))
+        factor, unit = choose_unit(sizes.max(initial=0.0), find_unit(name))
         axes.barh(range(len(keys)), factor * sizes, height=0.62, color=FORCE_COLOURS.get(name, INK))
         axes.set_yticks(range(len(keys)), keys if axes is panels[0] else [""] * len(keys), size=6.8)
         title = name if len(name) <= 10 else name[:9] + "…"
         axes.set(ylim=(-0.6, len(keys) - 0.4), title=title, xlabel=unit)
         axes.grid(False, axis="y")
         axes.locator_params(axis="x", nbins=3)
-        most, own_unit = unit_for(largest_value(found, name), unit_of(name))
-        text = f"largest\n{most * largest_value(found, name):.3g} {own_unit}"
+        most, own_unit = choose_unit(find_largest(found, name), find_unit(name))
+        text = f"largest\n{most * find_largest(found, name):.3g} {own_unit}"
         axes.text(0.98, 0.02, text, transform=axes.transAxes, ha="right", va="bottom", size=6.8)
     shown.notes.append(
         "Bars: the largest change over the sweep by 1 % of a number, of an angle by 1°; pin forces by their magnitude."

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, expect, installing
+from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.quantities import PIN_FORCES
-from fourbar.solution import SI, Array, Conversion, unit_in
+from fourbar.solution import SI, Array, Conversion, find_unit_in
 from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -31,13 +31,13 @@ FORCE_WIDTHS = dict(zip(PIN_FORCES, (2.6, 2.0, 1.6, 1.1), strict=True))
 """Thick beneath thin: forces that are equal still show all four lines."""
 
 
-def force_line(name: str) -> dict[str, Any]:
+def choose_force_line(name: str) -> dict[str, Any]:
     """How the curve of a pin force is drawn and named."""
     look = {"color": FORCE_COLOURS[name], "ls": FORCE_DASHES[name], "lw": FORCE_WIDTHS[name]}
-    return {**look, "label": force_name(name)}
+    return {**look, "label": write_force_name(name)}
 
 
-def force_name(name: str) -> str:
+def write_force_name(name: str) -> str:
     """F12 as it is typeset."""
     return f"$F_{{{name[1:]}}}$"
 
@@ -55,7 +55,7 @@ FORMATS = ("svg", "png", "pdf")
 
 
 @contextmanager
-def matplotlib_style() -> Iterator[None]:
+def apply_style() -> Iterator[None]:
     """Apply the settings of `STYLE` for the time of one drawing.
 
     Raises DependencyError where matplotlib is not installed.
@@ -63,7 +63,7 @@ def matplotlib_style() -> Iterator[None]:
     try:
         import matplotlib as mpl
     except ImportError:
-        raise DependencyError(f"drawing needs matplotlib: {installing('plot')}") from None
+        raise DependencyError(f"drawing needs matplotlib: {say_install('plot')}") from None
     with mpl.rc_context():
         mpl.rcdefaults()  # a user's matplotlibrc does not change a published figure
         mpl.rcParams.update(mpl.rc_params_from_file(STYLE, use_default_template=False))
@@ -82,10 +82,10 @@ def format_of(path: str | Path, file_format: str | None = None, formats: tuple[s
 
 def save(figure: "Figure", path: Path, file_format: str) -> None:
     """Write a figure whole or not at all."""
-    write_bytes(path, rendered(figure, file_format))
+    write_bytes(path, render_figure(figure, file_format))
 
 
-def rendered(figure: "Figure", file_format: str) -> bytes:
+def render_figure(figure: "Figure", file_format: str) -> bytes:
     """Write a figure as SVG, PNG or PDF, without a date in it."""
     metadata: dict[str, dict[str, Any]] = {
         "svg": {"Date": None, "Creator": "fourbar"},
@@ -100,7 +100,7 @@ def rendered(figure: "Figure", file_format: str) -> bytes:
 CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
 
 
-def plain(text: str, width: int) -> str:
+def shorten_text(text: str, width: int) -> str:
     """Shorten a stranger's text to one line of at most `width` characters."""
     line = " ".join(CONTROL.sub(" ", text).split())
     return line if len(line) <= width else line[: width - 1].rstrip() + "…"
@@ -109,10 +109,10 @@ def plain(text: str, width: int) -> str:
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
-def unit_for(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:
+def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:
     """Choose the factor from SI and the unit given, or the prefix that suits the largest magnitude; a rate has none."""
     if unit in units or "/" in unit:
-        name, factor = unit_in(unit, units)
+        name, factor = find_unit_in(unit, units)
         return factor, name.replace("^2", "²")
     if not math.isfinite(largest) or largest <= 0.0:
         return 1.0, unit
@@ -122,17 +122,17 @@ def unit_for(largest: float, unit: str, units: Conversion = SI) -> tuple[float, 
     return 1.0 / PREFIXES[-1][0], PREFIXES[-1][1] + unit
 
 
-def length_unit(largest: float, units: Conversion = SI) -> tuple[float, str]:
+def choose_length_unit(largest: float, units: Conversion = SI) -> tuple[float, str]:
     """Lengths in the unit stated, else in km, m, mm or µm by the largest."""
     if "m" in units:
-        return unit_for(largest, "m", units)
+        return choose_unit(largest, "m", units)
     for size, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm")):
         if largest >= size:
             return 1.0 / size, unit
     return 1e6, "µm"
 
 
-def largest(*values: Array) -> float:
+def find_greatest(*values: Array) -> float:
     """Largest finite magnitude, or 0."""
     flat = np.concatenate([np.abs(np.ravel(value)) for value in values])
     flat = flat[np.isfinite(flat)]
@@ -142,7 +142,7 @@ def largest(*values: Array) -> float:
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def number(value: float) -> str:
+def write_number(value: float) -> str:
     """Three significant digits, never in exponent form where four digits do."""
     if value == 0.0:
         return "0"
@@ -154,13 +154,13 @@ def number(value: float) -> str:
     return f"{mantissa}·10".replace("-", "−") + str(int(exponent)).translate(RAISED)
 
 
-def quantity(value: float, unit: str, units: Conversion = SI) -> str:
+def write_quantity(value: float, unit: str, units: Conversion = SI) -> str:
     """Write a quantity of an SI unit in the unit given, or with the prefix that suits it."""
-    factor, name = unit_for(abs(value), unit, units)
-    return f"{number(factor * value)} {name}"
+    factor, name = choose_unit(abs(value), unit, units)
+    return f"{write_number(factor * value)} {name}"
 
 
-def degree_ticks(axis: Any, span: float) -> None:
+def set_degree_ticks(axis: Any, span: float) -> None:
     """Ticks at round numbers of degrees."""
     from matplotlib.ticker import MultipleLocator
 
@@ -170,7 +170,7 @@ def degree_ticks(axis: Any, span: float) -> None:
             return
 
 
-def legend_above(axes: "Axes", columns: int = 4) -> None:
+def place_legend(axes: "Axes", columns: int = 4) -> None:
     """Place the legend between title and panel, where it covers no curve; none where no curve has a value."""
     if not axes.get_legend_handles_labels()[1]:
         return

@@ -13,9 +13,9 @@ import numpy as np
 
 from fourbar.linkage import FIRST_PIN, FourBar
 from fourbar.show.acting import Symbol
-from fourbar.show.plot.curves import limit_of
-from fourbar.show.plot.style import HEADED, INK, MUTED, largest
-from fourbar.show.plot.view import View, point_vectors
+from fourbar.show.plot.curves import choose_limit
+from fourbar.show.plot.style import HEADED, INK, MUTED, find_greatest
+from fourbar.show.plot.view import View, collect_point_vectors
 from fourbar.solution import Solution
 
 if TYPE_CHECKING:
@@ -110,11 +110,11 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
     """One symbol at one position; `size` is that of a support."""
     drawn, colour = DrawnSymbol(text=symbol.name), COLOURS[symbol.kind]
     if symbol.kind == "gravity":
-        _gravity(axes, symbol, drawn)
+        _draw_gravity(axes, symbol, drawn)
     elif symbol.kind == "spring":
         assert symbol.end is not None
         start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
-        _line(axes, drawn, _zigzag(start, end, 0.6 * size), colour, 1.0)
+        _draw_line(axes, drawn, _draw_zigzag(start, end, 0.6 * size), colour, 1.0)
         drawn.artists += axes.plot(
             [start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=5.5
         )
@@ -122,15 +122,15 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
         assert symbol.end is not None
         start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
         along = (end - start) / abs(end - start)
-        _line(axes, drawn, np.array([start, end]), colour, 1.2)
-        _line(axes, drawn, start + np.array([0.1, 1.0]) * place.barrel * along, colour, 4.5)
+        _draw_line(axes, drawn, np.array([start, end]), colour, 1.2)
+        _draw_line(axes, drawn, start + np.array([0.1, 1.0]) * place.barrel * along, colour, 4.5)
         drawn.text, drawn.away = f"${symbol.name}$", 1j * along
-        drawn.label = components(start + 0.5 * place.barrel * along)
+        drawn.label = split_components(start + 0.5 * place.barrel * along)
         drawn.artists += axes.plot(
             [start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=5.5
         )
     elif symbol.kind == "force":
-        _force(axes, symbol, place, size, drawn)
+        _draw_force(axes, symbol, place, size, drawn)
     elif symbol.kind in ("moment", "drive"):
         centre = place.point(symbol.bar, symbol.at)
         turn = math.copysign(1.0, symbol.moment) * symbol.sign(place.theta_2)
@@ -146,39 +146,41 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
         spiral = symbol.kind == "torsion"
         turned = np.linspace(0.0, (2.5 if spiral else 1.0) * math.tau, 90)
         radii = np.linspace(0.3 * radius, radius, 90) if spiral else radius
-        _line(axes, drawn, centre + radii * np.exp(1j * turned), colour, 2.2 if symbol.kind == "flywheel" else 1.2)
+        _draw_line(axes, drawn, centre + radii * np.exp(1j * turned), colour, 2.2 if symbol.kind == "flywheel" else 1.2)
         drawn.away = cmath.rect(1.0, NAMED_AT[symbol.kind])
-        drawn.label = components(centre + radius * drawn.away)
+        drawn.label = split_components(centre + radius * drawn.away)
     return drawn
 
 
-def components(z: complex) -> Point:
+def split_components(z: complex) -> Point:
     """Split z into x and y."""
     return (z.real, z.imag)
 
 
-def _line(axes: "Axes", drawn: DrawnSymbol, points: Any, colour: str, width: float) -> None:
+def _draw_line(axes: "Axes", drawn: DrawnSymbol, points: Any, colour: str, width: float) -> None:
     x, y = np.real(points), np.imag(points)
     drawn.artists += axes.plot(x, y, color=colour, lw=width, zorder=3.5)  # over supports, under the bars
     drawn.lines.append([(float(a), float(b)) for a, b in zip(x, y, strict=True)])
 
 
-def _arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: DrawnSymbol) -> None:
+def _draw_arrow(axes: "Axes", tail: complex, tip: complex, colour: str, drawn: DrawnSymbol) -> None:
     from matplotlib.patches import FancyArrowPatch
 
-    arrow = FancyArrowPatch(components(tail), components(tip), zorder=8, color=colour, mutation_scale=10.0, **HEADED)
+    arrow = FancyArrowPatch(
+        split_components(tail), split_components(tip), zorder=8, color=colour, mutation_scale=10.0, **HEADED
+    )
     drawn.artists.append(axes.add_patch(arrow))
-    axes.update_datalim([components(tail), components(tip)])
-    drawn.lines.append([components(tail), components(tip)])
+    axes.update_datalim([split_components(tail), split_components(tip)])
+    drawn.lines.append([split_components(tail), split_components(tip)])
 
 
-def _force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: DrawnSymbol) -> None:
+def _draw_force(axes: "Axes", symbol: Symbol, place: Place, size: float, drawn: DrawnSymbol) -> None:
     tail, sign = place.tail(symbol), symbol.sign(place.theta_2)
     if sign == 0.0:
         return
     tip = tail + sign * LENGTHS["force"] * size * place.direction(symbol) * symbol.vector / abs(symbol.vector)
-    _arrow(axes, tail, tip, COLOURS["force"], drawn)
-    drawn.label, drawn.away = components(tip), (tip - tail) / abs(tip - tail)
+    _draw_arrow(axes, tail, tip, COLOURS["force"], drawn)
+    drawn.label, drawn.away = split_components(tip), (tip - tail) / abs(tip - tail)
 
 
 def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str, drawn: DrawnSymbol) -> None:
@@ -187,12 +189,12 @@ def _turn(axes: "Axes", centre: complex, radius: float, turn: float, colour: str
         return
     angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
     points = centre + radius * np.exp(1j * angles)
-    _line(axes, drawn, points, colour, 1.5)
-    _arrow(axes, complex(points[-2]), complex(points[-1] + 2.0 * (points[-1] - points[-2])), colour, drawn)
-    drawn.label, drawn.away = components(complex(points[20])), complex(points[20] - centre) / radius
+    _draw_line(axes, drawn, points, colour, 1.5)
+    _draw_arrow(axes, complex(points[-2]), complex(points[-1] + 2.0 * (points[-1] - points[-2])), colour, drawn)
+    drawn.label, drawn.away = split_components(complex(points[20])), complex(points[20] - centre) / radius
 
 
-def _zigzag(start: complex, end: complex, width: float) -> Any:
+def _draw_zigzag(start: complex, end: complex, width: float) -> Any:
     """Draw a coil spring seen from the side: straight ends, teeth between."""
     along = end - start
     across = 1j * along / abs(along) * width if along else 0.0
@@ -201,7 +203,7 @@ def _zigzag(start: complex, end: complex, width: float) -> Any:
     return np.array([*teeth, start + 0.85 * along, end])
 
 
-def _gravity(axes: "Axes", symbol: Symbol, drawn: DrawnSymbol) -> None:
+def _draw_gravity(axes: "Axes", symbol: Symbol, drawn: DrawnSymbol) -> None:
     """Draw an arrow in the corner, of no length in the plane."""
     size = abs(symbol.vector)
     if size == 0.0:
@@ -216,17 +218,17 @@ def _gravity(axes: "Axes", symbol: Symbol, drawn: DrawnSymbol) -> None:
     ]
 
 
-def vectors(axes: "Axes", view: View, solution: Solution, factor: float, size: float) -> Callable[[int], None]:
+def draw_vectors(axes: "Axes", view: View, solution: Solution, factor: float, size: float) -> Callable[[int], None]:
     """Draw the arrows of a solution's first position, each kind to one scale of the sweep.
 
     Returns the function that moves them to another position.
     """
     drawn = []
     for letter, (colour, label) in ARROWS.items():
-        sizes = [np.hypot(*values.T) for values in point_vectors(view.scene, view.sweep, letter).values()]
-        if not (top := limit_of(sizes) or largest(*sizes)):
+        sizes = [np.hypot(*values.T) for values in collect_point_vectors(view.scene, view.sweep, letter).values()]
+        if not (top := choose_limit(sizes) or find_greatest(*sizes)):
             continue
-        found = point_vectors(view.scene, solution, letter)
+        found = collect_point_vectors(view.scene, solution, letter)
         feet = [solution.points[name] if name in solution.points else getattr(solution, name) for name in found]
         shafts = [LONGEST * size * v / np.maximum(np.hypot(*v.T), top)[:, None] for v in found.values()]
         tips = np.concatenate([factor * foot + shaft for foot, shaft in zip(feet, shafts, strict=True)])

@@ -7,8 +7,8 @@ import numpy as np
 
 from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import MOVING_BARS
-from fourbar.show.plot.curves import bases
-from fourbar.show.plot.style import INK, MUTED, OPEN, legend_above
+from fourbar.show.plot.curves import draw_axes
+from fourbar.show.plot.style import INK, MUTED, OPEN, place_legend
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -23,24 +23,24 @@ REMARK = 0.34
 
 def draw_transmission(axes: "Axes", view: View) -> None:
     """Acute angle between coupler and output, with limit and dead-centre positions."""
-    over = bases(axes, view)
+    over = draw_axes(axes, view)
     sweep = view.sweep
     mu = np.degrees(np.arctan2(np.abs(sweep.sin_mu), np.abs(np.cos(sweep.theta_4 - sweep.theta_3))))
     axes.plot(over, mu, color=INK)
     axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
-    place = free_place(mu)
+    place = find_free_place(mu)
     at = (over[0] + place * (over[-1] - over[0]), RECOMMENDED)
     look: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "size": 7.0, "color": MUTED}
     axes.annotate(f"{RECOMMENDED:g}° recommended", at, xytext=(0, 2), **look)
     axes.set(ylim=(0.0, 96.0), yticks=range(0, 91, 15))
-    for theta, height, marker, name in _marked(view):
+    for theta, height, marker, name in _list_marked(view):
         axes.plot(theta, height, marker, ms=6.0, mew=1.1, ls="none", label=name, clip_on=False, zorder=5, **OPEN)
     axes.set(ylabel=r"transmission angle $\mu$ (°)", title="Transmission angle")
     if view.time is None:
-        legend_above(axes, 2)
+        place_legend(axes, 2)
 
 
-def free_place(mu: Array) -> float:
+def find_free_place(mu: Array) -> float:
     """Where along the axis the curve keeps furthest from a remark at 40 deg, as a part of its length."""
     half = REMARK / 2.0
     best, clearance = 1.0 - half, -1.0
@@ -52,7 +52,7 @@ def free_place(mu: Array) -> float:
     return best
 
 
-def _marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
+def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
     """Limits of the commanded bar and dead centres, on the axis: places, mu (degrees), mark, name."""
     if view.time is not None:
         return []
@@ -67,7 +67,7 @@ def _marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
             theta = {2: found.theta_2, 3: found.theta_3, 4: found.theta_4}
             sign = math.copysign(1.0, math.sin(theta[other] - theta[one]))
             difference = found.theta_4 - found.theta_3
-            for place in _inside(own, theta[at.bar], margin if bar == at.bar else 0.0):
+            for place in _list_inside(own, theta[at.bar], margin if bar == at.bar else 0.0):
                 if bar == at.bar or at.branch[np.argmin(np.abs(own - place))] == sign:
                     turned.append(place)
                     heights.append(math.degrees(math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))))
@@ -79,7 +79,7 @@ def _marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
     return [entry for entry in marked if entry[0]]
 
 
-def _inside(own: Array, angle: float, margin: float) -> list[float]:
+def _list_inside(own: Array, angle: float, margin: float) -> list[float]:
     """List an angle (rad) and its full turns that lie in the sweep, degrees."""
     low, high = float(own.min()) - margin, float(own.max()) + margin
     start = math.degrees(angle)

@@ -6,14 +6,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects.actions import Actions, bodies
+from fourbar.effects.actions import Actions, list_bodies
 from fourbar.errors import NotAssembledError
-from fourbar.evaluation.case import state_at
+from fourbar.evaluation.case import compute_state
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.scene import Command, Scene, command, command_at, default_places
-from fourbar.show.plot.style import length_unit, unit_for
+from fourbar.show.plot.style import choose_length_unit, choose_unit
 from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve
 
@@ -52,7 +52,7 @@ class View:
         """What curves are drawn over: time, or what is commanded."""
         if self.time is not None:
             longest = max(float(other.time[-1]) for other in self.alike if other.time is not None)
-            factor, unit = (1.0, "s") if longest >= 1.0 else unit_for(longest, "s")
+            factor, unit = (1.0, "s") if longest >= 1.0 else choose_unit(longest, "s")
             return Axis("t", "$t$", f" {unit}", factor, factor * self.time)
         return axis_of(self.scene, self.sweep.at, self.units)
 
@@ -82,7 +82,7 @@ class View:
 
     def state(self) -> State:
         """Kinematics at the position drawn."""
-        return state_at(self.scene, self.here.at)
+        return compute_state(self.scene, self.here.at)
 
 
 class Axis(NamedTuple):
@@ -105,7 +105,7 @@ class Axis(NamedTuple):
 def axis_of(scene: Scene, at: Command, units: Conversion) -> Axis:
     """Make the axis of what is commanded."""
     if at.stroke is not None:
-        factor, unit = length_unit(max(scene.linkage.lengths), units)
+        factor, unit = choose_length_unit(max(scene.linkage.lengths), units)
         return Axis("stroke", "stroke", f" {unit}", factor, factor * at.stroke)
     return Axis(f"θ{'₀₁₂₃₄'[at.bar]}", rf"$\{at.commanded}$", "°", math.degrees(1.0), np.degrees(at.angle))
 
@@ -116,7 +116,7 @@ def where_in_words(solution: Solution) -> str:
     return f"{solution.commanded} = {f'{angle:.6g} deg' if stroke is None else f'{stroke[0]:.6g} m'}"
 
 
-def point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Array]:
+def collect_point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Array]:
     """Velocities ("v") or accelerations ("a") of A, B, the mass centres of bars that have mass, and own points."""
     drawn = ("A", "B", *(f"G{bar}" for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0))
     found = {name: getattr(solution, f"{letter}_{name}") for name in drawn}
@@ -124,7 +124,7 @@ def point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Ar
     return {name: values for name, values in found.items() if values is not None}
 
 
-def one(vector: Any) -> complex:
+def take_one(vector: Any) -> complex:
     """Return the one complex number of an array, at the position drawn."""
     return complex(np.ravel(vector)[0])
 
@@ -133,7 +133,7 @@ class Recorder(Actions):
     """Forces and couples that are kept one by one, each force with its arm, for a free-body diagram."""
 
     def __init__(self, scene: Scene, state: State) -> None:
-        super().__init__(state, bodies(scene.linkage))
+        super().__init__(state, list_bodies(scene.linkage))
         self.arrows: list[tuple[int, complex, complex]] = []
         """Bar, force (N), and from the bar's first pin to where it acts (m)."""
         self.turns: list[tuple[int, float]] = []
@@ -141,12 +141,12 @@ class Recorder(Actions):
 
     def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
         """Add a force on a bar, applied at `arm` from the bar's first pin."""
-        self.arrows.append((bar, one(force), one(arm)))
+        self.arrows.append((bar, take_one(force), take_one(arm)))
 
     def moment(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar."""
         if bar != 1:
-            self.turns.append((bar, one(moment).real))
+            self.turns.append((bar, take_one(moment).real))
 
     def couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first."""
@@ -155,12 +155,12 @@ class Recorder(Actions):
         self.moment(first, -couple)
 
 
-def over_time(scene: Scene) -> bool:
+def is_over_time(scene: Scene) -> bool:
     """Whether the motion is one through time: released, or by a law."""
     return scene.motion.free is not None or scene.motion.law is not None
 
 
-def sweep_command(scene: Scene) -> Command:
+def list_sweep(scene: Scene) -> Command:
     """List the positions as what is commanded rises; a single one is put among those of the default range."""
     own = command(scene)
     if len(own.angle) > 1:
@@ -172,21 +172,21 @@ def sweep_command(scene: Scene) -> Command:
     return command_at(scene, places, np.concatenate([wide.branch, own.branch])[first])
 
 
-def common_position(scenes: "list[Scene]") -> float | None:
+def choose_common_position(scenes: "list[Scene]") -> float | None:
     """Choose a position that shows each of several scenes over the same range; None where each has its own."""
-    if any(over_time(scene) for scene in scenes) or len(command(scenes[0]).angle) == 1:
+    if any(is_over_time(scene) for scene in scenes) or len(command(scenes[0]).angle) == 1:
         return None
-    sweeps = [solve(scene, at=sweep_command(scene)) for scene in scenes]
+    sweeps = [solve(scene, at=list_sweep(scene)) for scene in scenes]
     sweeps = [sweep for sweep in sweeps if sweep.assembled.any()]
-    return representative(sweeps) if sweeps else None
+    return choose_position(sweeps) if sweeps else None
 
 
-def on_branch(scene: Scene, branch: int) -> Scene:
+def set_branch(scene: Scene, branch: int) -> Scene:
     """Put the same scene on the given branch."""
     return replace(scene, motion=replace(scene.motion, branch=branch))
 
 
-def view(scene: Scene, position: float | None = None) -> View:
+def make_view(scene: Scene, position: float | None = None) -> View:
     """Evaluate the sweep of a scene, or its motion through time, and one position of it.
 
     Parameters
@@ -199,14 +199,14 @@ def view(scene: Scene, position: float | None = None) -> View:
     ------
     NotAssembledError : no position of the sweep assembles, or the one named does not.
     """
-    if over_time(scene):
-        return _through_time(scene, position)
-    where = sweep_command(scene)
+    if is_over_time(scene):
+        return _view_motion(scene, position)
+    where = list_sweep(scene)
     sweep = solve(scene, at=where)
-    _something(sweep)
+    _require_assembled(sweep)
     own = command(scene)
     if position is None:
-        position = float(own.places[0]) if len(own.angle) == 1 else representative([sweep])
+        position = float(own.places[0]) if len(own.angle) == 1 else choose_position([sweep])
     branch = where.branch[[np.argmin(np.abs(where.places - position))]]
     shown = View(scene, sweep, solve(scene, at=command_at(scene, np.array([position]), branch)))
     if not shown.here.assembled[0]:
@@ -214,15 +214,15 @@ def view(scene: Scene, position: float | None = None) -> View:
     return shown
 
 
-def _something(sweep: Solution) -> None:
+def _require_assembled(sweep: Solution) -> None:
     if not sweep.assembled.any():
         raise NotAssembledError("nothing to draw: the linkage assembles at none of the scene's positions")
 
 
-def _through_time(scene: Scene, position: float | None) -> View:
+def _view_motion(scene: Scene, position: float | None) -> View:
     """Evaluate a motion; drawn is the instant that assembles first, or whose theta_2 comes nearest to the position."""
     sweep = solve(scene)
-    _something(sweep)
+    _require_assembled(sweep)
     angle, name = sweep.at.angle, sweep.commanded
     if position is None:
         index = int(np.argmax(sweep.assembled))
@@ -240,7 +240,7 @@ def _through_time(scene: Scene, position: float | None) -> View:
     return shown
 
 
-def representative(sweeps: "list[Solution]") -> float:
+def choose_position(sweeps: "list[Solution]") -> float:
     """Choose a position, the same for all sweeps, that shows the bars apart; well conditioned where one is."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], sweeps[0].assembled, [False]]).astype(int))).reshape(-1, 2)
     run = slice(*ends[int(np.argmax(ends[:, 1] - ends[:, 0]))])

@@ -234,13 +234,13 @@ def test_a_narrow_terminal_gets_whole_columns_and_the_names_of_what_is_missing()
 
 
 def tables_text(scene: fourbar.Scene, width: int) -> str:
-    return tables.printed(scene, fourbar.solve(scene), width)
+    return tables.print_tables(scene, fourbar.solve(scene), width)
 
 
 def test_the_digits_of_the_torque() -> None:
     solution = fourbar.solve(crank_rocker(), "error")
     assert solution.torque is not None and solution.torque_error is not None
-    column = next(cells for name, cells in tables.columns(solution).items() if "digits" in name)
+    column = next(cells for name, cells in tables.list_columns(solution).items() if "digits" in name)
     for cell, torque, error in zip(column, solution.torque, solution.torque_error, strict=True):
         digits = int(cell)
         assert error <= abs(torque) * 10.0**-digits or digits == 0
@@ -323,19 +323,19 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
 
 
 def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> None:
-    from fourbar.mjcf import defaults_used, scene_from_lengths
-    from fourbar.mjcf.simulators import mjcf_for
+    from fourbar.mjcf import list_defaults, make_scene
+    from fourbar.mjcf.simulators import write_mjcf_for
 
     code, out, err = run("mjcf", MODELS / "crank_rocker.toml", "-o", tmp_path / "a.xml")
     assert (code, out, err) == (HOLDS, "", "")
-    assert (tmp_path / "a.xml").read_text() == mjcf_for(load(MODELS / "crank_rocker.toml"))
+    assert (tmp_path / "a.xml").read_text() == write_mjcf_for(load(MODELS / "crank_rocker.toml"))
     lengths = ["--lengths", 0.3, "10 cm", "250 mm", 0.22]
     code, out, err = run("mjcf", *lengths, "--omega", "60 rpm", "-o", tmp_path / "b.xml")
-    scene = scene_from_lengths(0.3, 0.1, 0.25, 0.22, omega=2.0 * math.pi)
-    assert (code, err) == (HOLDS, "") and out.splitlines() == defaults_used(scene)
-    assert (tmp_path / "b.xml").read_text() == mjcf_for(scene)
+    scene = make_scene(0.3, 0.1, 0.25, 0.22, omega=2.0 * math.pi)
+    assert (code, err) == (HOLDS, "") and out.splitlines() == list_defaults(scene)
+    assert (tmp_path / "b.xml").read_text() == write_mjcf_for(scene)
     assert run("mjcf", MODELS / "thesis.toml", "--drive", "motor", "-o", tmp_path / "c.xml")[0] == HOLDS
-    assert (tmp_path / "c.xml").read_text() == mjcf_for(load(MODELS / "thesis.toml"), drive="motor")
+    assert (tmp_path / "c.xml").read_text() == write_mjcf_for(load(MODELS / "thesis.toml"), drive="motor")
 
 
 @pytest.mark.parametrize("form", ["sdf", "usd"])

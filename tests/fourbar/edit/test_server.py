@@ -206,7 +206,7 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(bench
     program += (
         "(out / 'report.html').write_text('<p>report'); time.sleep(float(out.parent.joinpath('wait').read_text()))"
     )
-    monkeypatch.setattr(witness, "harness", lambda: [sys.executable, "-c", program])
+    monkeypatch.setattr(witness, "find_harness", lambda: [sys.executable, "-c", program])
     monkeypatch.setattr(witness, "TICK", 0.05)
 
     async def ask(made: Workbench, address: str) -> None:

@@ -15,9 +15,9 @@ import fourbar
 from fourbar.files import loads
 
 pytest.importorskip("tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit")
-from fourbar.edit.answer import frame
-from fourbar.edit.document import SceneDocument, offers
-from fourbar.edit.dragging import rounded, unit_of
+from fourbar.edit.document import SceneDocument, list_offers
+from fourbar.edit.dragging import find_unit, write_rounded
+from fourbar.edit.reply import pack_frame
 from fourbar.edit.session import Session
 
 ROOT = Path(__file__).parents[3]
@@ -69,7 +69,7 @@ def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(pa
 
 def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
     names = {"points": "P", "tolerances": "lengths.input"}
-    for part in offers()["parts"]:
+    for part in list_offers()["parts"]:
         document, at = SceneDocument(CRANK_ROCKER.read_text()), part["at"]
         place = [names[at[0]] if step == "" else step for step in at]
         if place[-1] == "law":
@@ -78,12 +78,12 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
         if place[-1] == "free":
             document.set(["motion", "theta_2"], "60 deg")
         if place[0] == "effects" and len(place) == 3:
-            document.put(place[:2], next(p["value"] for p in offers()["parts"] if p["at"] == place[:2]))
+            document.put(place[:2], next(p["value"] for p in list_offers()["parts"] if p["at"] == place[:2]))
         before = document.text()
         document.put(place, part["value"])
         assert document.text() != before or place[0] == "effects"
         loads(document.text())
-    fields = dict(leaves(offers()["fields"]))
+    fields = dict(leaves(list_offers()["fields"]))
     document = SceneDocument(CRANK_ROCKER.read_text())
     for place, value in fields.items():
         document.set(place, str(value))
@@ -195,11 +195,13 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
 
 
 def test_numbers_get_the_digits_of_a_pixel_and_keep_their_unit() -> None:
-    assert rounded(0.123456, 0.003, "m") == "0.123 m"
-    assert rounded(123.456, 3.0, "mm") == "123 mm"
-    assert rounded(1234.0, 300.0, "mm") == "1200 mm"
+    assert write_rounded(0.123456, 0.003, "m") == "0.123 m"
+    assert write_rounded(123.456, 3.0, "mm") == "123 mm"
+    assert write_rounded(1234.0, 300.0, "mm") == "1200 mm"
     assert (
-        unit_of("12 1/2 in", "m") == "in" and unit_of("3e-2 kg m^2", "") == "kg m^2" and unit_of(None, "deg") == "deg"
+        find_unit("12 1/2 in", "m") == "in"
+        and find_unit("3e-2 kg m^2", "") == "kg m^2"
+        and find_unit(None, "deg") == "deg"
     )
 
 
@@ -216,7 +218,7 @@ def unpacked(data: bytes) -> dict:
 
 def test_the_answer_is_what_analyze_says(session: Session) -> None:
     session.do({"do": "set", "path": ["bars", "coupler", "mass"], "value": "2 lb"})
-    told = unpacked(frame(session.answer(settled=True)))
+    told = unpacked(pack_frame(session.answer(settled=True)))
     scene = loads(session.now.text)
     s = fourbar.solve(scene, "error")
     columns = told["data"]["branches"]["1"]
@@ -232,7 +234,7 @@ def test_the_answer_is_what_analyze_says(session: Session) -> None:
 def test_every_linkage_that_people_know_has_an_answer(tmp_path: Path) -> None:
     for path in [*(ROOT / "models").glob("*.toml"), *(ROOT / "models" / "gallery").glob("*.toml")]:
         told = Session(path, tmp_path / "exports").answer()
-        assert unpacked(frame(told))["columns"], path
+        assert unpacked(pack_frame(told))["columns"], path
 
 
 def test_an_answer_takes_ten_bare_solves_at_most(session: Session) -> None:
@@ -241,7 +243,9 @@ def test_an_answer_takes_ten_bare_solves_at_most(session: Session) -> None:
         start = time.perf_counter()
         fourbar.solve(session.now.scene)
         middle = time.perf_counter()
-        frame(session.do({"do": "set", "path": ["lengths", "input"], "value": f"{100 + turn % 9} mm", "gesture": "g"}))
+        pack_frame(
+            session.do({"do": "set", "path": ["lengths", "input"], "value": f"{100 + turn % 9} mm", "gesture": "g"})
+        )
         spent = {"bare": middle - start, "answer": time.perf_counter() - middle}
         best = {name: min(best[name], spent[name]) for name in best}
     assert best["answer"] < BARE_SOLVES * best["bare"], best

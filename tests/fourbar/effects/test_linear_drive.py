@@ -13,10 +13,10 @@ import fourbar
 from fourbar.effects import SpringEnd
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
-from fourbar.mjcf.sdf import sdf
-from fourbar.mjcf.usd import usd
-from fourbar.show.duty import motor_duty, motor_entry, shaking_force, shaking_moment
-from fourbar.solution import json_text
+from fourbar.mjcf.sdf import write_sdf
+from fourbar.mjcf.usd import write_usd
+from fourbar.show.duty import motor_duty, shaking_force, shaking_moment, write_motor
+from fourbar.solution import write_json
 from tests.support.scenes import crank_rocker
 
 PAIRS = list(combinations((1, 2, 3, 4), 2))
@@ -313,7 +313,7 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies() -> None:
     assert again.drive == scene.drive
     assert again.drive.start.bar == 1 and again.drive.end == SpringEnd(4, 0.09, 0.0)
     assert again.drive.start[1:] == pytest.approx((0.21, math.radians(-60)))
-    assert again.drive_bar is None and '"drive_bar": null' in json_text(fourbar.solve(again))
+    assert again.drive_bar is None and '"drive_bar": null' in write_json(fourbar.solve(again))
     with pytest.raises(fourbar.InputError, match="a drive acts on a bar or along a line"):
         replace(scene, drive_bar=3)
     with pytest.raises(fourbar.InputError, match="out = 'torque'"):
@@ -366,7 +366,7 @@ def test_the_frame_bears_what_changes_the_momentum_of_the_bars(one: int, other: 
     pins = np.abs(s.F12).max() + np.abs(s.F14).max()
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * pins
     assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * pins
-    duty, entry = motor_duty(s), motor_entry(s, {})
+    duty, entry = motor_duty(s), write_motor(s, {})
     assert duty.peak_force == np.abs(s.drive_force).max() and duty.peak_torque is None
     assert duty.peak_speed == np.abs(s.stroke_speed).max() and entry["units"]["peak_speed"] == "m/s"
 
@@ -404,7 +404,7 @@ def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(one:
 
 def test_files_of_simulators_refuse_it_by_name() -> None:
     scene = driven(1, 4, loads=())
-    for write in (sdf, usd):
+    for write in (write_sdf, write_usd):
         with pytest.raises(fourbar.FourBarError, match=r"linear drive \(drive\.from, drive\.to\)"):
             write(scene)
 

@@ -9,7 +9,7 @@ import pytest
 import fourbar
 from fourbar.effects import Gravity, PinFriction, Spring, SpringEnd, Springs, Torsion
 from fourbar.errors import LimitError
-from fourbar.formulas.mobility import default_range
+from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import PINS
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Motion, Sweep
@@ -84,7 +84,7 @@ def continuous(scene: Scene, pin: str) -> np.ndarray:
 def test_a_torsion_spring_is_wound_where_the_continuous_angle_says_so(name: str, branch: int, pin: str) -> None:
     """Followed position by position, and evaluated at each fiftieth by itself and in another order."""
     link = replace(linkage(name), ground_angle=0.4)
-    least, most = default_range(link)
+    least, most = choose_range(link)
     if name == "kite":  # from its change point to the same again: there bars 3 and 4 are free to turn
         least, most = 0.4, 0.4 + 2.0 * math.pi
     margin = 1e-3 * (most - least)

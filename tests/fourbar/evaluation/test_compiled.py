@@ -99,8 +99,8 @@ def test_what_it_does_not_carry_is_numpys_to_the_last_digit() -> None:
 
 def test_small_work_is_left_to_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     used: list[bool] = []
-    true = compiled_case.looped
-    monkeypatch.setattr(compiled_case, "looped", lambda *given, **named: used.append(True) or true(*given, **named))
+    true = compiled_case.run_loop
+    monkeypatch.setattr(compiled_case, "run_loop", lambda *given, **named: used.append(True) or true(*given, **named))
     solve(scene(), "error")
     assert not used
     monkeypatch.setattr(blocks, "WORTH_COMPILING", 301 * (EVALUATIONS + 1) - EVALUATIONS - 301)
@@ -127,6 +127,6 @@ def test_a_place_that_cannot_be_written_costs_only_time(monkeypatch: pytest.Monk
         return "compiled without a cache"
 
     monkeypatch.setattr(numba, "njit", njit)
-    assert compiled.loop.__wrapped__(compiled.run, False) == "compiled without a cache"
-    monkeypatch.setattr(compiled, "loop", compiled.loop.__wrapped__)
-    assert compiled.loop(compiled.run) == "compiled without a cache"
+    assert compiled.compile_loop.__wrapped__(compiled.run, False) == "compiled without a cache"
+    monkeypatch.setattr(compiled, "compile_loop", compiled.compile_loop.__wrapped__)
+    assert compiled.compile_loop(compiled.run) == "compiled without a cache"

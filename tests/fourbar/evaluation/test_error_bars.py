@@ -13,7 +13,7 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
-from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from fourbar_validation.run import printed
 from fourbar_validation.run.question import Question
 
@@ -108,7 +108,7 @@ def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:
 
 def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
     """Where a spring's ends nearly meet the direction in which it pulls is lost, which is no power of any sine."""
-    scene = SPECIMENS["ends of a spring nearly meet"]
+    scene = FAULT_SCENES["ends of a spring nearly meet"]
     rows = printed.check_error_bars(Question("", scene, command(scene)))
     assert [row.verdict for row in rows] == ["agrees", "agrees"]
 

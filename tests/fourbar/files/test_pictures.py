@@ -33,7 +33,7 @@ def test_the_picture_of_a_scene_file_is_shown_and_saved(
     (tmp_path / name).write_bytes(PNG)
     monkeypatch.chdir("/")  # the name is relative to the scene file
     scene = load(scene_file(tmp_path, name))
-    assert embedded(animate.page(scene))["pictures"] == {"3": EMBEDDED}
+    assert embedded(animate.write_page(scene))["pictures"] == {"3": EMBEDDED}
     save(scene, tmp_path / "again.toml")
     again = load(tmp_path / "again.toml")
     assert again.pictures == scene.pictures
@@ -48,7 +48,7 @@ def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(tmp_path: P
     scene = load(scene_file(inner, "bar.png", "output"))
     save(scene, tmp_path / "outer.toml")
     assert 'picture = "inner/bar.png"' in (tmp_path / "outer.toml").read_text()
-    assert embedded(animate.page(load(tmp_path / "outer.toml")))["pictures"] == {"4": EMBEDDED}
+    assert embedded(animate.write_page(load(tmp_path / "outer.toml")))["pictures"] == {"4": EMBEDDED}
     other = tmp_path / "other"
     other.mkdir()
     with pytest.raises(InputError, match=r"^bars\.output\.picture.*copy it there first[^\n]*$"):
@@ -60,7 +60,7 @@ def test_one_given_with_the_command_takes_its_place(tmp_path: Path) -> None:
     (tmp_path / "bar.png").write_bytes(PNG)
     (tmp_path / "other.png").write_bytes(PNG + b"x")
     scene = load(scene_file(tmp_path, "bar.png"))
-    shown = embedded(animate.page(scene, {"coupler": tmp_path / "other.png"}))["pictures"]["3"]
+    shown = embedded(animate.write_page(scene, {"coupler": tmp_path / "other.png"}))["pictures"]["3"]
     assert base64.b64decode(shown.partition(",")[2]) == PNG + b"x"
 
 

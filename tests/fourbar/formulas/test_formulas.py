@@ -19,18 +19,18 @@ from fourbar.formulas.arithmetic import (
     exact_difference,
     polar,
     power_of_two,
+    split_sum,
     square_root,
     tangent,
-    two_sum,
     vector,
 )
-from fourbar.formulas.many_digits import decided, limit_remainder
+from fourbar.formulas.many_digits import decide_half_angles, limit_remainder
 from fourbar.formulas.many_digits import half_angle as exact_half_angle
 from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import Coefficients, Rates, State, rates
-from fourbar.formulas.path import drive_sine, drive_sine_of_triangle, path, state
+from fourbar.formulas.path import compute_state, drive_sine, drive_sine_of_triangle, prepare_path
 from fourbar.formulas.pin_forces import Body, inertia_wrenches, pin_forces
-from fourbar.formulas.position import HalfAngle, close_loop, direction, half_angle, loop, parallel_pairs
+from fourbar.formulas.position import HalfAngle, close_loop, direction, find_parallel_pairs, half_angle, loop
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import MOVING_BARS, Bar, FourBar, uniform
 from tests.fourbar.formulas.test_points import Drawn, random_positions
@@ -112,7 +112,7 @@ def test_a_difference_of_two_sums_is_zero_where_it_is_zero_and_nowhere_else() ->
         found = Fraction(exact_difference(p, q, r, s))
         zeros += exact == 0
         assert abs(found - exact) <= THREE_SUMS * abs(exact), (p, q, r, s)
-        total, rest = two_sum(p, q)
+        total, rest = split_sum(p, q)
         assert total == p + q and Fraction(total) + Fraction(rest) == Fraction(p) + Fraction(q)
     assert zeros > 1000
 
@@ -162,13 +162,13 @@ def test_pairs_stay_parallel_on_one_side_of_the_change_points_alone() -> None:
     ):
         found = loop(*lengths)
         for branch, first, second in ((1, ahead, back), (-1, back, ahead)):
-            pairs = parallel_pairs(found, half_angle(found, psi), branch)
+            pairs = find_parallel_pairs(found, half_angle(found, psi), branch)
             assert [pair.tolist() for pair in pairs] == [first if together else neither, second if folded else neither]
 
 
 def read_from_the_output(drawn: Drawn) -> tuple[State, Any, Any]:
     """The state read in theta_2, and position and coefficients read in theta_4."""
-    moving, from_output = drawn.moving(), path(loop(*drawn.bars.lengths), drawn.bars.ground_angle, 4)
+    moving, from_output = drawn.moving(), prepare_path(loop(*drawn.bars.lengths), drawn.bars.ground_angle, 4)
     theta_4 = np.angle(moving.at.u4)
     # of the triangle B, A, O2: bars 3 and 2 there are as bars 4 and 3 in the order of theta_2
     sign = -np.sign((moving.at.u2 * moving.at.u3.conjugate()).imag)
@@ -208,7 +208,7 @@ def test_read_in_theta_4_the_input_stands_at_its_limit() -> None:
     """There theta_4 alone is an independent angle: the input has no speed and the output may have any."""
     bars = FourBar(0.5, Bar(0.4), Bar(0.3), Bar(0.25), 0.2)
     for limit in limit_positions(bars):
-        from_output = path(loop(*bars.lengths), bars.ground_angle, 4)
+        from_output = prepare_path(loop(*bars.lengths), bars.ground_angle, 4)
         sign = math.copysign(1.0, math.sin(limit.theta_3 - limit.theta_2))
         at, k = from_output.motion(
             from_output.position(limit.theta_4, from_output.half_angle(limit.theta_4), sign), sign
@@ -219,7 +219,7 @@ def test_read_in_theta_4_the_input_stands_at_its_limit() -> None:
 
 
 def test_read_in_theta_4_a_parallelogram_stays_parallel_exactly() -> None:
-    from_output = path(loop(0.3, 0.1, 0.3, 0.1), 0.0, 4)
+    from_output = prepare_path(loop(0.3, 0.1, 0.3, 0.1), 0.0, 4)
     theta_4 = np.array([1e-9, 0.5, 3.0])
     sign = -1.0  # of sin(theta_3 - theta_2): the coupler lies as the ground
     at, k = from_output.motion(from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign)
@@ -235,7 +235,7 @@ def test_the_sine_of_the_drive_is_that_of_the_two_bars_not_driven(lengths: tuple
     d, a, _, _ = lengths
     angles, u1 = np.linspace(-2.9, 3.0, 30), np.exp(0.4j)
     for bar, branch in itertools.product((2, 4), (1.0, -1.0)):
-        reading = path(loop(*lengths), 0.4, bar)
+        reading = prepare_path(loop(*lengths), 0.4, bar)
         with np.errstate(invalid="ignore"):  # read from the output the loop does not close at every angle
             at, _ = reading.motion(reading.position(angles, reading.half_angle(angles), branch), branch)
         closed = np.isfinite(at.sin_mu)
@@ -281,7 +281,7 @@ FUSED = 64.0 * U
 def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any, bar: int = 2) -> dict[str, Any]:
     """All that the formulas give, on the path in the angle of a bar."""
     lengths = loop(d, a, b, c)
-    from_output = path(lengths, theta_1, bar)
+    from_output = prepare_path(lengths, theta_1, bar)
     half = from_output.half_angle(q)
     at, k = from_output.motion(from_output.position(q, half, branch), branch)
     moving = rates(k, 2.0, -3.0)
@@ -451,7 +451,7 @@ def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
     bars, theta_2 = uniform(0.3, 0.1, 0.25, 0.22), np.linspace(0.1, 6.0, 7)
     half = half_angle(loop(*bars.lengths), theta_2)
     for offset in (None, mp.mpf("1e-3")):
-        found = decided(bars, 1.0, half, np.array([1, 4]), theta_2, offset)
+        found = decide_half_angles(bars, 1.0, half, np.array([1, 4]), theta_2, offset)
         for name, before, after in zip(half._fields, half, found, strict=True):
             exact = [getattr(exact_half_angle(bars, float(angle), offset), name) for angle in theta_2]
             assert after[[1, 4]].tolist() == [exact[1], exact[4]]
@@ -485,12 +485,12 @@ def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(bar: in
 
 def test_a_state_holds_what_it_was_made_from() -> None:
     bars, theta_2 = FourBar(0.3, Bar(0.1), Bar(0.25), Bar(0.22), 0.4), np.array([0.5, 1.0])
-    unit, moving = state(bars, theta_2, 1), state(bars, theta_2, 1, 3.0, -2.0)
+    unit, moving = compute_state(bars, theta_2, 1), compute_state(bars, theta_2, 1, 3.0, -2.0)
     assert unit.theta_1 == 0.4 and np.array_equal(unit.theta_2, theta_2)
     assert (unit.speed, unit.moving.omega_2, unit.moving.alpha_2) == (1.0, 1.0, 0.0)
     assert (moving.speed, moving.moving.omega_2, moving.moving.alpha_2) == (3.0, 3.0, -2.0)
     assert np.array_equal(unit.moving.omega_4, unit.k.h4) and np.array_equal(unit.moving.alpha_4, unit.k.dh4)
-    assert [path(unit.lengths, 0.4, bar).bar for bar in (2, 4)] == [2, 4]
+    assert [prepare_path(unit.lengths, 0.4, bar).bar for bar in (2, 4)] == [2, 4]
 
 
 def test_the_factor_that_changes_less_gives_the_other_its_digits() -> None:

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from fourbar.errors import InputError, NotAssembledError
-from fourbar.formulas.circuits import circuit_of, circuits, same_circuit
+from fourbar.formulas.circuits import circuits, find_circuit, is_same_circuit
 from fourbar.formulas.linkage_type import classify
 from fourbar.formulas.mobility import (
     change_points,
-    default_range,
-    intervals,
+    choose_range,
+    find_intervals,
+    follow_smooth_path,
     limit_positions,
-    on_smooth_path,
     swing,
     time_ratio,
     turns_fully,
 )
-from fourbar.formulas.path import smooth_branch, state
+from fourbar.formulas.path import compute_state, find_smooth_branch
 from fourbar.formulas.position import loop
 from fourbar.linkage import Bar, FourBar, uniform
 
@@ -60,7 +60,7 @@ def closes(bars: FourBar, theta_2: np.ndarray) -> np.ndarray:
 
 
 def angle(bars: FourBar, theta_2: np.ndarray, branch: int | np.ndarray, bar: int) -> np.ndarray:
-    return np.angle(state(bars, theta_2, branch).direction(bar))
+    return np.angle(compute_state(bars, theta_2, branch).direction(bar))
 
 
 def inside(angle: np.ndarray, ranges: tuple[tuple[float, float], ...]) -> np.ndarray:
@@ -80,7 +80,7 @@ def test_thesis_limits_of_the_input() -> None:
     # theta_4 of chapter 2 (from B to O4) is ours + 180 deg
     assert (math.degrees(limits[0].theta_4) + 180.0) % 360.0 == pytest.approx(105.98752759110246, abs=PRINTED_8)
     assert (math.degrees(limits[1].theta_4) + 180.0) % 360.0 == pytest.approx(344.01247240889757, abs=PRINTED_8)
-    assert np.degrees(default_range(THESIS)) == pytest.approx([85.61804062253105, 364.38195937746895], abs=PRINTED_8)
+    assert np.degrees(choose_range(THESIS)) == pytest.approx([85.61804062253105, 364.38195937746895], abs=PRINTED_8)
     assert math.degrees(swing(THESIS, 2)) == pytest.approx(280.7639187549379, abs=PRINTED_8)
 
 
@@ -145,7 +145,7 @@ def test_a_structure_stands_in_one_position() -> None:
         bars = linkage(*lengths, theta_1=0.3)
         assert classify(bars).code == "structure" and classify(bars).turning == ()
         (limit,) = limit_positions(bars)
-        start, stop = default_range(bars)
+        start, stop = choose_range(bars)
         assert start == stop == limit.theta_2
         assert closes(bars, np.array([start]))[0] == pytest.approx(0.0, abs=12.0 * EPS)
 
@@ -155,7 +155,7 @@ def test_ranges_and_circuits_agree_with_a_scan(bars: FourBar) -> None:
     theta_2 = bars.ground_angle + (np.arange(GRID) + 0.5) * (2 * math.pi / GRID)
     margin = closes(bars, theta_2)
     sure = np.abs(margin) > 16.0 * EPS * sum(bars.lengths)
-    assert (inside(theta_2, intervals(bars))[sure] == (margin >= 0.0)[sure]).all()
+    assert (inside(theta_2, find_intervals(bars))[sure] == (margin >= 0.0)[sure]).all()
     assert turns_fully(bars) == bool((margin[sure] >= 0.0).all())
 
     # positions as a graph: neighbours on a branch, both branches next to a gap or across a change point
@@ -178,7 +178,7 @@ def test_ranges_and_circuits_agree_with_a_scan(bars: FourBar) -> None:
             node[root((i, 1))] = root((i, -1))
     assert len({root(x) for x in node}) == len(circuits(bars))
     places = np.array(sorted(node))
-    numbers = circuit_of(bars, theta_2[places[:, 0]], places[:, 1].astype(np.int8))
+    numbers = find_circuit(bars, theta_2[places[:, 0]], places[:, 1].astype(np.int8))
     for x, number in zip(places[:: GRID // 50], numbers[:: GRID // 50], strict=True):
         same = root(tuple(x.tolist())) == root(tuple(places[0].tolist()))
         assert same == (number == numbers[0])
@@ -192,21 +192,21 @@ def test_circuits_of_grashof_linkages_by_the_angle_that_never_closes() -> None:
         if found.surplus <= 0.0:
             continue
         seen.add(found.barker)
-        theta_2 = np.concatenate([np.linspace(*ends, 41)[1:-1] for ends in intervals(bars)])
+        theta_2 = np.concatenate([np.linspace(*ends, 41)[1:-1] for ends in find_intervals(bars)])
         for branch in (1, -1):
-            sin_mu = state(bars, theta_2, branch).at.sin_mu
+            sin_mu = compute_state(bars, theta_2, branch).at.sin_mu
             sine = np.sin(theta_2 - bars.ground_angle) if found.shortest in (3, 4) else sin_mu
-            assert ((sine > 0.0) == (circuit_of(bars, theta_2, branch) == 0)).all()
+            assert ((sine > 0.0) == (find_circuit(bars, theta_2, branch) == 0)).all()
     assert seen == {1, 2, 3, 4}
 
 
 def test_same_circuit_refuses_a_position_that_does_not_exist() -> None:
     crank_rocker, rocker = uniform(3, 1, 2.5, 2.2), uniform(3, 2.5, 1, 2.2)
-    assert same_circuit(crank_rocker, (0.1, 1), (3.0, 1)) and not same_circuit(crank_rocker, (0.1, 1), (3.0, -1))
-    start, stop = default_range(rocker)
-    assert same_circuit(rocker, (start, 1), (stop, -1)) and not same_circuit(rocker, (start, 1), (-start, 1))
+    assert is_same_circuit(crank_rocker, (0.1, 1), (3.0, 1)) and not is_same_circuit(crank_rocker, (0.1, 1), (3.0, -1))
+    start, stop = choose_range(rocker)
+    assert is_same_circuit(rocker, (start, 1), (stop, -1)) and not is_same_circuit(rocker, (start, 1), (-start, 1))
     with pytest.raises(NotAssembledError, match=r"theta_2 = 3\.0"):
-        same_circuit(rocker, (start, 1), (3.0, 1))
+        is_same_circuit(rocker, (start, 1), (3.0, 1))
 
 
 def exact_psi(bars: FourBar, bar: int, stretched: bool) -> mp.mpf:
@@ -277,7 +277,7 @@ def test_swing_is_what_a_scan_of_the_output_finds() -> None:
         if change_points(bars):
             continue  # there the output's range is that of several smooth paths
         seen.add(classify(bars).code[:4])
-        start, stop = intervals(bars)[0]
+        start, stop = find_intervals(bars)[0]
         phase = np.arange(0.5, SCAN) * (math.pi / SCAN)
         theta_2 = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(phase)  # dense where theta_4 goes as a root
         branches = (1,) if turns_fully(bars) else (1, -1)
@@ -295,12 +295,14 @@ def test_ranges_of_coupler_and_output_hold_every_position_and_no_more() -> None:
         theta_2 = theta_2[closes(bars, theta_2) > 0.0]
         for bar in (3, 4):
             reached = np.concatenate([angle(bars, theta_2, branch, bar) for branch in (1, -1)])
-            clear = np.min([np.abs(np.sin(0.5 * (reached - end))) for end in np.ravel(intervals(bars, bar))], axis=0)
-            assert inside(reached[clear > 1e-6], intervals(bars, bar)).all()
+            clear = np.min(
+                [np.abs(np.sin(0.5 * (reached - end))) for end in np.ravel(find_intervals(bars, bar))], axis=0
+            )
+            assert inside(reached[clear > 1e-6], find_intervals(bars, bar)).all()
             # the first range holds the ground's direction (bar 4: its opposite) or begins less than pi after it
-            first, half = intervals(bars, bar)[0][0], math.pi if bar == 4 else 0.0
+            first, half = find_intervals(bars, bar)[0][0], math.pi if bar == 4 else 0.0
             assert abs(first - (bars.ground_angle + half)) <= math.pi * (1.0 + EPS)
-            for start, stop in intervals(bars, bar):
+            for start, stop in find_intervals(bars, bar):
                 for end in (start, stop) if not turns_fully(bars, bar) else ():
                     # theta_k goes as a square root near its limit's theta_2, or is tangent to it
                     assert np.abs(np.sin(0.5 * (reached - end))).min() < 20.0 * math.pi / GRID
@@ -310,7 +312,7 @@ def test_time_ratio_is_the_time_of_both_strokes() -> None:
     bars = uniform(3.0, 1.0, 2.5, 2.2)
     n = 200_000
     theta_2 = (np.arange(n) + 0.5) * (2 * math.pi / n)
-    at = state(bars, theta_2, 1).at
+    at = compute_state(bars, theta_2, 1).at
     ahead = np.count_nonzero(np.sin(theta_2 - np.angle(at.u3)) * at.sin_mu > 0.0)  # omega_4 > 0
     ratio = max(ahead, n - ahead) / min(ahead, n - ahead)
     assert time_ratio(bars) == pytest.approx(ratio, rel=8.0 / n)  # both ends counted to one step
@@ -334,12 +336,12 @@ def test_the_smooth_path_has_no_corner(lengths: tuple[float, ...], backwards: bo
     if turns_fully(bars):
         theta_2 = 0.4 + (np.arange(2400) + 0.5) * (4 * math.pi / 2400)
     else:
-        theta_2 = np.linspace(*default_range(bars), 1200)
+        theta_2 = np.linspace(*choose_range(bars), 1200)
     theta_2 = theta_2[::-1] if backwards else theta_2
-    branch = on_smooth_path(bars, theta_2, 1)
+    branch = follow_smooth_path(bars, theta_2, 1)
     assert branch[0] == 1 and (branch == -1).any()
     # at one position alone, without the sweep before it: the same path, or the one that crosses it
-    alone = smooth_branch(loop(*bars.lengths), theta_2 - 0.4, 1.0)
+    alone = find_smooth_branch(loop(*bars.lengths), theta_2 - 0.4, 1.0)
     assert np.array_equal(alone * alone[0], branch)
     largest = {True: 0.0, False: 0.0}
     for smooth in (True, False):
@@ -354,26 +356,26 @@ def test_the_smooth_path_has_no_corner(lengths: tuple[float, ...], backwards: bo
 def test_a_sweep_on_a_change_point_is_before_it() -> None:
     bars = uniform(2, 1, 2, 1)  # change points at 0 and pi
     quarter = np.arange(5) * (math.pi / 2)
-    assert on_smooth_path(bars, quarter, 1).tolist() == [1, -1, -1, 1, 1]
-    assert on_smooth_path(bars, quarter[::-1], 1).tolist() == [1, -1, -1, 1, 1]
-    assert on_smooth_path(bars, np.array([-1.0, 0.0, -1.0]), 1).tolist() == [1, 1, 1]  # touched, then back
-    assert on_smooth_path(bars, np.array([-1.0, 0.0, 1.0]), -1).tolist() == [-1, -1, 1]
-    assert on_smooth_path(bars, np.array([1.0, 1.0, 1.0]), -1).tolist() == [-1, -1, -1]
-    assert on_smooth_path(bars, np.array([1.0]), 1).dtype == np.int8
-    assert (on_smooth_path(uniform(3, 1, 2.5, 2.2), quarter, -1) == -1).all()
+    assert follow_smooth_path(bars, quarter, 1).tolist() == [1, -1, -1, 1, 1]
+    assert follow_smooth_path(bars, quarter[::-1], 1).tolist() == [1, -1, -1, 1, 1]
+    assert follow_smooth_path(bars, np.array([-1.0, 0.0, -1.0]), 1).tolist() == [1, 1, 1]  # touched, then back
+    assert follow_smooth_path(bars, np.array([-1.0, 0.0, 1.0]), -1).tolist() == [-1, -1, 1]
+    assert follow_smooth_path(bars, np.array([1.0, 1.0, 1.0]), -1).tolist() == [-1, -1, -1]
+    assert follow_smooth_path(bars, np.array([1.0]), 1).dtype == np.int8
+    assert (follow_smooth_path(uniform(3, 1, 2.5, 2.2), quarter, -1) == -1).all()
 
 
 def test_a_position_on_a_change_point_belongs_to_the_side_it_is_reached_from() -> None:
     bars = uniform(2, 1, 2, 1)
-    assert on_smooth_path(bars, np.array([-1.0, 0.5, 0.0, 0.5]), 1).tolist() == [1, -1, -1, -1]
-    assert on_smooth_path(bars, np.array([0.5, -1.0, 0.0, -1.0]), 1).tolist() == [1, -1, -1, -1]
+    assert follow_smooth_path(bars, np.array([-1.0, 0.5, 0.0, 0.5]), 1).tolist() == [1, -1, -1, -1]
+    assert follow_smooth_path(bars, np.array([0.5, -1.0, 0.0, -1.0]), 1).tolist() == [1, -1, -1, -1]
 
 
 def test_a_single_precision_angle_next_to_a_change_point_is_next_to_it() -> None:
     bars = linkage(2, 1, 2, 1, 0.4)
     near = np.array([0.4, 0.5], dtype=np.float32)  # 6e-9 beyond 0.4
     assert near[0].item() > 0.4
-    assert on_smooth_path(bars, near, 1).tolist() == [1, 1]
+    assert follow_smooth_path(bars, near, 1).tolist() == [1, 1]
 
 
 def test_change_points_lie_along_the_ground_and_opposite() -> None:
@@ -413,21 +415,21 @@ def test_a_change_point_is_met_in_spite_of_rounding() -> None:
         bars = linkage(2, 1, 2, 1, float(theta_1))
         quarters = np.linspace(theta_1, theta_1 + 40 * math.pi, 81)
         expected = [1, -1, -1, 1] * 20 + [1]
-        assert on_smooth_path(bars, quarters, 1).tolist() == expected
-        assert on_smooth_path(bars, quarters[::-1], 1).tolist() == expected
+        assert follow_smooth_path(bars, quarters, 1).tolist() == expected
+        assert follow_smooth_path(bars, quarters[::-1], 1).tolist() == expected
 
 
 def test_a_range_narrower_than_two_margins_is_halved() -> None:
     bars = linkage(6.0, 1.0, 2.0, 3.0001, 0.3)  # 1e-4 beyond a structure
-    (start, stop), (low, high) = intervals(bars)[0], default_range(bars)
+    (start, stop), (low, high) = find_intervals(bars)[0], choose_range(bars)
     assert 0.0 < stop - start < math.radians(4.0)
     assert (low - start, stop - high) == pytest.approx(2 * [(stop - start) / 4.0], rel=1e-12)
 
 
 def test_the_default_range_is_as_wide_as_the_contract_says() -> None:
-    assert default_range(uniform(3, 1, 2.5, 2.2)) == (0.0, 2 * math.pi)
+    assert choose_range(uniform(3, 1, 2.5, 2.2)) == (0.0, 2 * math.pi)
     for bars in random_linkages(7, 100):
-        start, stop = default_range(bars)
+        start, stop = choose_range(bars)
         if turns_fully(bars):
             continue
         touching = -16.0 * EPS * sum(bars.lengths)  # at a change point the bars just meet

@@ -11,7 +11,7 @@ import fourbar
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.many_digits import limit_remainder
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import singular, state
+from fourbar.formulas.path import compute_state, find_singular
 
 EPS = 2.0**-52
 LENGTHS = (0.3, 0.1, 0.25, 0.22)
@@ -58,7 +58,7 @@ def newton(link: fourbar.FourBar, theta_2: mpmath.mpf, start: tuple[float, float
 def test_the_loop_closes_on_the_requested_branch(lengths: tuple[float, ...], branch: int, theta_1: float) -> None:
     d, a, b, c = lengths
     link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
-    moving = state(link, theta_1 + ANGLES, branch)
+    moving = compute_state(link, theta_1 + ANGLES, branch)
     e2, e3, e4 = (np.exp(1j * angle(moving, bar)) for bar in (2, 3, 4))
     gap = a * e2 + b * e3 - d * cmath.exp(1j * theta_1) - c * e4
     assert np.max(np.abs(gap)) <= CLOSURE * sum(lengths)
@@ -68,7 +68,7 @@ def test_the_loop_closes_on_the_requested_branch(lengths: tuple[float, ...], bra
 
 def test_velocity_and_acceleration_are_differences_of_the_position() -> None:
     link, omega, alpha = linkage(), 3.0, -7.0
-    moving = state(link, np.array([1.1]), -1, omega, alpha)
+    moving = compute_state(link, np.array([1.1]), -1, omega, alpha)
     start = (float(angle(moving, 3)[0]), float(angle(moving, 4)[0]))
     with mpmath.workdps(50):
         h = mpmath.mpf("1e-12")
@@ -82,7 +82,7 @@ def test_velocity_and_acceleration_are_differences_of_the_position() -> None:
 
 def test_mirror_image() -> None:
     """Mirrored at the ground line: angles change sign, and so does the branch."""
-    up, down = state(linkage(0.0), ANGLES, 1), state(linkage(0.0), -ANGLES, -1)
+    up, down = compute_state(linkage(0.0), ANGLES, 1), compute_state(linkage(0.0), -ANGLES, -1)
     for bar in (3, 4):
         assert np.array_equal(angle(up, bar), -angle(down, bar))
 
@@ -93,7 +93,7 @@ def test_parallel_bars_are_exact_near_the_change_point(lengths: tuple[float, ...
     link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
     parallelogram = a == c
     for delta in (1e-8, 1e-4, 0.5):
-        moving = state(link, np.array([math.pi - delta]), 1 if parallelogram else -1, 2.0)
+        moving = compute_state(link, np.array([math.pi - delta]), 1 if parallelogram else -1, 2.0)
         expected = (0.0, 2.0) if parallelogram else (2.0, 0.0)
         assert (moving.omega(3)[0], moving.omega(4)[0]) == expected
         assert (moving.alpha(3)[0], moving.alpha(4)[0]) == (0.0, 0.0)
@@ -101,7 +101,7 @@ def test_parallel_bars_are_exact_near_the_change_point(lengths: tuple[float, ...
 
 def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
     link = fourbar.uniform(1.0, 1.0, 0.4, 0.4)
-    moving = state(link, np.array([0.5, 2.0]), 1)
+    moving = compute_state(link, np.array([0.5, 2.0]), 1)
     assert assembled(moving).tolist() == [True, False]
     for value in (angle(moving, 3), moving.omega(3), moving.alpha(4), moving.point(3, 0.1)):
         assert np.isnan(value).tolist() == [False, True]
@@ -160,10 +160,10 @@ def test_points_move_as_their_positions_do(point: tuple[float, float], theta_1: 
     angles = np.linspace(0.3, 6.0, 9)
 
     def at(t: float) -> State:
-        return state(link, angles + omega * t + 0.5 * alpha * t * t, 1)
+        return compute_state(link, angles + omega * t + 0.5 * alpha * t * t, 1)
 
     z = complex(*point)
-    moving = state(link, angles, 1, omega, alpha)
+    moving = compute_state(link, angles, 1, omega, alpha)
     d, a, b, c = link.lengths
     e2, e3, e4 = (np.exp(1j * angle(moving, bar)) for bar in (2, 3, 4))
     O4 = d * cmath.exp(1j * theta_1)
@@ -185,7 +185,10 @@ def test_points_move_as_their_positions_do(point: tuple[float, float], theta_1: 
 
 @pytest.mark.parametrize("branch", [1, -1])
 def test_slip_at_a_pin_is_the_difference_of_its_two_bars(branch: int) -> None:
-    unit, growing = state(linkage(), ANGLES, branch, 1.0, 0.0), state(linkage(), ANGLES, branch, 0.0, 1.0)
+    unit, growing = (
+        compute_state(linkage(), ANGLES, branch, 1.0, 0.0),
+        compute_state(linkage(), ANGLES, branch, 0.0, 1.0),
+    )
     for pin, (i, j) in fourbar.linkage.PINS.items():
         assert unit.slip(pin) == pytest.approx(unit.omega(j) - unit.omega(i), abs=CLOSURE)
         assert unit.slip(pin) == pytest.approx(growing.alpha(j) - growing.alpha(i), abs=CLOSURE)
@@ -197,7 +200,7 @@ def test_speeds_given_one_by_one_are_speeds_given_at_once() -> None:
     """Zero at every position, as a number or as an array, is the same motion; the ground does not move."""
     states = []
     for omega, alpha in ((3.0, 0.0), (np.full(5, 3.0), np.zeros(5)), (3, 0)):
-        states.append(state(linkage(), np.linspace(0.3, 6.0, 5), 1, omega, alpha))
+        states.append(compute_state(linkage(), np.linspace(0.3, 6.0, 5), 1, omega, alpha))
         assert states[-1].omega(1) == 0.0 and states[-1].alpha(1) == 0.0 and states[-1].coefficient(1) == 0.0
     for other in states[1:]:
         for bar in (2, 3, 4):
@@ -209,7 +212,7 @@ def test_speeds_given_one_by_one_are_speeds_given_at_once() -> None:
 def test_the_cosine_at_B_is_that_of_the_two_bars() -> None:
     for lengths, branch in ((LENGTHS, 1), (LENGTHS, -1), ((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1)):
         d, a, b, c = lengths
-        moving = state(fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.4), ANGLES, branch)
+        moving = compute_state(fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.4), ANGLES, branch)
         ok = assembled(moving)
         expected = np.cos(angle(moving, 4) - angle(moving, 3))
         assert dot(moving.at.u3, moving.at.u4)[ok] == pytest.approx(expected[ok], abs=64 * EPS)
@@ -219,32 +222,32 @@ def test_the_cosine_at_B_is_that_of_the_two_bars() -> None:
 def test_singular_positions_have_no_speed_and_their_neighbours_keep_theirs() -> None:
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     theta_2 = np.array([0.0, 1.0, math.pi])
-    moving = state(link, theta_2, 1, 2.0, 5.0)
-    assert singular(moving.at).tolist() == [True, False, True] and assembled(moving).all()
+    moving = compute_state(link, theta_2, 1, 2.0, 5.0)
+    assert find_singular(moving.at).tolist() == [True, False, True] and assembled(moving).all()
     assert np.isnan(moving.at.root).tolist() == [True, False, True]
     assert np.isfinite(moving.at.sin_mu).all() and np.isfinite(moving.at.u3).all()
     for bar in (3, 4):
         assert np.isnan(moving.omega(bar)).tolist() == [True, False, True]
     assert (moving.omega(4)[1], moving.alpha(4)[1], moving.alpha(3)[1]) == (2.0, 5.0, 0.0)
-    still = state(link, theta_2, 1, 2.0)
+    still = compute_state(link, theta_2, 1, 2.0)
     assert np.isnan(still.alpha(3)).tolist() == np.isnan(still.alpha(4)).tolist() == [True, False, True]
-    assert not singular(state(linkage(), ANGLES, 1).at).any()
+    assert not find_singular(compute_state(linkage(), ANGLES, 1).at).any()
 
 
 @pytest.mark.parametrize("lengths", [(3, 1, 2, 2), (0.99, 0.97, 0.98, 0.98)])
 def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths: tuple[float, ...]) -> None:
     theta_2 = math.pi + 2.0 * EPS * np.arange(5)  # the next doubles after pi
-    moving = state(fourbar.uniform(*lengths), theta_2, 1)
+    moving = compute_state(fourbar.uniform(*lengths), theta_2, 1)
     assert (moving.at.sin_mu > 0.0).all() and (moving.at.sin_mu < 8.0 * EPS).all()
-    assert singular(moving.at).all() and np.isnan(moving.omega(3)).all()
-    assert not singular(state(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).at).any()
+    assert find_singular(moving.at).all() and np.isnan(moving.omega(3)).all()
+    assert not find_singular(compute_state(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).at).any()
 
 
 def test_branches_may_differ_from_position_to_position() -> None:
     branches = np.where(np.arange(41) % 3 == 0, -1, 1).astype(np.int8)
-    mixed = state(linkage(), ANGLES, branches, 2.0, 1.0)
+    mixed = compute_state(linkage(), ANGLES, branches, 2.0, 1.0)
     for branch in (1, -1):
-        alone = state(linkage(), ANGLES, branch, 2.0, 1.0)
+        alone = compute_state(linkage(), ANGLES, branch, 2.0, 1.0)
         which = branches == branch
         for bar in (3, 4):
             assert np.array_equal(mixed.direction(bar)[which], alone.direction(bar)[which])
@@ -273,7 +276,7 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
     link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), theta_1)
     theta_2 = theta_1 + math.pi * half_turn + np.array([1e-9, 0.5, 2.0])
     branch = -branch if half_turn else branch
-    moving = state(link, theta_2, branch, 2.0, 3.0)
+    moving = compute_state(link, theta_2, branch, 2.0, 3.0)
     u1, u2 = cmath.exp(1j * theta_1), moving.at.u2
     together = a == c
     directions, speeds, growths = (
@@ -291,7 +294,7 @@ def test_a_kite_whose_A_lies_on_O4_has_no_speed_there_and_no_warning() -> None:
     """a = d, b = c: at theta_2 = theta_1 bars 3 and 4 lie on each other and turn freely."""
     link = fourbar.uniform(0.3, 0.3, 0.2, 0.2)
     for branch in (1, -1):
-        moving = state(link, np.array([0.0, 0.5]), branch, 2.0, 3.0)
+        moving = compute_state(link, np.array([0.0, 0.5]), branch, 2.0, 3.0)
         for value in (moving.omega(3), moving.omega(4), moving.alpha(3), moving.alpha(4)):
             assert np.isfinite(value).tolist() == [False, True]
 
@@ -306,22 +309,27 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch: int, the
     for psi, towards in ((0.0, 1.0), *((side * psi, side) for psi in (1e-170, 1e-157) for side in (1.0, -1.0))):
         if psi != 0.0 and theta_1 != 0.0:
             continue
-        on, near = (state(link, theta_1 + np.array([psi, 0.5]), branch, 2.0, 3.0) for psi in (psi, towards * step))
+        on, near = (
+            compute_state(link, theta_1 + np.array([psi, 0.5]), branch, 2.0, 3.0) for psi in (psi, towards * step)
+        )
         for bar in (3, 4):
             assert on.direction(bar) == pytest.approx(near.direction(bar), abs=2.0 * step)
-        assert singular(on.at).tolist() == [True, False]
+        assert find_singular(on.at).tolist() == [True, False]
         assert np.isnan(on.omega(3)).tolist() == np.isnan(on.alpha(4)).tolist() == [True, False]
     # with b and c unlike each other nothing closes there
-    assert not assembled(state(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)).any()
+    assert not assembled(compute_state(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)).any()
 
 
 def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
     """Bars 3 and 4 of a parallelogram lie as its ground and input do: so does the angle between them."""
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    at = state(link, np.linspace(0.01, 3.1, 200), 1).at
+    at = compute_state(link, np.linspace(0.01, 3.1, 200), 1).at
     assert np.array_equal(at.sin_mu, at.u2.imag) and np.array_equal(dot(at.u3, at.u4), at.u2.real)
     # 8 EPS has no digit left, the next double has
-    assert singular(state(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).at).tolist() == [True, False]
+    assert find_singular(compute_state(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).at).tolist() == [
+        True,
+        False,
+    ]
 
 
 def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
@@ -330,12 +338,12 @@ def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
     for least, most in ((0.7, 2.0), (0.02, 0.03), (1.1, 1.3)):
         d, a = (4.0 * EPS * b * part for part in (most + least, most - least))
         link = fourbar.uniform(d, a, b, b)
-        moving = state(link, psi, 1, 2.0)
+        moving = compute_state(link, psi, 1, 2.0)
         e = np.abs(d - a * np.exp(1j * psi))
-        assert assembled(moving).all() and np.array_equal(singular(moving.at), e / b <= 8.0 * EPS)
-        assert np.array_equal(np.isnan(moving.omega(3)), singular(moving.at))
+        assert assembled(moving).all() and np.array_equal(find_singular(moving.at), e / b <= 8.0 * EPS)
+        assert np.array_equal(np.isnan(moving.omega(3)), find_singular(moving.at))
         status = fourbar.solve(fourbar.Scene(link, fourbar.Motion(psi, 2.0))).status
-        assert [each == "singular" for each in status] == singular(moving.at).tolist()
+        assert [each == "singular" for each in status] == find_singular(moving.at).tolist()
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 1.2, -2.9])

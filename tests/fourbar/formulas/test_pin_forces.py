@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects.actions import Actions, bodies
-from fourbar.evaluation.case import state_at
+from fourbar.effects.actions import Actions, list_bodies
+from fourbar.evaluation.case import compute_state
 from fourbar.formulas.arithmetic import cross, dot
+from fourbar.formulas.path import compute_state as state_of
 from fourbar.formulas.path import drive_sine
-from fourbar.formulas.path import state as state_of
-from fourbar.formulas.pin_forces import Wrenches, between
-from fourbar_validation.lab.stress.bench import bodies_of, command, example
+from fourbar.formulas.pin_forces import Wrenches, solve_between
+from fourbar_validation.lab.stress.bench import make_bodies, make_command, make_example
 from fourbar_validation.published.thirteen import assemble, solve_thirteen
 
 EPS = 2.0**-52
@@ -42,9 +42,9 @@ def scene(drive_bar: int) -> fourbar.Scene:
 
 
 def test_the_thirteen_equations_give_the_same() -> None:
-    at = command(50)
-    bodies = bodies_of(example(), at)
-    unknowns, solution = solve_thirteen(bodies, 2), fourbar.solve(example(), at=at)
+    at = make_command(50)
+    bodies = make_bodies(make_example(), at)
+    unknowns, solution = solve_thirteen(bodies, 2), fourbar.solve(make_example(), at=at)
     for name, column in (("F12", 0), ("F32", 2), ("F43", 6), ("F14", 8)):
         ours = getattr(solution, name)
         assert np.max(np.abs(unknowns[:, column : column + 2] - ours)) <= SOLVED * np.max(np.abs(ours))
@@ -62,7 +62,7 @@ def test_power_in_equals_power_out(drive_bar: int) -> None:
     """
     case = scene(drive_bar)
     s = fourbar.solve(case)
-    actions = Actions(state_at(case, fourbar.command(case)), bodies(case.linkage))
+    actions = Actions(compute_state(case, fourbar.command(case)), list_bodies(case.linkage))
     for term in (*case.loads, *case.effects):
         term.act(actions, actions.state)
     acting = actions.wrenches(Wrenches())
@@ -147,7 +147,7 @@ def test_bars_without_mass_or_inertia(bodies: tuple[tuple[float, float], ...], a
     bars = (fourbar.Bar(x, *body, (0.4 * x, 0.3)) for x, body in zip((0.1, 0.25, 0.22), bodies, strict=True))
     case = fourbar.Scene(fourbar.FourBar(0.3, *bars), fourbar.Motion(0.0, 10.0), drive_bar)
     at = fourbar.scene.Command(np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, alpha)
-    unknowns, solution = solve_thirteen(bodies_of(case, at), drive_bar), fourbar.solve(case, at=at)
+    unknowns, solution = solve_thirteen(make_bodies(case, at), drive_bar), fourbar.solve(case, at=at)
     size = np.max(np.abs(unknowns[:, :12])) / np.min(np.abs(solution.drive_condition))
     for name, column in (("F12", 0), ("F32", 2), ("F43", 6), ("F14", 8)):
         assert np.max(np.abs(unknowns[:, column : column + 2] - getattr(solution, name))) <= SOLVED * size
@@ -158,8 +158,8 @@ def test_a_centre_one_metre_from_its_bar() -> None:
     """Across the bar by exactly 1 m, and not along it."""
     across = fourbar.Bar(0.25, 0.5, 0.1, (1.0, math.pi / 2))
     case = fourbar.Scene(fourbar.FourBar(0.3, fourbar.Bar(0.1), across, fourbar.Bar(0.22)), fourbar.Motion(0.0, 10.0))
-    at = command(9)
-    unknowns, solution = solve_thirteen(bodies_of(case, at), 2), fourbar.solve(case, at=at)
+    at = make_command(9)
+    unknowns, solution = solve_thirteen(make_bodies(case, at), 2), fourbar.solve(case, at=at)
     assert np.max(np.abs(unknowns[:, 12] - solution.torque)) <= SOLVED * np.max(np.abs(unknowns[:, 12]))
 
 
@@ -194,7 +194,7 @@ def test_all_that_acts_grows_and_the_forces_with_it(drive_bar: int) -> None:
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(pin: str, drive_bar: int) -> None:
     """With the couples mu r |F| of the forces found, the thirteen equations give these forces again."""
-    case = fourbar.Scene(example().linkage, fourbar.Motion(0.0, 10.0), drive_bar, effects=(fourbar.Gravity(),))
+    case = fourbar.Scene(make_example().linkage, fourbar.Motion(0.0, 10.0), drive_bar, effects=(fourbar.Gravity(),))
     at = fourbar.scene.Command(np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, 0.0)
     s = fourbar.solve(
         replace(case, effects=(*case.effects, fourbar.effects.PinFriction.at(**{pin: (0.1, 0.02)}))), at=at
@@ -202,7 +202,7 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(pi
     (i, j), force = {"O2": ((1, 2), s.F12), "A": ((2, 3), s.F32), "B": ((3, 4), s.F43), "O4": ((1, 4), s.F14)}[pin]
     rate = {1: 0.0, 2: s.omega_2, 3: s.omega_3, 4: s.omega_4}
     couple = 0.1 * 0.02 * np.hypot(*force.T) * np.sign(rate[j] - rate[i])
-    bodies = bodies_of(case, at)
+    bodies = make_bodies(case, at)
     for bar, of in ((i, 1.0), (j, -1.0)):
         if bar != 1:
             bodies.inertia_moment[bar][:] -= of * couple
@@ -216,8 +216,8 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(pi
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_the_sine_of_a_drive_is_that_of_two_directions(drive_bar: int) -> None:
     """Of the two bars that are not driven."""
-    at = command(5)._replace(angle=np.linspace(0.1, 6.0, 5))
-    s, found = fourbar.solve(example(), "position", at=at), state_of(example().linkage, at.theta_2, 1).at
+    at = make_command(5)._replace(angle=np.linspace(0.1, 6.0, 5))
+    s, found = fourbar.solve(make_example(), "position", at=at), state_of(make_example().linkage, at.theta_2, 1).at
     angle = {2: at.theta_2, 3: s.theta_3, 4: s.theta_4}
     one, other = (k for k in (2, 3, 4) if k != drive_bar)
     assert drive_sine(found, drive_bar) == pytest.approx(np.sin(angle[other] - angle[one]), abs=8 * EPS)
@@ -226,7 +226,7 @@ def test_the_sine_of_a_drive_is_that_of_two_directions(drive_bar: int) -> None:
 def test_a_force_between_two_bars_in_line_does_not_exist() -> None:
     u, v = np.array([1.0, 1.0, 1.0]), np.array([1.0, 1j, 0.6 + 0.8j])
     with np.errstate(all="ignore"):
-        force = between(2.0, 3.0, u, v, cross(u, v))
+        force = solve_between(2.0, 3.0, u, v, cross(u, v))
     assert not np.isfinite(force[0])
     u, v, force = u[1:], v[1:], force[1:]
     assert cross(u, force) == pytest.approx([2.0, 2.0]) and cross(v, force) == pytest.approx([3.0, 3.0])

@@ -9,9 +9,9 @@ import pytest
 
 from fourbar.errors import InputError
 from fourbar.formulas.circuits import circuits
-from fourbar.formulas.mobility import intervals, turns_fully
+from fourbar.formulas.mobility import find_intervals, turns_fully
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import state
+from fourbar.formulas.path import compute_state
 from fourbar.formulas.points import Centre, coupler_curve, instant_centres, point_coefficients
 from fourbar.linkage import Bar, FourBar
 
@@ -32,7 +32,7 @@ class Drawn(NamedTuple):
     branch: int
 
     def moving(self, omega_2: float = 1.0, alpha_2: float = 0.0) -> State:
-        return state(self.bars, self.theta_2, self.branch, omega_2, alpha_2)
+        return compute_state(self.bars, self.theta_2, self.branch, omega_2, alpha_2)
 
     @property
     def sine(self) -> float:
@@ -48,7 +48,7 @@ def random_positions(seed: int, count: int, least_sine: float = 0.05) -> list[Dr
         if 2.0 * max(d, a, b, c) > d + a + b + c - 0.01:
             continue
         bars = FourBar(d, Bar(a), Bar(b), Bar(c), float(rng.uniform(-math.pi, math.pi)))
-        start, stop = intervals(bars)[-1]
+        start, stop = find_intervals(bars)[-1]
         drawn = Drawn(bars, rng.uniform(start, stop, 1), int(rng.choice([-1, 1])))
         if drawn.sine > least_sine:
             found.append(drawn)

@@ -6,10 +6,10 @@ import pytest
 from mpmath import mpf
 
 from fourbar.formulas.arithmetic import cross, dot
-from fourbar.formulas.motion import State, coefficients, rates, with_parallel_pairs, with_sines_of_rates
-from fourbar.formulas.path import drive_sine, path, state
+from fourbar.formulas.motion import State, coefficients, put_parallel_pairs, rates, take_sines_of_rates
+from fourbar.formulas.path import compute_state, drive_sine, prepare_path
 from fourbar.formulas.pin_forces import Body, Wrenches, coupler_about_B, pin_forces
-from fourbar.formulas.position import Loop, close_loop, direction, half_angle, loop, parallel_pairs
+from fourbar.formulas.position import Loop, close_loop, direction, find_parallel_pairs, half_angle, loop
 from fourbar.linkage import uniform
 
 FEW_ROUNDINGS = 8.0 * 2.0**-52
@@ -51,7 +51,7 @@ def differences(lengths: tuple[float, ...], psi: float, branch: int) -> list[mpf
 def test_coefficients_keep_their_digits_where_the_diagonal_is_short(
     lengths: tuple[float, ...], psi: float, branch: int
 ) -> None:
-    k = state(uniform(*lengths), psi, branch).k
+    k = compute_state(uniform(*lengths), psi, branch).k
     h3, h4, dh3, dh4 = differences(lengths, psi, branch)
     size = FEW_ROUNDINGS * (1 + abs(h3) + abs(h4))
     for found, exact in ((k.h3, h3), (k.h4, h4), (k.h23, 1 - h3), (k.h43, h4 - h3)):
@@ -68,7 +68,7 @@ def test_small_sines_of_coupler_and_output_keep_their_digits(
     bars, half = loop(*lengths), half_angle(loop(*lengths), psi)
     u1 = complex(np.exp(1j * theta_1))
     plain = close_loop(bars, u1, direction(psi) * u1, half, branch)
-    found = with_sines_of_rates(bars, plain, coefficients(bars, plain))
+    found = take_sines_of_rates(bars, plain, coefficients(bars, plain))
     with mp.workdps(50):
         d, a, b, c = map(mpf, lengths)
         A = a * mp.expj(mpf(psi))
@@ -85,11 +85,11 @@ def test_small_sines_of_coupler_and_output_keep_their_digits(
 def test_small_sines_are_those_of_the_triangle_elsewhere() -> None:
     bars, half = loop(0.3, 0.1, 0.25, 0.22), half_angle(loop(0.3, 0.1, 0.25, 0.22), 1.0)
     at = close_loop(bars, 1.0 + 0.0j, direction(1.0), half, 1)
-    assert with_sines_of_rates(bars, at, coefficients(bars, at)) is at
+    assert take_sines_of_rates(bars, at, coefficients(bars, at)) is at
 
 
 def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre() -> None:
-    s = state(uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0]), 1, 3.0, -5.0)
+    s = compute_state(uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0]), 1, 3.0, -5.0)
     three = Body(0.7, 0.02, 0.11 + 0.07j)
     arm = s.point(3, three.z) - s.point(4, s.lengths.c)
     expected = -three.I * s.alpha(3) - three.m * cross(arm, s.acceleration(3, three.z))
@@ -102,10 +102,10 @@ def test_bars_that_stay_parallel_turn_as_one(lengths: tuple[float, ...], branch:
     bars, theta_2 = loop(*lengths), np.array([1e-12, 0.7, -0.7, 2.0])
     half = half_angle(bars, theta_2)
     at = close_loop(bars, 1.0 + 0.0j, direction(theta_2), half, branch)
-    first, second = parallel_pairs(bars, half, branch)
+    first, second = find_parallel_pairs(bars, half, branch)
     assert np.any(first | second) and not np.all(first | second)
     k = coefficients(bars, at)
-    exact = with_parallel_pairs(k, first, second)
+    exact = put_parallel_pairs(k, first, second)
     assert set(exact.h23[first]) <= {1.0} and set(exact.h23[second]) <= {0.0}  # however near the change point
     assert set(exact.h43[first]) <= {1.0} and set(exact.h43[second]) <= {-1.0}
     for name in ("h3", "h4", "h23", "h43"):  # the formulas themselves, away from the change point, up to rounding
@@ -115,9 +115,9 @@ def test_bars_that_stay_parallel_turn_as_one(lengths: tuple[float, ...], branch:
 def two_readings() -> tuple[State, State]:
     """The same positions with theta_2 and with theta_4 as the independent angle."""
     bars = uniform(0.3, 0.1, 0.25, 0.22)
-    by_2 = state(bars, np.array([0.4, 1.0, 4.0]), 1)
+    by_2 = compute_state(bars, np.array([0.4, 1.0, 4.0]), 1)
     lengths, theta_4 = by_2.lengths, np.angle(by_2.at.u4)
-    reading = path(lengths, 0.0, 4)
+    reading = prepare_path(lengths, 0.0, 4)
     sign = np.sign(drive_sine(by_2.at, 4))
     at, k = reading.motion(reading.position(theta_4, reading.half_angle(theta_4), sign), sign)
     return by_2, State(lengths, 0.0, by_2.theta_2, at, k, 1.0, rates(k, 1.0, 0.0))
@@ -131,10 +131,10 @@ def test_a_loop_read_backwards_keeps_the_half_angle_that_it_was_closed_with() ->
 def test_grounds_at_several_angles_are_those_of_each() -> None:
     bars, theta_2 = uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0])
     lengths, theta_1 = loop(*bars.lengths), np.array([[0.0], [0.4], [1.0]])
-    many = path(Loop(*(length + 0.0 * theta_1 for length in lengths)), theta_1)
+    many = prepare_path(Loop(*(length + 0.0 * theta_1 for length in lengths)), theta_1)
     found = many.position(theta_2, many.half_angle(theta_2), 1)
     for row, angle in enumerate(theta_1[:, 0]):
-        one = path(lengths, float(angle))
+        one = prepare_path(lengths, float(angle))
         alone = one.position(theta_2, one.half_angle(theta_2), 1)
         assert np.allclose(found.u2[row], alone.u2, rtol=0.0, atol=FEW_ROUNDINGS)
         assert np.allclose(found.u2[row], np.exp(1j * theta_2), rtol=0.0, atol=FEW_ROUNDINGS)
@@ -158,7 +158,7 @@ def test_a_point_moves_by_either_angle_alike() -> None:
 
 @pytest.mark.parametrize(("ground", "taken"), [(0.01, True), (1.1, False)])
 def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(ground: float, taken: bool) -> None:
-    s = state(uniform(ground, 1.0, 1.2, 1.1), np.array([0.4, 1.0, 4.0]), 1)
+    s = compute_state(uniform(ground, 1.0, 1.2, 1.1), np.array([0.4, 1.0, 4.0]), 1)
     wrenches = Wrenches(1.0 + 2.0j, -0.5j, 0.3 + 0.1j, 0.7, -0.4, 0.2)
     forces = [pin_forces(s.lengths, s.at, 2, s.at.sin_mu, wrenches, 0.2j, moment).F32 for moment in (0.3, -0.5)]
     along = [dot(s.at.u2, F32) for F32 in forces]

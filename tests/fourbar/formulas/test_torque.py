@@ -7,19 +7,19 @@ from flint import arb, ctx
 from scipy.optimize import brentq
 
 import fourbar
-from fourbar.effects.actions import Actions, bodies
-from fourbar.evaluation.case import state_at
-from fourbar.evaluation.free_motion import _meeting, release
-from fourbar.formulas.mobility import limit_positions, on_smooth_path
+from fourbar.effects.actions import Actions, list_bodies
+from fourbar.evaluation.case import compute_state
+from fourbar.evaluation.free_motion import _meet_change_points, release
+from fourbar.formulas.mobility import follow_smooth_path, limit_positions
 from fourbar.formulas.motion import State, rates
-from fourbar.formulas.path import path, smooth_branch
-from fourbar.formulas.path import state as state_of
+from fourbar.formulas.path import compute_state as state_of
+from fourbar.formulas.path import find_smooth_branch, prepare_path
 from fourbar.formulas.position import half_angle, loop
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.scene import Command, command
 from fourbar.solve import solve
-from fourbar_validation.engines.balls import BITS, inputs, outputs
-from fourbar_validation.lab.cost.formulas import thirteen_equations
+from fourbar_validation.engines.balls import BITS, collect_inputs, compute_outputs
+from fourbar_validation.lab.cost.formulas import solve_thirteen_equations
 
 EPS = 2.0**-52
 K = 200.0
@@ -70,7 +70,7 @@ def test_torque_and_pin_forces_agree_with_the_thirteen_equations(drive: int) -> 
         scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), drive, terms[:3], terms[3:])
         ok = solve(scene, "force", at=at).status_code == 0
         at = some_of(at, ok)
-        s, theirs = solve(scene, "force", at=at), thirteen_equations(scene, at)
+        s, theirs = solve(scene, "force", at=at), solve_thirteen_equations(scene, at)
         assert s.torque is not None and s.drive_condition is not None
         force = sum(np.hypot(*theirs[name].T) for name in PINS)
         worth = K * EPS / (s.condition**2 * s.drive_condition)
@@ -87,10 +87,10 @@ def exactly(scene: fourbar.Scene, at: Command) -> dict[str, arb] | None:
     """Balls at the one position of a command, its remainder included; None where the loop does not close."""
     before, ctx.prec = ctx.prec, BITS
     try:
-        x = {name: arb(value) for name, value in inputs(scene, float(at.theta_2[0])).items()}
+        x = {name: arb(value) for name, value in collect_inputs(scene, float(at.theta_2[0])).items()}
         if at.remainder is not None:
             x["theta_2"] += arb(mp.nstr(at.remainder, 100))
-        return outputs(scene, int(at.branch[0]), x, scene.drive_bar)
+        return compute_outputs(scene, int(at.branch[0]), x, scene.drive_bar)
     finally:
         ctx.prec = before
 
@@ -276,12 +276,12 @@ def test_coefficients_are_the_derivatives_of_the_loop(lengths: tuple[float, ...]
 
 def J_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
     """The equivalent inertia of all bars, kg m^2."""
-    return np.asarray(sum(inertia(linkage.input.length, bodies(linkage), state.at, state.k)))
+    return np.asarray(sum(inertia(linkage.input.length, list_bodies(linkage), state.at, state.k)))
 
 
 def slope_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
     """Its derivative by the independent angle."""
-    return np.asarray(2.0 * half_slope(linkage.input.length, bodies(linkage), state.at, state.k))
+    return np.asarray(2.0 * half_slope(linkage.input.length, list_bodies(linkage), state.at, state.k))
 
 
 @pytest.mark.parametrize("lengths", SHAPES.values(), ids=SHAPES.keys())
@@ -304,7 +304,7 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(lengths: tuple[float, 
     assert slope[ok] == pytest.approx(((ahead - back) / (2 * step))[ok], abs=1e-6 * float(np.max(J[ok])))
     # q = theta_4: the chain rule, on the path that reads the loop from bar 4
     rate, bend = state.k.h4, state.k.dh4
-    backwards = path(state.lengths, linkage.ground_angle, 4)
+    backwards = prepare_path(state.lengths, linkage.ground_angle, 4)
     q = np.angle(state.at.u4)
     half = backwards.half_angle(q)
     for sign in (1.0, -1.0):
@@ -348,12 +348,12 @@ def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive
     for terms in ((loads, effects), (loads, effects[:1]), ((), ())):
         scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), drive, *terms)
         s = solve(scene, "force", at=at)
-        assert thirteen_equations(scene, at)["torque"] == pytest.approx(s.torque, rel=1e-11)
+        assert solve_thirteen_equations(scene, at)["torque"] == pytest.approx(s.torque, rel=1e-11)
         for i in range(5):  # one by one
             alone = solve(scene, "force", at=some_of(at, np.arange(5) == i)).torque
             assert alone[0] == pytest.approx(s.torque[i], rel=1e-13)
-    state = state_at(scene, at)
-    assert Actions(state, bodies(linkage)).work() == (0.0, 0.0)
+    state = compute_state(scene, at)
+    assert Actions(state, list_bodies(linkage)).work() == (0.0, 0.0)
 
 
 def test_a_free_linkage_needs_no_torque() -> None:
@@ -363,7 +363,7 @@ def test_a_free_linkage_needs_no_torque() -> None:
     alpha = np.array([free_acceleration(linkage, float(q), 3.0, 1, gravity) for q in angles])
     at = Command(angles, np.ones(5, np.int8), 3.0, alpha)
     scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 3.0), effects=gravity)
-    theirs, state = thirteen_equations(scene, at), state_at(scene, at)
+    theirs, state = solve_thirteen_equations(scene, at), compute_state(scene, at)
     size = np.hypot(*theirs["F32"].T) * max(linkage.lengths) + np.abs(J_of(linkage, state) * alpha)
     assert np.all(np.abs(theirs["torque"]) <= 1e-13 * size)
 
@@ -388,9 +388,9 @@ def test_followed_through_change_points_it_is_the_smooth_path(lengths: tuple[flo
     """The sign that a free motion follows is that of the sweep, and no bar jumps: it turns as its coefficient says."""
     linkage = of((*lengths, 0.4))
     q = 0.4 + np.linspace(0.1, 12.0, 4001)
-    branch = on_smooth_path(linkage, q, 1)
+    branch = follow_smooth_path(linkage, q, 1)
     assert (branch == -1).any()
-    found = smooth_branch(loop(*map(float, lengths)), q - 0.4, float(branch[0]))
+    found = find_smooth_branch(loop(*map(float, lengths)), q - 0.4, float(branch[0]))
     assert np.array_equal(found, branch)
     state, step = state_of(linkage, q, found), q[1] - q[0]
     for u, h, dh in ((state.at.u3, state.k.h3, state.k.dh3), (state.at.u4, state.k.h4, state.k.dh4)):
@@ -404,11 +404,11 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
     """The lengths add up to 2: what misses a change point by 2 U = EPS touches, by twice that it does not."""
     exact, beyond = (0.5, 0.5 + EPS, 0.5, 0.5), (0.5, 0.5 + 2 * EPS, 0.5, 0.5)
     for lengths, touches in ((exact, True), (beyond, False)):
-        assert (_meeting(loop(*lengths)).E1 == 0.0) == touches
-        assert (_meeting(loop(*lengths)).E2 == 0.0) == touches
+        assert (_meet_change_points(loop(*lengths)).E1 == 0.0) == touches
+        assert (_meet_change_points(loop(*lengths)).E2 == 0.0) == touches
         assert loop(*lengths).E1 < 0.0
     wide = loop(0.3, 0.1, 0.25, 0.22)
-    assert _meeting(wide) == wide
+    assert _meet_change_points(wide) == wide
     products = 0.47**2 - 0.4**2, 0.2**2 - 0.03**2
     assert wide[4:] == pytest.approx(products)
 
@@ -452,7 +452,7 @@ def test_a_drive_shares_the_power_of_the_input(drive: int) -> None:
     )
     rate = getattr(s, f"omega_{drive}")
     assert len(s) > 5 and s.torque * rate == pytest.approx(two.torque * at.omega_2, rel=1e-13)
-    assert driving_torque(state_at(fourbar.Scene(linkage), at).k.h2, 3.0, 1.0) == 2.0
+    assert driving_torque(compute_state(fourbar.Scene(linkage), at).k.h2, 3.0, 1.0) == 2.0
 
 
 def test_a_single_pendulum() -> None:

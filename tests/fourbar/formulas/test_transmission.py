@@ -6,8 +6,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from fourbar.formulas.mobility import default_range, intervals, limit_positions, turns_fully
-from fourbar.formulas.path import state
+from fourbar.formulas.mobility import choose_range, find_intervals, limit_positions, turns_fully
+from fourbar.formulas.path import compute_state
 from fourbar.formulas.transmission import (
     distance_to_singular,
     mechanical_advantage,
@@ -42,7 +42,7 @@ def test_transmission_angle_is_the_acute_angle_between_coupler_and_output() -> N
 def test_transmission_angle_keeps_its_digits_where_it_vanishes() -> None:
     psi = 10.0 ** -np.arange(1.0, 14.0)
     # in a parallelogram the angle at B is the angle of the input
-    found = transmission_angle(state(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), psi, 1))
+    found = transmission_angle(compute_state(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), psi, 1))
     assert found == pytest.approx(psi, rel=8 * EPS)
 
 
@@ -56,9 +56,9 @@ def test_extremes_are_those_of_a_scan() -> None:
         bars = FourBar(d, Bar(a), Bar(b), Bar(c), float(rng.uniform(-3.0, 3.0)))
         found = transmission_extremes(bars)
         kinds.add((found.least == 0.0, found.greatest == math.pi))
-        start, stop = intervals(bars)[0]
+        start, stop = find_intervals(bars)[0]
         theta_2 = np.linspace(start, stop, SCAN)[1:-1]
-        at = state(bars, theta_2, 1).at
+        at = compute_state(bars, theta_2, 1).at
         ba, bo = -b * at.u3, -c * at.u4
         angle = np.abs(np.angle(ba / bo))  # A-B-O4
         step = (stop - start) / (SCAN - 1)
@@ -114,15 +114,15 @@ def test_power_in_is_power_out() -> None:
 def test_advantage_where_the_output_stands_and_where_the_input_does() -> None:
     # the output stands still exactly: antiparallel kite folded onto itself, B on O2
     kite = FourBar(2.0, Bar(1.0), Bar(1.0), Bar(2.0))
-    assert np.isinf(mechanical_advantage(state(kite, np.array([1.0]), -1))).all()
+    assert np.isinf(mechanical_advantage(compute_state(kite, np.array([1.0]), -1))).all()
     rocker = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2))
     limit = limit_positions(rocker)[0].theta_2
-    near = state(rocker, limit + np.array([1e-4, 1e-6, 1e-8]), 1)
+    near = compute_state(rocker, limit + np.array([1e-4, 1e-6, 1e-8]), 1)
     advantage = np.abs(mechanical_advantage(near))
     assert np.isfinite(near.at.sin_mu).all()
     # it falls as the root of the distance
     assert advantage[:-1] / advantage[1:] == pytest.approx([10.0, 10.0], rel=1e-2)
-    flat = state(FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0)), np.array([0.0]), 1)
+    flat = compute_state(FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0)), np.array([0.0]), 1)
     assert np.isnan(speed_ratio(flat)).all() and np.isnan(mechanical_advantage(flat)).all()
 
 
@@ -133,10 +133,10 @@ def test_distance_is_that_to_the_edge_of_assembly() -> None:
         FourBar(4.0, Bar(2.0), Bar(2.5), Bar(2.2), 3.0),
     ):
         assert not turns_fully(bars)
-        theta_2 = np.linspace(*default_range(bars), 40) + 4 * math.pi
+        theta_2 = np.linspace(*choose_range(bars), 40) + 4 * math.pi
         distance = distance_to_singular(bars, theta_2)
         inside, outside = (
-            [~np.isnan(state(bars, theta_2 + s * distance * (1.0 + away), 1).at.sin_mu) for s in (1, -1)]
+            [~np.isnan(compute_state(bars, theta_2 + s * distance * (1.0 + away), 1).at.sin_mu) for s in (1, -1)]
             for away in (-1e-9, 1e-9)
         )
         assert np.all(inside[0] & inside[1])
@@ -151,7 +151,7 @@ def test_distance_counts_change_points_and_the_dead_centres_of_the_drive() -> No
     assert np.isfinite(dead).all() and (dead >= distance_to_singular(crank, theta_2, 4)).all()
     # at a dead centre of a drive on bar 4 the output stands: the speed ratio changes its sign there
     at = theta_2 + dead * 0.999, theta_2 + dead * 1.001, theta_2 - dead * 0.999, theta_2 - dead * 1.001
-    sign = [np.sign(speed_ratio(state(crank, angle, 1))) for angle in at]
+    sign = [np.sign(speed_ratio(compute_state(crank, angle, 1))) for angle in at]
     assert ((sign[0] != sign[1]) | (sign[2] != sign[3])).all()
     parallelogram = FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0), 0.5)
     assert distance_to_singular(parallelogram, np.array([0.6, 3.5, 0.5 + math.pi / 2])) == pytest.approx(
@@ -161,7 +161,7 @@ def test_distance_counts_change_points_and_the_dead_centres_of_the_drive() -> No
 
 def test_what_ends_the_input_is_near_for_every_drive_and_branch() -> None:
     rocker = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2), 0.7)
-    theta_2 = np.linspace(*default_range(rocker), 9)
+    theta_2 = np.linspace(*choose_range(rocker), 9)
     from_its_ends = distance_to_singular(rocker, theta_2)
     parallelogram = FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0), 0.5)
     for branch in (1, -1, np.where(np.arange(9) < 4, 1, -1)):
@@ -176,7 +176,7 @@ def test_what_ends_the_input_is_near_for_every_drive_and_branch() -> None:
 def test_a_dead_centre_is_where_the_driven_bar_reverses(drive: int, branch: int) -> None:
     crank = FourBar(3.0, Bar(1.0), Bar(2.5), Bar(2.2), 0.5)
     theta_2 = np.linspace(0.0, 2.0 * math.pi, 1201)
-    reverses = np.flatnonzero(np.diff(np.sign(state(crank, theta_2, branch).omega(drive))))
+    reverses = np.flatnonzero(np.diff(np.sign(compute_state(crank, theta_2, branch).omega(drive))))
     assert reverses.size == 2
     step = theta_2[1] - theta_2[0]
     sides = np.full(theta_2.shape, branch)
@@ -189,5 +189,5 @@ def test_a_dead_centre_is_where_the_driven_bar_reverses(drive: int, branch: int)
 
 def test_distances_of_single_precision_angles_are_in_doubles() -> None:
     rocker = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2), 0.7)
-    coarse = np.linspace(*default_range(rocker), 9).astype(np.float32)
+    coarse = np.linspace(*choose_range(rocker), 9).astype(np.float32)
     assert np.array_equal(distance_to_singular(rocker, coarse), distance_to_singular(rocker, coarse.astype(float)))

@@ -10,9 +10,9 @@ import pytest
 
 import fourbar
 from fourbar.effects import Torsion
-from fourbar.mjcf import Settings, defaults_used, mjcf, scene_from_lengths
+from fourbar.mjcf import Settings, list_defaults, make_scene, write_mjcf
 from fourbar.mjcf.document import SETTLING
-from fourbar_validation.scenes.suites import model_files
+from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker, thesis
 
 SPEED = 1e-2
@@ -65,7 +65,7 @@ def random_scene(rng: np.random.Generator) -> tuple[str, fourbar.Scene]:
 def run_alone(scene: fourbar.Scene) -> tuple[float, float, float]:
     """Plain MuJoCo from keyframe 0 through the sweep: worst gap, worst speed, angle still missing at the end."""
     assert isinstance(scene.motion.theta_2, fourbar.Sweep) and scene.motion.omega_2 is not None
-    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     start, stop, omega = scene.motion.theta_2.start, scene.motion.theta_2.stop, scene.motion.omega_2
@@ -95,7 +95,7 @@ LAG = 1e-3
 
 def opened(scene: fourbar.Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """As MuJoCo's viewer does it: no keyframe, no control."""
-    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
     data = mujoco.MjData(model)
     mujoco.mj_resetData(model, data)
     mujoco.mj_forward(model, data)
@@ -114,7 +114,7 @@ def sprung() -> fourbar.Scene:
 
 def test_opens_assembled_and_moves_without_keyframe_or_control() -> None:
     rng = np.random.default_rng(SEED)
-    scenes = [fourbar.load(file) for file in model_files()] + [sprung()]
+    scenes = [fourbar.load(file) for file in list_model_files()] + [sprung()]
     for scene in [*scenes, *(random_scene(rng)[1] for _ in range(12))]:
         model, data = opened(scene)
         assert gap(data) < OPEN and (model.qpos0 == model.key_qpos[0]).all()
@@ -182,7 +182,7 @@ def test_past_a_limit_position_it_starts_anew_assembled(tmp_path: Path, monkeypa
 def test_keyframe_is_on_the_requested_branch_and_closed() -> None:
     for branch in (1, -1):
         scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.0, 60), 10.0, 0.0, branch))
-        model = mujoco.MjModel.from_xml_string(mjcf(scene))
+        model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, 0)
         mujoco.mj_forward(model, data)
@@ -196,7 +196,7 @@ def test_keyframe_is_on_the_requested_branch_and_closed() -> None:
 
 def test_numbers_survive_bit_for_bit() -> None:
     scene = thesis()
-    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
     for name, bar in (("input", scene.linkage.input), ("coupler", scene.linkage.coupler)):
         assert model.body(name).mass[0] == bar.mass
         assert model.body(name).inertia[2] == bar.moment_of_inertia
@@ -205,7 +205,7 @@ def test_numbers_survive_bit_for_bit() -> None:
 
 
 def test_shapes_add_no_mass_and_change_no_bit() -> None:
-    text = mjcf(crank_rocker())
+    text = write_mjcf(crank_rocker())
     bare = ET.fromstring(text)
     for body in bare.iter("body"):
         for geom in body.findall("geom"):
@@ -222,20 +222,20 @@ def test_shapes_add_no_mass_and_change_no_bit() -> None:
 
 @pytest.mark.parametrize("title", ["</mujoco>\"'&<!-- -->", "a\x00b\x1b[31m\n\t", "\ud800", "é" * 10_000, ""])
 def test_hostile_titles(title: str) -> None:
-    mujoco.MjModel.from_xml_string(mjcf(crank_rocker(title=title)))
+    mujoco.MjModel.from_xml_string(write_mjcf(crank_rocker(title=title)))
 
 
 @pytest.mark.parametrize(("mass", "inertia"), [(0.0, None), (1e-16, 1.0), (1.0, 1e-16)])
 def test_massless_bar_is_refused_in_one_line(mass: float, inertia: float | None) -> None:
     linkage = fourbar.FourBar(0.3, fourbar.Bar(0.1, 1.0), fourbar.Bar(0.25, mass, inertia), fourbar.Bar(0.22, 1.0))
     with pytest.raises(fourbar.InputError, match=r"^bars\.coupler\..*massless[^\n]*$"):
-        mjcf(crank_rocker(linkage=linkage))
+        write_mjcf(crank_rocker(linkage=linkage))
 
 
 @pytest.mark.parametrize("omega", [None, 0.0])
 def test_at_rest_a_file_is_written_that_stays_at_rest(omega: float | None) -> None:
     scene = crank_rocker(motion=fourbar.Motion(1.0, omega), loads=(), effects=())
-    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_step(model, data, 100)
@@ -243,15 +243,15 @@ def test_at_rest_a_file_is_written_that_stays_at_rest(omega: float | None) -> No
 
 
 def test_from_lengths_alone() -> None:
-    scene = scene_from_lengths(0.3, 0.1, 0.25, 0.22)
+    scene = make_scene(0.3, 0.1, 0.25, 0.22)
     assert (scene.motion.omega_2, scene.motion.branch) == (1.0, 1)
     assert scene.linkage.coupler.mass == 0.25
-    mujoco.MjModel.from_xml_string(mjcf(scene))
-    assert all("\n" not in line for line in defaults_used(scene))
+    mujoco.MjModel.from_xml_string(write_mjcf(scene))
+    assert all("\n" not in line for line in list_defaults(scene))
 
 
 def test_without_keyframe_no_position_is_written() -> None:
-    text = mjcf(crank_rocker(), Settings(timestep=1e-3), keyframe=False)
+    text = write_mjcf(crank_rocker(), Settings(timestep=1e-3), keyframe=False)
     assert mujoco.MjModel.from_xml_string(text).nkey == 0
     with pytest.raises(fourbar.InputError, match="timestep"):
-        mjcf(crank_rocker(), keyframe=False)
+        write_mjcf(crank_rocker(), keyframe=False)

@@ -16,7 +16,7 @@ import fourbar
 from fourbar.effects import Friction
 from fourbar.effects.spring import SpringEnd
 from fourbar.linkage import BAR_NAMES
-from fourbar.mjcf import mjcf_for
+from fourbar.mjcf import write_mjcf_for
 from fourbar.mjcf.document import SETTLING, Drive
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
@@ -57,7 +57,7 @@ class Opened:
     """A file in MuJoCo at its keyframe."""
 
     def __init__(self, scene: Scene, drive: Drive) -> None:
-        self.scene, self.drive, self.text = scene, drive, mjcf_for(scene, drive=drive)
+        self.scene, self.drive, self.text = scene, drive, write_mjcf_for(scene, drive=drive)
         self.model = mujoco.MjModel.from_xml_string(self.text)
         self.data = mujoco.MjData(self.model)
         mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
@@ -349,4 +349,4 @@ def test_a_controller_of_ones_own_finds_the_torque() -> None:
 def test_a_motor_for_one_that_takes_none_is_refused() -> None:
     for wrong in ({"simulator": "newton", "drive": "motor"}, {"drive": "servo"}, {"simulator": "ode"}):
         with pytest.raises(fourbar.InputError, match=r"^[^\n]+$"):
-            mjcf_for(crank_rocker(), **wrong)  # type: ignore[arg-type]
+            write_mjcf_for(crank_rocker(), **wrong)  # type: ignore[arg-type]

@@ -16,12 +16,12 @@ import pytest
 import fourbar
 from fourbar.effects import Torsion
 from fourbar.errors import LimitError
-from fourbar.mjcf import SIMULATORS, mjcf_for
-from fourbar.mjcf.sdf import sdf
-from fourbar.mjcf.usd import usd
+from fourbar.mjcf import SIMULATORS, write_mjcf_for
+from fourbar.mjcf.sdf import write_sdf
+from fourbar.mjcf.usd import write_usd
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.scenes.suites import model_files
+from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker
 
 STEPS = 20
@@ -172,12 +172,12 @@ def test_genesis_reads_as_the_comment_says_and_leaves_out_what_it_names(tmp_path
         (stiff, ["rest angles of torsion (it rests as assembled)"]),
         (at_B, ["viscous at B, friction at B, torsion at B"]),
     ):
-        assert re.findall(r"it leaves out ([^.]*)\. ", mjcf_for(scene, "genesis")) == names
+        assert re.findall(r"it leaves out ([^.]*)\. ", write_mjcf_for(scene, "genesis")) == names
     gs = pytest.importorskip("genesis")
     gs.init(backend=gs.cpu, precision="64", logging_level="error")
     faster = replace(whole, motion=replace(motion, alpha_2=30.0))
     for scene, moves_as in ((kept, kept), (whole, kept), (faster, kept), (stiff, resting)):
-        (file := tmp_path / "four_bar.xml").write_text(mjcf_for(scene, "genesis"))
+        (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "genesis"))
         read = read_genesis(file, MIDWAY)
         assert max(errors(moves_as, *read)) < YIELDING
         assert read[1][0] == pytest.approx(10.0, rel=1e-6), "the keyframe's speed, of an accelerated scene too"
@@ -187,7 +187,7 @@ def test_genesis_reads_as_the_comment_says_and_leaves_out_what_it_names(tmp_path
 def test_newton_reads_the_mjcf_as_the_comment_says(tmp_path: Path) -> None:
     for motion in (fourbar.Motion(1.0, 10.0), fourbar.Motion(1.0, 10.0, 30.0)):
         scene = crank_rocker(motion=motion, drive_bar=4)
-        (file := tmp_path / "four_bar.xml").write_text(mjcf_for(scene, "newton"))
+        (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "newton"))
         read = read_newton(file, MIDWAY)
         assert max(errors(scene, *read)) < SINGLE
         assert read[2][0] == pytest.approx(motion.acceleration, abs=0.01)
@@ -202,7 +202,7 @@ YIELDING = 1e-2
 @pytest.mark.nightly
 def test_warp_reads_as_the_comment_says() -> None:
     scene = crank_rocker(drive_bar=4)
-    text = mjcf_for(scene, "warp")
+    text = write_mjcf_for(scene, "warp")
     assert max(errors(scene, *read_warp(text, forward=2))) < SINGLE
     assert "forward twice" in text
 
@@ -210,15 +210,15 @@ def test_warp_reads_as_the_comment_says() -> None:
 @pytest.mark.nightly
 def test_mjx_reads_as_the_comment_says() -> None:
     scene = crank_rocker(drive_bar=4)
-    assert max(errors(scene, *read_mjx(mjcf_for(scene, "mjx"), STEPS))) < YIELDING
-    assert max(errors(scene, *read_mjx(mjcf_for(scene, "mjx"), 0))) > 0.1, "a state that was only set"
+    assert max(errors(scene, *read_mjx(write_mjcf_for(scene, "mjx"), STEPS))) < YIELDING
+    assert max(errors(scene, *read_mjx(write_mjcf_for(scene, "mjx"), 0))) > 0.1, "a state that was only set"
 
 
 @pytest.mark.parametrize("simulator", SIMULATORS)
 def test_each_file_loads_in_mujoco_and_runs(simulator: str) -> None:
     """Single precision, pads or none: MuJoCo itself carries all of them."""
     scene = crank_rocker()
-    assert max(errors(scene, *read_mujoco(mjcf_for(scene, simulator), forward=1))) < CARRIED
+    assert max(errors(scene, *read_mujoco(write_mjcf_for(scene, simulator), forward=1))) < CARRIED
 
 
 CARRIED = 2e-3
@@ -246,7 +246,7 @@ def test_drake_loads_the_sdf_and_moves_as_released() -> None:
     plants, parsing = (importlib.import_module(f"pydrake.multibody.{name}") for name in ("plant", "parsing"))
     simulator = importlib.import_module("pydrake.systems.analysis").Simulator
     scene = released()
-    text = sdf(scene, "drake")
+    text = write_sdf(scene, "drake")
     theta_2, theta_3, _, *speeds = (float(x) for x in re.findall(r"(-?[\d.]+(?:e-?\d+)?) rad", text))
     ours, missed, pulls = fourbar.solve(scene), [], []
     for step in (1e-3, 5e-4):
@@ -270,7 +270,7 @@ def test_drake_loads_the_sdf_and_moves_as_released() -> None:
 
 def test_sdf_closes_its_loop_and_keeps_masses() -> None:
     scene = released()
-    root = ET.fromstring(sdf(scene))
+    root = ET.fromstring(write_sdf(scene))
     pose = {link.get("name"): [float(x) for x in str(link.findtext("pose")).split()] for link in root.iter("link")}
     joints = {joint.get("name"): joint for joint in root.iter("joint")}
     assert set(joints) == {"ground_on_world", "O2", "A", "O4", "B"}
@@ -286,11 +286,11 @@ def test_sdf_closes_its_loop_and_keeps_masses() -> None:
 
 def test_sdf_refuses_what_it_cannot_hold() -> None:
     with pytest.raises(LimitError, match=r"^loads \(here on bar 4\) have no counterpart in SDF for gazebo"):
-        sdf(crank_rocker(loads=(fourbar.Load(4, moment=1.0),)))
+        write_sdf(crank_rocker(loads=(fourbar.Load(4, moment=1.0),)))
     with pytest.raises(LimitError, match="torsion"):
-        sdf(released(effects=(Torsion.at(O2=(1.0, 0.0, 0.0)),)), "drake")
+        write_sdf(released(effects=(Torsion.at(O2=(1.0, 0.0, 0.0)),)), "drake")
     with pytest.raises(LimitError, match="pin B"):
-        sdf(released(effects=(fourbar.Viscous.at(B=1.0),)), "drake")
+        write_sdf(released(effects=(fourbar.Viscous.at(B=1.0),)), "drake")
 
 
 def points(text: str, name: str) -> list[complex]:
@@ -301,7 +301,7 @@ def points(text: str, name: str) -> list[complex]:
 
 def test_usd_closes_its_loop_keeps_masses_and_refuses_what_it_cannot_hold() -> None:
     scene = released(effects=(fourbar.Gravity(),))
-    text, linkage = usd(scene), scene.linkage
+    text, linkage = write_usd(scene), scene.linkage
     turns = [2.0 * cmath.phase(complex(float(w), float(z)))
              for w, z in re.findall(r"xformOp:orient = \((\S+), 0, 0, (\S+)\)", text)]  # fmt: skip
     places = points(text, "xformOp:translate")
@@ -317,12 +317,12 @@ def test_usd_closes_its_loop_keeps_masses_and_refuses_what_it_cannot_hold() -> N
     assert [float(x) for x in re.findall(r"physics:mass = (\S+)", text)] == [linkage.bar(n).mass for n in (2, 3, 4)]
     for wrong in (crank_rocker(loads=(fourbar.Load(4, moment=1.0),)), released()):
         with pytest.raises(LimitError, match="no counterpart in USD"):
-            usd(wrong)
+            write_usd(wrong)
 
 
-@pytest.mark.parametrize("write", [sdf, partial(sdf, reader="drake"), usd])
+@pytest.mark.parametrize("write", [write_sdf, partial(write_sdf, reader="drake"), write_usd])
 def test_without_loads_every_model_is_written_and_says_how_to_start(write: Any) -> None:
-    for file in model_files():
+    for file in list_model_files():
         scene = fourbar.load(file)
         text = write(scene, without_loads=True)
         assert "loads are left out" in text and f"puts on bar {scene.drive_bar}" in text
@@ -347,7 +347,7 @@ def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
     pytest.importorskip("newton_usd_schemas")
     wheel = fourbar.Flywheel(100.0, 2)
     scene = crank_rocker(effects=(fourbar.Gravity(), wheel), loads=(), motion=fourbar.Motion(1.0, 3.0))
-    text = usd(scene)
+    text = write_usd(scene)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "four_bar.usda"
         file.write_text(text)

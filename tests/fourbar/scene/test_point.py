@@ -9,8 +9,8 @@ import pytest
 
 from fourbar import InputError, Motion, Point, Scene, load, solve, vary
 from fourbar.files import dump, loads
-from fourbar.show.tables import columns
-from fourbar.solution import csv_text, json_text
+from fourbar.show.tables import list_columns
+from fourbar.solution import write_csv, write_json
 from tests.support.scenes import crank_rocker
 
 POINTS = (Point("P", 3, (0.04, 0.4)), Point("on_ground", 1, (0.1, 0.5)), Point("tip", 4, (0.3, -0.2)))
@@ -58,7 +58,7 @@ def test_positions_alone_have_no_velocities_of_points() -> None:
     whole = scene(*POINTS, motion=Motion(1.0))
     s = solve(whole)
     assert list(s.points) == [point.name for point in POINTS] and s.velocity == {} == s.acceleration
-    assert json.loads(json_text(s))["v_P"] is None
+    assert json.loads(write_json(s))["v_P"] is None
     out = {"a_P": np.zeros((1, 2))}
     s = solve(scene(*POINTS, motion=Motion(1.0, 2.0)), out=out)
     assert s.points == {} and s.acceleration["P"] is out["a_P"] and out["a_P"].all()
@@ -66,8 +66,8 @@ def test_positions_alone_have_no_velocities_of_points() -> None:
 
 def test_every_table_has_their_columns() -> None:
     s = solve(scene(*POINTS))
-    document, head = json.loads(json_text(s)), csv_text(s).split("\n", 1)[0].split(",")
-    frame, shown = s.to_pandas(), columns(s)
+    document, head = json.loads(write_json(s)), write_csv(s).split("\n", 1)[0].split(",")
+    frame, shown = s.to_pandas(), list_columns(s)
     for start, arrays in (("", s.points), ("v_", s.velocity), ("a_", s.acceleration)):
         for point in POINTS:
             name, array = start + point.name, arrays[point.name]
@@ -88,7 +88,7 @@ def test_a_study_varies_them_and_lists_its_members() -> None:
     frame = s.to_pandas()
     assert len(frame) == s.theta_2.size and frame["member"].tolist() == [0] * 61 + [1] * 61
     assert np.array_equal(frame["a_P_x"].to_numpy()[61:], own.acceleration["P"][:, 0])
-    assert np.shape(json.loads(json_text(s))["torque"]) == (2, 61) and "2 linkages" in s._repr_html_()  # type: ignore[attr-defined]
+    assert np.shape(json.loads(write_json(s))["torque"]) == (2, 61) and "2 linkages" in s._repr_html_()  # type: ignore[attr-defined]
 
 
 def test_a_file_holds_them(tmp_path: Any) -> None:

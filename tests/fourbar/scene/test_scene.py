@@ -11,13 +11,13 @@ import fourbar
 from fourbar import Bar, FourBar, Free, FromLimit, Law, Load, Motion, Scene, Sweep, solve, uniform, vary
 from fourbar.effects import Gravity, Torsion, Viscous
 from fourbar.errors import InputError, LimitError
-from fourbar.formulas.mobility import limit_angles, limit_positions
+from fourbar.formulas.mobility import find_limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
-from fourbar.mjcf import mjcf
+from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command
 from fourbar.solution import Solution
 from fourbar_validation.compare.rows import AGREES, REFUSES
-from fourbar_validation.engines.balls import reference
+from fourbar_validation.engines.balls import compute_reference
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
@@ -76,7 +76,7 @@ def test_what_comes_out_fed_back_as_a_command_returns_itself(path: Path, bar: in
 @pytest.mark.parametrize("bar", MOVING_BARS)
 def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar: int) -> None:
     rocker = FourBar(0.5, Bar(0.4), Bar(0.3), Bar(0.25), 0.2)
-    for number, angle in enumerate(limit_angles(rocker, bar), 1):
+    for number, angle in enumerate(find_limit_angles(rocker, bar), 1):
         assert any(abs(math.sin(0.5 * (limit[bar - 2] - angle))) < 8 * U for limit in limit_positions(rocker, bar))
         names = [f"theta_{bar}", f"omega_{bar}"]
         found = [
@@ -117,7 +117,7 @@ def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces() -> N
             assert answer.quantities["F43"] == pytest.approx(found.F43, rel=1e-11)
         found = solve(replace(rocker, motion=motion), "error")
         assert found.torque_error[1] > 0.01 * abs(found.torque[1]) and found.drive_condition[1] < 1e-14
-        exact = reference(replace(rocker, motion=motion, drive_bar=3), sign, limit.theta_4)
+        exact = compute_reference(replace(rocker, motion=motion, drive_bar=3), sign, limit.theta_4)
         assert exact is not None and np.isfinite(float(exact[0]["torque"].mid()))
 
 
@@ -191,11 +191,11 @@ def test_released_at_theta_4_it_passes_a_limit_of_theta_2_and_stops_at_its_own()
     rocker = FourBar(0.5, Bar(0.4, 1.0), Bar(0.3, 1.0), Bar(0.25, 1.0))
     limit = limit_positions(rocker)[0]
     sign = 1 if math.sin(limit.theta_3 - limit.theta_2) > 0.0 else -1
-    ahead = 1.0 if math.sin(limit_angles(rocker, 4)[0] - limit.theta_4) > 0.0 else -1.0
+    ahead = 1.0 if math.sin(find_limit_angles(rocker, 4)[0] - limit.theta_4) > 0.0 else -1.0
     motion = Motion(theta_4=limit.theta_4 - 0.1 * ahead, omega_4=ahead, branch=sign, free=Free(20.0, 200))
     found = solve(Scene(rocker, motion))
     assert found.stopped_at is not None and len(found) < 201 and set(found.branch.tolist()) == {1, -1}
-    assert min(abs(math.sin(0.5 * (found.theta_4[-1] - x))) for x in limit_angles(rocker, 4)) < 0.1
+    assert min(abs(math.sin(0.5 * (found.theta_4[-1] - x))) for x in find_limit_angles(rocker, 4)) < 0.1
 
 
 TWO = """
@@ -239,7 +239,7 @@ def test_a_file_of_it_reads_back_bit_for_bit(angle: object) -> None:
 
 def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
     scene = replace(LOADED, motion=Motion(theta_4=Sweep(3.8, 4.2, 7), omega_4=1.0), loads=())
-    for refuse in (mjcf, fourbar.extremes):
+    for refuse in (write_mjcf, fourbar.extremes):
         with pytest.raises(LimitError, match=r"^motion.theta_4: .* takes a command of theta_2 alone$"):
             refuse(scene)
     with pytest.raises(InputError, match=r"theta_4'?: is commanded, and theta_2 is not"):

@@ -13,7 +13,7 @@ from fourbar.errors import FourBarError, InputError
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
 from fourbar.scene.motion import Sweep
-from fourbar.studies.keys import at_place, with_numbers
+from fourbar.studies.keys import read_place, replace_numbers
 from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
@@ -135,7 +135,7 @@ def test_a_study_of_strokes_is_as_its_members_one_by_one(bar: int, strokes: tupl
     values |= {"lengths.ground_angle": [0.0, 0.2], "motion.stroke_speed": [0.2, -0.3]}
     study = fourbar.solve(fourbar.vary(own, values))
     for k in range(2):
-        one = fourbar.solve(with_numbers(own, {key: pair[k] for key, pair in values.items()}))
+        one = fourbar.solve(replace_numbers(own, {key: pair[k] for key, pair in values.items()}))
         assert one.status == study.status[k] and one.status.count("ok") > 5
         for name in ("theta_2", "theta_4", "alpha_3", "drive_force", "F14", "condition", "stroke"):
             theirs = getattr(one, name)
@@ -153,7 +153,7 @@ def test_sensitivities_at_a_stroke_are_its_differences(bar: int, stroke: float) 
     found = fourbar.sensitivity(own)
     assert {"motion.stroke", "motion.stroke_speed", "motion.stroke_acceleration", "drive.to.at.1"} <= set(found.keys)
     for key in found.keys:
-        at = stroke if key == "motion.stroke" else at_place(own, found.keys[key].place)
+        at = stroke if key == "motion.stroke" else read_place(own, found.keys[key].place)
         ends = np.array([at + h, at - h])
         s = fourbar.solve(fourbar.vary(own, {key: ends[:, None] if key == "motion.stroke" else ends}))
         for name in ("theta_2", "theta_3", "alpha_4", "drive_force", "F12", "condition"):

@@ -17,9 +17,9 @@ from fourbar.files import loads
 from fourbar.files.effects import REGISTRY
 from fourbar.scene import Scene
 from fourbar.show import animate
-from fourbar.show.acting import NO_SYMBOL, acting
-from fourbar.show.between import between
-from fourbar.show.page_data import page_data
+from fourbar.show.acting import NO_SYMBOL, list_acting
+from fourbar.show.between import locate_between
+from fourbar.show.page_data import collect_page_data
 from tests.support.scenes import crank_rocker
 
 TURNING = Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
@@ -36,12 +36,12 @@ def everything() -> Scene:
 
 
 def test_everything_that_acts_has_a_symbol(everything: Scene) -> None:
-    kinds = [symbol.kind for symbol in acting(everything)]
+    kinds = [symbol.kind for symbol in list_acting(everything)]
     for key in REGISTRY.keys() - NO_SYMBOL:
         assert {"springs": "spring"}.get(key, key) in kinds
     assert kinds.count("force") == 2 and kinds[0] == "drive"
     released = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4)))
-    assert "drive" not in [symbol.kind for symbol in acting(released)]
+    assert "drive" not in [symbol.kind for symbol in list_acting(released)]
 
 
 def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> None:
@@ -56,7 +56,7 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> Non
     for index in (5, 30):
         place = symbols.place_of(everything.linkage, solution, index, 1.0)
         drawn = {
-            s.name: symbols.draw(axes, s, place, 0.01) for s in acting(everything) if s.kind in ("force", "spring")
+            s.name: symbols.draw(axes, s, place, 0.01) for s in list_acting(everything) if s.kind in ("force", "spring")
         }
         theta_3, theta_4 = solution.theta_3[index], solution.theta_4[index]
         tail, tip = (complex(*point) for point in drawn["load 1"].lines[0])
@@ -79,13 +79,13 @@ def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(ev
 
     from fourbar.show.plot.labels import Labels
     from fourbar.show.plot.mechanism import draw_mechanism, scale_of
-    from fourbar.show.plot.view import view
+    from fourbar.show.plot.view import make_view
 
     lengths = {"input": 0.02, "coupler": 0.25, "output": 0.22}
     short = replace(
         everything.linkage, **{k: replace(getattr(everything.linkage, k), length=v) for k, v in lengths.items()}
     )
-    shown = view(replace(everything, linkage=short, points=(fourbar.Point("P", 3, (0.15, 0.7)),)))
+    shown = make_view(replace(everything, linkage=short, points=(fourbar.Point("P", 3, (0.15, 0.7)),)))
     factor, *_ = scale_of(shown)
     axes = Figure().subplots()
     draw_mechanism(axes, shown, shown.here, 0, Labels())
@@ -112,11 +112,11 @@ def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(ev
 
 
 def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
-    text = animate.page(everything)
+    text = animate.write_page(everything)
     match = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
     assert match is not None
     data = json.loads(match[1])
-    assert [one["kind"] for one in data["acting"]] == [symbol.kind for symbol in acting(everything)]
+    assert [one["kind"] for one in data["acting"]] == [symbol.kind for symbol in list_acting(everything)]
     factors = next(one["factor"] for one in data["acting"] if one["name"] == "load 2")
     assert np.allclose(factors, TABLED.table.at(np.array(data["theta_2"])), rtol=1e-15)  # type: ignore[union-attr]
 
@@ -124,22 +124,22 @@ def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
 def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     """Path, speed and mark in the plot, path in the notebook's drawing, place and columns in the page."""
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
-    from fourbar.show.drawing import POINT, drawing
-    from fourbar.show.plot.figures import drawn
+    from fourbar.show.drawing import POINT, draw_scene
+    from fourbar.show.plot.figures import draw_figure
 
     scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
-    found = between(scene, fourbar.solve(scene))
+    found = locate_between(scene, fourbar.solve(scene))
     assert found is not None
     solution = found.solution
-    panels = drawn(scene, "points", units=fourbar.units("m m/s m/s^2")).figure.subfigs[0].axes
+    panels = draw_figure(scene, "points", units=fourbar.units("m m/s m/s^2")).figure.subfigs[0].axes
     path = next(line for line in panels[0].lines if line.get_label() == "path of P")
     assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {line.get_label() for line in panels[0].lines}
     assert np.allclose(path.get_xydata(), solution.points["P"], rtol=0.0, atol=1e-15)
     for panel, own in zip(panels[1:], (solution.velocity, solution.acceleration), strict=True):
         line = next(line for line in panel.lines if line.get_label() == "P")
         assert np.allclose(line.get_ydata(), np.hypot(*own["P"].T), rtol=1e-15)
-    assert drawing(scene, solution).count(f'stroke="{POINT}"') == 1
-    data = page_data(scene, {})
+    assert draw_scene(scene, solution).count(f'stroke="{POINT}"') == 1
+    data = collect_page_data(scene, {})
     assert data["points"][0]["name"] == "P" and abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
 
 
@@ -158,13 +158,13 @@ def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything:
 
 def test_a_film_names_and_moves_what_the_plot_does(everything: Scene) -> None:
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
-    from fourbar.show.plot.film import _stage
-    from fourbar.show.plot.style import matplotlib_style
-    from fourbar.show.plot.view import view
+    from fourbar.show.plot.film import _make_stage
+    from fourbar.show.plot.style import apply_style
+    from fourbar.show.plot.view import make_view
 
     scene = replace(everything, points=(fourbar.Point("P", 3, (0.15, 0.7)),))
-    with matplotlib_style():
-        figure, move = _stage(view(scene), moving=True)
+    with apply_style():
+        figure, move = _make_stage(make_view(scene), moving=True)
         move(7)
         figure.draw_without_rendering()
     (axes,) = figure.axes

@@ -51,7 +51,7 @@ def embedded(page: str) -> dict:
 
 def test_embedded_numbers_are_those_of_solve_on_both_branches() -> None:
     scene = crank_rocker()
-    data = embedded(animate.page(scene))
+    data = embedded(animate.write_page(scene))
     for sign in (1, -1):
         solution = fourbar.solve(replace(scene, motion=replace(scene.motion, branch=sign)))
         columns = data["branches"][str(sign)]
@@ -63,7 +63,7 @@ def test_embedded_numbers_are_those_of_solve_on_both_branches() -> None:
 
 def test_a_single_position_is_one_of_the_rows_and_the_first_shown() -> None:
     theta_2 = math.radians(123.456)
-    data = embedded(animate.page(thesis(theta_2)))
+    data = embedded(animate.write_page(thesis(theta_2)))
     assert data["theta_2"][data["start"]] == theta_2
     assert data["branches"]["1"]["torque"][data["start"]] == fourbar.solve(thesis(theta_2)).torque[0]
     assert len(data["theta_2"]) > 300
@@ -73,7 +73,7 @@ RELEASED = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 9
 
 
 def test_a_free_motion_is_embedded_instant_by_instant() -> None:
-    data, solution = embedded(animate.page(RELEASED)), fourbar.solve(RELEASED)
+    data, solution = embedded(animate.write_page(RELEASED)), fourbar.solve(RELEASED)
     (columns,) = data["branches"].values()
     np.testing.assert_array_equal(data["time"], solution.time)
     for name in ("theta_2", "theta_4", "omega_2", "alpha_3", "F12"):
@@ -86,14 +86,14 @@ def test_a_free_motion_is_embedded_instant_by_instant() -> None:
 @pytest.mark.parametrize(("duration", "rate"), [(0.2, 0.1), (1.4e-3, 1e-4), (30.0, 1.0), (6e3, 100.0), (6.1e3, 1e3)])
 def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration: float, rate: float) -> None:
     law = Law((0.0, 0.5 * duration, duration), (0.0, 1.0, 2.0), ends="rest")
-    data = embedded(animate.page(crank_rocker(motion=fourbar.Motion(law=law))))
+    data = embedded(animate.write_page(crank_rocker(motion=fourbar.Motion(law=law))))
     assert data["rate"] == pytest.approx(rate)
     assert 1.5 <= duration / rate <= 60.0
     assert len(data["branches"]["1"]["torque"]) == 361
 
 
 def test_positions_that_do_not_assemble_are_null() -> None:
-    data = embedded(animate.page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360))))
+    data = embedded(animate.write_page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360))))
     solution = fourbar.solve(replace(thesis(), motion=fourbar.Motion(np.array(data["theta_2"]), 0.2244)))
     assert [v is None for v in data["branches"]["1"]["torque"]] == np.isnan(solution.torque).tolist()
     assert data["branches"]["1"]["F12"][30] == [None, None]
@@ -101,14 +101,14 @@ def test_positions_that_do_not_assemble_are_null() -> None:
 
 def test_a_fine_sweep_is_thinned_evenly_and_says_so() -> None:
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36_000), 1.0))
-    data = embedded(animate.page(scene))
+    data = embedded(animate.write_page(scene))
     assert len(data["theta_2"]) == page_data.MAX_ROWS
     assert np.diff(data["theta_2"]) == pytest.approx(2 * math.pi / (page_data.MAX_ROWS - 1))
     assert data["positions"] == 36_001
 
 
 def test_nothing_is_fetched_and_hostile_text_stays_text() -> None:
-    page = animate.page(replace(crank_rocker(), title=HOSTILE, source=HOSTILE))
+    page = animate.write_page(replace(crank_rocker(), title=HOSTILE, source=HOSTILE))
     tags = Tags(page).tags
     assert [name for name, _ in tags].count("script") == 2
     assert "img" not in [name for name, _ in tags]
@@ -123,7 +123,7 @@ def test_nothing_is_fetched_and_hostile_text_stays_text() -> None:
 def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else() -> None:
     import hashlib
 
-    page = animate.page(crank_rocker())
+    page = animate.write_page(crank_rocker())
     policy = next(a["content"] for name, a in Tags(page).tags if a.get("http-equiv"))
     assert policy is not None
     assert "default-src 'none'" in policy
@@ -134,7 +134,7 @@ def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else() -> None
 
 
 def test_embedded_json_survives_any_string() -> None:
-    text = animate.embedded({"a": HOSTILE})
+    text = animate.embed_json({"a": HOSTILE})
     assert not set("<>&\u2028") & set(text)
     assert json.loads(text) == {"a": HOSTILE}
 
@@ -142,7 +142,7 @@ def test_embedded_json_survives_any_string() -> None:
 def test_a_picture_is_embedded_where_it_is_one(tmp_path: Path) -> None:
     good = tmp_path / "bar.png"
     good.write_bytes(PNG)
-    data = embedded(animate.page(crank_rocker(), {"coupler": good}))
+    data = embedded(animate.write_page(crank_rocker(), {"coupler": good}))
     assert data["pictures"] == {"3": "data:image/png;base64," + base64.b64encode(PNG).decode()}
 
 
@@ -223,11 +223,11 @@ def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
     from PIL import Image
 
     from fourbar.show.plot import film as films
-    from fourbar.show.plot.film import frames
-    from fourbar.show.plot.view import view
+    from fourbar.show.plot.film import choose_frames
+    from fourbar.show.plot.view import make_view
 
-    shown = view(RELEASED)
-    assert np.all(np.diff(frames(shown, 46)) == 2) and shown.sweep.time[frames(shown, 46)[-1]] == 1.8
+    shown = make_view(RELEASED)
+    assert np.all(np.diff(choose_frames(shown, 46)) == 2) and shown.sweep.time[choose_frames(shown, 46)[-1]] == 1.8
     monkeypatch.setattr(films, "FRAMES_PER_SECOND", 5)
     animate.write(RELEASED, tmp_path / "a.gif")
     with Image.open(tmp_path / "a.gif") as film:
@@ -235,15 +235,15 @@ def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
 
 
 def test_a_film_of_a_rocker_goes_there_and_back() -> None:
-    from fourbar.show.plot.film import frames
-    from fourbar.show.plot.view import view
+    from fourbar.show.plot.film import choose_frames
+    from fourbar.show.plot.view import make_view
 
-    shown = view(thesis())
-    order = frames(shown, 40)
+    shown = make_view(thesis())
+    order = choose_frames(shown, 40)
     theta_2 = shown.sweep.theta_2[order]
     assert shown.sweep.assembled[order].all()
     assert len(order) == pytest.approx(40, abs=2)
     assert theta_2[0] == theta_2.min()
     assert 0 < int(np.argmax(theta_2)) < len(order) - 1
-    turning = view(crank_rocker())
-    assert np.all(np.diff(frames(turning, 30)) == 2)
+    turning = make_view(crank_rocker())
+    assert np.all(np.diff(choose_frames(turning, 30)) == 2)

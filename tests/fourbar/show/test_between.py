@@ -11,8 +11,8 @@ import fourbar
 from fourbar.effects import SpringEnd
 from fourbar.scene import Command
 from fourbar.scene.motion_law import Law
-from fourbar.show.between import between, sizes
-from fourbar.show.tables import heading
+from fourbar.show.between import list_sizes, locate_between
+from fourbar.show.tables import write_heading
 from tests.support.scenes import crank_rocker, thesis
 
 LOCATED = 1e-7
@@ -33,10 +33,10 @@ def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(steps: int
     d, a, b, c = WIPER.linkage.lengths
     stretched, folded = (math.acos((r * r + d * d - c * c) / (2.0 * r * d)) for r in (b + a, b - a))
     scene = swept(WIPER, steps)
-    found = between(scene, fourbar.solve(scene))
+    found = locate_between(scene, fourbar.solve(scene))
     assert found is not None and [pin for _, pin in found.reversals] == ["O4", "O4"]
     assert np.abs(np.subtract([angle for angle, _ in found.reversals], [stretched, folded + math.pi])).max() < LOCATED
-    located = sizes(found.solution)
+    located = list_sizes(found.solution)
     for name in ("F12", "F32", "F43", "F14"):  # each is largest on one side of the first jump
         most = max(_beside(scene, stretched, step)[name] for step in (-1, 1))
         assert located[name].max() == pytest.approx(most, rel=PEAK)
@@ -46,15 +46,15 @@ def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(steps: int
 def _beside(scene: fourbar.Scene, theta_2: float, step: int) -> dict[str, float]:
     """Sizes next to an angle."""
     at = Command(np.array([theta_2 + step * 1e-8]), np.array([1], dtype=np.int8), scene.motion.omega_2, 0.0)
-    return {name: float(size[0]) for name, size in sizes(fourbar.solve(scene, at=at)).items()}
+    return {name: float(size[0]) for name, size in list_sizes(fourbar.solve(scene, at=at)).items()}
 
 
 def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
     coarse = swept(crank_rocker(), 24)
-    found = between(coarse, fourbar.solve(coarse))
+    found = locate_between(coarse, fourbar.solve(coarse))
     assert found is not None and not found.growing and not found.reversals
-    fine = sizes(fourbar.solve(replace(coarse, motion=replace(coarse.motion, theta_2=FINE))))
-    for name, size in sizes(found.solution).items():
+    fine = list_sizes(fourbar.solve(replace(coarse, motion=replace(coarse.motion, theta_2=FINE))))
+    for name, size in list_sizes(found.solution).items():
         assert size.max() == pytest.approx(fine[name].max(), rel=PEAK), name
     own = np.isin(found.solution.theta_2, fourbar.solve(coarse).theta_2)
     assert own.sum() == 25 and np.all(np.diff(found.solution.theta_2) > 0.0)
@@ -63,25 +63,25 @@ def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
 def test_towards_a_pole_no_largest_value_is_made_up() -> None:
     scene = swept(thesis(), 360)
     solution = fourbar.solve(scene)
-    found = between(scene, solution)
+    found = locate_between(scene, solution)
     assert found is not None and "torque" in found.growing
     assert np.nanmax(np.abs(found.solution.torque)) == np.nanmax(np.abs(solution.torque))
-    assert any(line.startswith("largest torque of these positions") for line in heading(scene, solution))
+    assert any(line.startswith("largest torque of these positions") for line in write_heading(scene, solution))
     scene = swept(crank_rocker(), 24)
-    assert not any("of these positions" in line for line in heading(scene, fourbar.solve(scene)))
+    assert not any("of these positions" in line for line in write_heading(scene, fourbar.solve(scene)))
 
 
 def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_not() -> None:
     law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest")
     scene = crank_rocker(motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),))
-    found = between(scene, fourbar.solve(scene))
-    fine = sizes(fourbar.solve(replace(scene, motion=fourbar.Motion(law=replace(law, steps=20000)))))
+    found = locate_between(scene, fourbar.solve(scene))
+    fine = list_sizes(fourbar.solve(replace(scene, motion=fourbar.Motion(law=replace(law, steps=20000)))))
     assert found is not None and [pin for _, pin in found.reversals] == ["O2"]
-    assert np.max(sizes(found.solution)["power"]) == pytest.approx(fine["power"].max(), rel=PEAK)
+    assert np.max(list_sizes(found.solution)["power"]) == pytest.approx(fine["power"].max(), rel=PEAK)
     assert np.all(np.diff(found.solution.time) > 0.0)
     listed = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, 6.0, 9), 10.0))
-    assert between(listed, fourbar.solve(listed)) is None
-    assert any("torque of these positions" in line for line in heading(listed, fourbar.solve(listed)))
+    assert locate_between(listed, fourbar.solve(listed)) is None
+    assert any("torque of these positions" in line for line in write_heading(listed, fourbar.solve(listed)))
 
 
 def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
@@ -91,13 +91,13 @@ def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
         motion = fourbar.Motion(stroke=fourbar.Sweep(0.33, 0.17, steps), stroke_speed=-0.2, side="left")
         return crank_rocker(motion=motion, drive=drive, effects=(fourbar.Friction((("A", 0.01),)),))
 
-    found = between(of(20), fourbar.solve(of(20)))
+    found = locate_between(of(20), fourbar.solve(of(20)))
     assert (
         found is not None and found.solution.at.stroke is not None and (np.diff(found.solution.at.stroke) < 0.0).all()
     )
     fine = fourbar.solve(of(20000))
-    for name, size in sizes(fine).items():
-        assert sizes(found.solution)[name].max() == pytest.approx(size.max(), rel=PEAK), name
+    for name, size in list_sizes(fine).items():
+        assert list_sizes(found.solution)[name].max() == pytest.approx(size.max(), rel=PEAK), name
     slips = np.flatnonzero(np.diff(np.sign(fine.omega_3 - fine.omega_2)))
     assert [pin for _, pin in found.reversals] == ["A"] * len(slips)
     for (place, _), i in zip(found.reversals, slips, strict=True):

@@ -16,8 +16,8 @@ import fourbar
 from fourbar.cli import status
 from fourbar.errors import DependencyError, InputError
 from fourbar.files import scene_file as files
-from fourbar.files.new import new_scene
-from fourbar.show.drawing import HEIGHT, WIDTH, drawing
+from fourbar.files.new import write_new_scene
+from fourbar.show.drawing import HEIGHT, WIDTH, draw_scene
 from tests.support.scenes import crank_rocker, thesis
 
 HOSTILE = "<script>alert(1)</script>&"
@@ -27,7 +27,7 @@ PIXEL = 0.11
 
 def test_the_drawing_is_to_scale_and_inside_its_frame() -> None:
     scene = thesis(np.radians([100.0, 135.0, 200.0]))
-    root = ET.fromstring(drawing(scene, fourbar.solve(scene)))
+    root = ET.fromstring(draw_scene(scene, fourbar.solve(scene)))
     lines = [[float(e.attrib[k]) for k in ("x1", "y1", "x2", "y2")] for e in root.iter() if e.tag.endswith("line")
              and "x1" in e.attrib]  # fmt: skip
     assert len(lines) == 3
@@ -97,7 +97,7 @@ def test_showing_needs_numpy_alone() -> None:
 
 
 def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> None:
-    text = new_scene(("20 cm", "0.48 m", "55 cm", "20 cm"))
+    text = write_new_scene(("20 cm", "0.48 m", "55 cm", "20 cm"))
     scene = files.loads(text)
     assert scene.linkage.lengths == (0.2, 0.48, 0.55, 0.2)
     assert [scene.linkage.bar(n).mass for n in (2, 3, 4)] == [0.48, 0.55, 0.2]
@@ -122,7 +122,7 @@ def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> 
 )
 def test_a_new_scene_of_bad_lengths_is_refused(lengths: tuple[str, ...], named: str) -> None:
     with pytest.raises(InputError, match=named):
-        new_scene(lengths)
+        write_new_scene(lengths)
 
 
 def test_a_new_scene_never_replaces_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

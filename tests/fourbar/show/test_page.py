@@ -61,7 +61,7 @@ def type_length(driver, bar: int, value: float | str) -> None:
 
 def test_numbers_are_shown_in_the_units_of_the_page(browse) -> None:
     scene = crank_rocker()
-    driver = browse(animate.page(scene, units=fourbar.units("mm kN N.mm rpm")))
+    driver = browse(animate.write_page(scene, units=fourbar.units("mm kN N.mm rpm")))
     s = fourbar.solve(scene)
     expected = [s.torque[0] * 1e3, s.F43[0, 0] * 1e-3, s.omega_4[0] * 30.0 / math.pi]
     assert shown(driver, "torque", "F43_x", "omega_4") == pytest.approx(expected, rel=PRINTED)
@@ -76,7 +76,7 @@ def test_numbers_are_shown_in_the_units_of_the_page(browse) -> None:
 
 def test_it_loads_and_shows_the_first_position(browse) -> None:
     scene = crank_rocker()
-    driver = browse(animate.page(scene))
+    driver = browse(animate.write_page(scene))
     s = fourbar.solve(scene)
     assert driver.title == "crank-rocker"
     assert shown(driver, "theta_2", "theta_3", "theta_4") == pytest.approx(
@@ -89,7 +89,7 @@ def test_it_loads_and_shows_the_first_position(browse) -> None:
 
 def test_a_step_changes_the_numbers_by_the_right_amount(browse) -> None:
     scene = crank_rocker()
-    driver = browse(animate.page(scene))
+    driver = browse(animate.write_page(scene))
     s = fourbar.solve(scene)
     names = ("theta_2", "theta_3", "torque", "F12_x")
     for clicks in (1, 2, 3):
@@ -112,7 +112,7 @@ def test_a_step_changes_the_numbers_by_the_right_amount(browse) -> None:
 
 def test_play_moves_the_linkage_and_pause_leaves_true_numbers(browse) -> None:
     scene = crank_rocker()
-    driver = browse(animate.page(scene))
+    driver = browse(animate.write_page(scene))
     start = pins(driver)["A"]
     driver.find_element("id", "play").click()
     assert driver.find_element("id", "play").text == "Pause"
@@ -139,11 +139,11 @@ def clockwork(driver, ticks: int) -> list[int]:
 
 
 def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(browse) -> None:
-    driver = browse(animate.page(crank_rocker()))
+    driver = browse(animate.write_page(crank_rocker()))
     rows = clockwork(driver, 241)  # 12 s: two sweeps
     assert set(rows) == set(range(61)) or set(rows) == set(range(60))
     assert sum(np.diff(rows) < 0) == 2
-    text = animate.page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360)))
+    text = animate.write_page(thesis(fourbar.Sweep(0.0, 2 * math.pi, 360)))
     data = embedded(text)
     driver = browse(text)
     driver.execute_script("go(200); document.getElementById('speed').value = '0.25'")  # less than a row per frame
@@ -154,7 +154,7 @@ def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(brows
 
 
 def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
-    driver = browse(animate.page(RELEASED))
+    driver = browse(animate.write_page(RELEASED))
     s = fourbar.solve(RELEASED)
     assert not driver.find_element("id", "branch").is_displayed()
     assert not driver.find_element("id", "torque").is_displayed()
@@ -165,14 +165,14 @@ def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
     assert driver.find_element("id", "theta-text").text == "0.740 s"
     assert driver.find_element("id", "theta").get_attribute("aria-valuetext") == "0.740 seconds"
     assert shown(driver, "omega_2", "alpha_4") == pytest.approx([s.omega_2[37], s.alpha_4[37]], rel=PRINTED)
-    kinetic = embedded(animate.page(RELEASED))["branches"]["1"]["energy"][37]
+    kinetic = embedded(animate.write_page(RELEASED))["branches"]["1"]["energy"][37]
     assert shown(driver, "energy") == pytest.approx([kinetic], rel=PRINTED)
     drawn = pins(driver)
     np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[37], atol=PIXEL)
 
 
 def test_a_released_linkage_with_other_lengths_is_swept_over_the_angle(browse) -> None:
-    driver = browse(animate.page(RELEASED))
+    driver = browse(animate.write_page(RELEASED))
     driver.execute_script("go(37)")
     type_length(driver, 3, 283.0)
     assert driver.find_element("id", "branch").is_displayed()
@@ -202,7 +202,7 @@ OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
 )
 def test_another_command_is_the_axis_and_the_linkage_follows(browse, motion, name, at, over, pace) -> None:
     scene = crank_rocker(motion=motion, drive=DRIVE)
-    driver, s = browse(animate.page(scene)), fourbar.solve(scene)
+    driver, s = browse(animate.write_page(scene)), fourbar.solve(scene)
     driver.execute_script("go(20)")
     assert driver.find_element("id", "theta-text").text == at
     assert driver.find_element("id", "over").text == over and pace in driver.find_element("id", "pace").text
@@ -230,7 +230,7 @@ def test_another_command_is_the_axis_and_the_linkage_follows(browse, motion, nam
 
 def test_a_changed_length_redraws_by_the_formulas_and_hides_the_forces(browse) -> None:
     scene = crank_rocker()
-    driver = browse(animate.page(scene))
+    driver = browse(animate.write_page(scene))
     driver.execute_script("go(7)")
     type_length(driver, 3, 283.0)
     changed = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.283), fourbar.Bar(0.22), ground_angle=0.2)
@@ -260,7 +260,7 @@ def test_a_changed_length_redraws_by_the_formulas_and_hides_the_forces(browse) -
 
 def test_type_time_and_scene_file_follow_the_lengths(browse, tmp_path: Path) -> None:
     scene = crank_rocker(title="a\\nb", motion=fourbar.Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0))
-    driver = browse(animate.page(scene))
+    driver = browse(animate.write_page(scene))
     assert driver.find_element("id", "type").text == "crank-rocker"
     assert loads(state_of(driver, "sceneFile()")).linkage == scene.linkage
     type_length(driver, 2, 200.0)
@@ -287,7 +287,7 @@ def test_type_time_and_scene_file_follow_the_lengths(browse, tmp_path: Path) -> 
 
 
 def test_the_page_names_a_linkage_as_fourbar_does(browse) -> None:
-    driver = browse(animate.page(crank_rocker()))
+    driver = browse(animate.write_page(crank_rocker()))
     rng = np.random.default_rng(19)
     cases = [[*map(float, rng.integers(1, 6, 4) / 10.0)] for _ in range(300)]
     cases = [lengths for lengths in cases if 2 * max(lengths) <= sum(lengths)]
@@ -300,7 +300,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     spring = fourbar.Spring(SpringEnd(1, 0.1, -0.5), SpringEnd(4, 0.08, 0.0), 20.0, 0.1)
     load = fourbar.Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
     scene = crank_rocker(loads=(load,), effects=(fourbar.Springs((spring,)), fourbar.Gravity()))
-    driver = browse(animate.page(scene))
+    driver = browse(animate.write_page(scene))
     driver.execute_script("go(20)")
     s = fourbar.solve(scene)
     script = """return [...document.querySelectorAll("path.act")].map(e => [e.getAttribute("class"),
@@ -331,7 +331,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
 
 @pytest.mark.parametrize("value", ("-1", "0", "5000", ""))
 def test_lengths_that_cannot_be_are_refused_and_the_picture_stays(browse, value: str) -> None:
-    driver = browse(animate.page(crank_rocker()))
+    driver = browse(animate.write_page(crank_rocker()))
     before = pins(driver)
     type_length(driver, 2, value)
     assert driver.find_element("id", "length-error").is_displayed()
@@ -339,7 +339,7 @@ def test_lengths_that_cannot_be_are_refused_and_the_picture_stays(browse, value:
 
 
 def test_the_formulas_of_the_page_agree_with_fourbar(browse) -> None:
-    driver = browse(animate.page(crank_rocker()))
+    driver = browse(animate.write_page(crank_rocker()))
     rng = np.random.default_rng(5)
     cases, expected = [], []
     while len(cases) < 300:
@@ -370,7 +370,7 @@ def test_the_formulas_of_the_page_agree_with_fourbar(browse) -> None:
 
 
 def test_the_intervals_of_the_page_are_those_that_assemble(browse) -> None:
-    driver = browse(animate.page(crank_rocker()))
+    driver = browse(animate.write_page(crank_rocker()))
     rng = np.random.default_rng(6)
     kinds = set()
     for _ in range(60):
@@ -391,7 +391,7 @@ def test_the_intervals_of_the_page_are_those_that_assemble(browse) -> None:
 
 def test_the_branch_switches_the_picture_and_the_numbers(browse) -> None:
     scene = crank_rocker()
-    driver = browse(animate.page(scene))
+    driver = browse(animate.write_page(scene))
     driver.execute_script("chooseBranch(-1)")
     s = fourbar.solve(replace(scene, motion=replace(scene.motion, branch=-1)))
     assert shown(driver, "torque", "F32_y") == pytest.approx([s.torque[0], s.F32[0, 1]], rel=PRINTED)
@@ -402,7 +402,7 @@ def test_the_branch_switches_the_picture_and_the_numbers(browse) -> None:
 @pytest.mark.parametrize("scaling", ("sweep", "position"))
 def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(browse, scaling: str) -> None:
     scene = crank_rocker()
-    driver = browse(animate.page(scene))
+    driver = browse(animate.write_page(scene))
     choose = """const e = document.getElementById("arrow-scale"); e.value = arguments[0];
         e.dispatchEvent(new Event("change")); go(50)"""
     driver.execute_script(choose, scaling)
@@ -421,7 +421,7 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(browse, scalin
 
 @pytest.mark.parametrize(("width", "scaling"), [(360, "position"), (1100, "position"), (360, "sweep"), (1100, "sweep")])
 def test_no_arrow_and_no_name_of_one_leaves_the_picture(browse, width: int, scaling: str) -> None:
-    driver = browse(animate.page(thesis() if scaling == "position" else crank_rocker()), width)
+    driver = browse(animate.write_page(thesis() if scaling == "position" else crank_rocker()), width)
     script = """const choice = document.getElementById("arrow-scale"); choice.value = arguments[0];
         choice.dispatchEvent(new Event("change"));
         const least = []; for (let i = 0; i < grid.length; i += 7) { go(i);
@@ -437,7 +437,7 @@ def test_keyboard_drives_it(browse) -> None:
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
 
-    driver = browse(animate.page(crank_rocker()))
+    driver = browse(animate.write_page(crank_rocker()))
     press = lambda *keys: ActionChains(driver).send_keys(*keys).perform()  # noqa: E731
     press(Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_LEFT, Keys.ARROW_RIGHT)
     assert state_of(driver, "row") == 2
@@ -463,7 +463,7 @@ def test_keyboard_drives_it(browse) -> None:
 
 
 def test_every_control_has_a_name(browse) -> None:
-    driver = browse(animate.page(crank_rocker()))
+    driver = browse(animate.write_page(crank_rocker()))
     controls = driver.find_elements("css selector", "button, select, input, [role=img]")
     assert len(controls) > 15
     for control in (c for c in controls if c.is_displayed()):
@@ -475,7 +475,7 @@ def test_every_control_has_a_name(browse) -> None:
 @pytest.mark.parametrize("dark", (False, True))
 @pytest.mark.parametrize("scene", (crank_rocker(), thesis()), ids=("crank-rocker", "thesis"))
 def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(browse, scene: fourbar.Scene, dark: bool) -> None:
-    driver = browse(animate.page(scene), 360, dark=dark)
+    driver = browse(animate.write_page(scene), 360, dark=dark)
     assert state_of(driver, "document.documentElement.scrollWidth") <= 360
     assert state_of(driver, "document.getElementById('picture').getBoundingClientRect().width") > 300
     for control in driver.find_elements("css selector", "button, select, input[type=number], input[type=range]"):
@@ -508,7 +508,7 @@ def contrast(first: str, second: str) -> float:
 
 
 def test_labels_of_the_picture_do_not_cover_each_other(browse) -> None:
-    driver = browse(animate.page(thesis()), 360)
+    driver = browse(animate.write_page(thesis()), 360)
     script = """return [...document.querySelectorAll("#labels text")].filter(e => e.style.display !== "none")
         .map(e => { const b = e.getBBox(); return [b.x, b.y, b.x + b.width, b.y + b.height]; })"""
     for row in (90, 136, 200, 300):
@@ -522,7 +522,7 @@ def test_labels_of_the_picture_do_not_cover_each_other(browse) -> None:
 
 
 def test_hostile_titles_do_nothing_but_appear(browse) -> None:
-    driver = browse(animate.page(replace(crank_rocker(), title=HOSTILE)))
+    driver = browse(animate.write_page(replace(crank_rocker(), title=HOSTILE)))
     assert "<script>alert(1)</script>" in driver.find_element("css selector", "h1").text
     driver.find_element("id", "forward").click()
     assert state_of(driver, "row") == 1
@@ -530,7 +530,7 @@ def test_hostile_titles_do_nothing_but_appear(browse) -> None:
 
 def test_a_picture_lies_along_its_bar(browse, tmp_path: Path) -> None:
     (tmp_path / "bar.png").write_bytes(PNG)
-    driver = browse(animate.page(crank_rocker(), {"output": tmp_path / "bar.png"}))
+    driver = browse(animate.write_page(crank_rocker(), {"output": tmp_path / "bar.png"}))
     driver.execute_script("go(9)")
     length = state_of(driver, "Number(document.getElementById('picture-4').getAttribute('width'))")
     drawn = pins(driver)
@@ -543,7 +543,7 @@ def test_a_picture_lies_along_its_bar(browse, tmp_path: Path) -> None:
 
 
 def test_with_reduced_motion_it_moves_twice_a_second(browse) -> None:
-    driver = browse(animate.page(crank_rocker()), still=True)
+    driver = browse(animate.write_page(crank_rocker()), still=True)
     script = """window.requestAnimationFrame = () => 0; play(true); const seen = new Set();
         const x = () => document.getElementById("pin-A").getAttribute("cx");
         for (let i = 0; i < 60; i++) { frame(10000 + 50 * i); seen.add(x()); }
@@ -553,7 +553,7 @@ def test_with_reduced_motion_it_moves_twice_a_second(browse) -> None:
 
 def test_positions_alone_show_no_dynamics(browse) -> None:
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36)))
-    driver = browse(animate.page(scene))
+    driver = browse(animate.write_page(scene))
     assert not driver.find_element("id", "forces").is_displayed()
     assert driver.find_element("id", "omega_3").text == "–"
     driver.find_element("id", "forward").click()
@@ -565,14 +565,14 @@ def test_it_says_why_a_position_has_no_forces(browse) -> None:
     motion = fourbar.Motion(fourbar.Sweep(0.3, 2.0, 4), 1.0)
     for drive_bar, remark in ((3, "no torque of the drive holds them in balance"), (2, "")):
         scene = fourbar.Scene(fourbar.uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar)
-        status = browse(animate.page(scene)).find_element("id", "status")
+        status = browse(animate.write_page(scene)).find_element("id", "status")
         assert (remark in status.text) and status.is_displayed() == bool(remark)
 
 
 def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> None:
     loose = (fourbar.Tolerance("lengths.input", 5e-5), fourbar.Tolerance("bars.coupler.mass", 0.001, True))
     scene = crank_rocker(tolerances=loose, points=(fourbar.Point("P", 3, (0.1, 0.2)),))
-    driver = browse(animate.page(scene, units=fourbar.units("N.mm")), 360)
+    driver = browse(animate.write_page(scene, units=fourbar.units("N.mm")), 360)
     found = fourbar.tolerances(scene, PAGE_SAMPLES)
     driver.execute_script("go(20)")
     rows = {
@@ -596,7 +596,7 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> No
 
 
 def test_a_scene_without_bands_says_why_or_shows_nothing(browse) -> None:
-    driver = browse(animate.page(replace(RELEASED, tolerances=(fourbar.Tolerance("lengths.input", 5e-5),))))
+    driver = browse(animate.write_page(replace(RELEASED, tolerances=(fourbar.Tolerance("lengths.input", 5e-5),))))
     assert "free motion" in driver.find_element("id", "tolerance-note").text
     assert not driver.find_element("id", "bands").is_displayed()
-    assert not browse(animate.page(crank_rocker())).find_element("id", "tolerances").is_displayed()
+    assert not browse(animate.write_page(crank_rocker())).find_element("id", "tolerances").is_displayed()

@@ -93,11 +93,11 @@ def test_units_are_read_as_people_write_them() -> None:
 
 def test_plots_and_notebooks_say_theirs() -> None:
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
-    from fourbar.show.plot.figures import drawn
+    from fourbar.show.plot.figures import draw_figure
 
     scene, imperial = crank_rocker(), units("imperial")
     for name, label in (("torque", "$T_2$ (lbf in)"), ("forces", "$|F|$ (lbf)")):
-        axes = drawn(scene, name, units=imperial).figure.subfigs[0].axes[0]
+        axes = draw_figure(scene, name, units=imperial).figure.subfigs[0].axes[0]
         assert axes.get_ylabel() == label
         if name == "torque":
             torque = fourbar.solve(scene).torque

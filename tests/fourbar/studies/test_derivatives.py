@@ -15,10 +15,10 @@ from fourbar.effects import Friction, Gravity, Load, PinFriction, Table, Viscous
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Free, FromLimit, Motion
-from fourbar.solution import values_of
+from fourbar.solution import find_values
 from fourbar.studies.derivatives import Sensitivity, sensitivity
-from fourbar.studies.keys import entries
-from fourbar_validation.engines.balls import BITS, Values, inputs, outputs
+from fourbar.studies.keys import list_entries
+from fourbar_validation.engines.balls import BITS, Values, collect_inputs, compute_outputs
 from tests.fourbar.studies.test_study import ANGLES, DRIVEN, LINK, LOADS, RUBBING, scene
 
 TABLED = Load(4, (2.0, 0.1), (0.0, 0.0), 0.3, "world", Table((0.0, 2.0, 6.0), (0.0, 1.0, 2.0)))
@@ -68,11 +68,13 @@ def check_against_balls(of: Scene, found: Sensitivity) -> int:
     """Compare every derivative at every position; how many were compared."""
     ctx.prec, at, compared = BITS, command(of), 0
     for i, theta_2 in enumerate(at.theta_2):
-        exact = {name: arb(value) for name, value in inputs(of, float(theta_2)).items()}
+        exact = {name: arb(value) for name, value in collect_inputs(of, float(theta_2)).items()}
         exact = moved(of, exact, "motion.omega_2", arb(0))  # what is left out, unrounded
         for key, entry in found.keys.items():
             step = arb(STEP) * max(abs(float(exact[part(key)])), 1e-3)
-            ends = [outputs(of, int(at.branch[i]), moved(of, exact, key, h), of.drive_bar) for h in (-step, step)]
+            ends = [
+                compute_outputs(of, int(at.branch[i]), moved(of, exact, key, h), of.drive_bar) for h in (-step, step)
+            ]
             assert ends[0] is not None and ends[1] is not None, entry
             for name in found.by:
                 value, own = found.value(name)[i], found.of(name, key)[i]
@@ -92,7 +94,7 @@ def test_derivatives_are_those_of_a_50_digit_reference(drive: int) -> None:
     found = sensitivity(of)
     assert found.status == ["ok", "ok"]
     assert check_against_balls(of, found) == 2 * len(found.keys) * len(found.by)
-    assert set(found.keys) == {"motion.theta_2", *entries(of)}
+    assert set(found.keys) == {"motion.theta_2", *list_entries(of)}
 
 
 @pytest.mark.parametrize(("effects", "drive"), [(DRIVEN, 4), (RUBBING, 2)])
@@ -110,7 +112,7 @@ def test_effects_that_the_reference_lacks_by_differences(effects: tuple[Any, ...
         study[key] = x + moves[:, None] if key == "motion.theta_2" else x + moves
     solution = fourbar.solve(fourbar.vary(of, {k: v for k, v in study.items() if k not in LEFT_OUT}))
     for name in found.by:
-        of_all = values_of(solution, name)
+        of_all = find_values(solution, name)
         for row, key in enumerate(start):
             if key in LEFT_OUT:
                 continue

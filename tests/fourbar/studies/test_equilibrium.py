@@ -15,7 +15,7 @@ import fourbar
 from fourbar import Bar, FourBar, Friction, Gravity, Load, Motion, PinFriction, Scene, Spring, Springs, Sweep, Torsion
 from fourbar.cli import status
 from fourbar.effects import SpringEnd
-from fourbar.mjcf import mjcf
+from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import Free
 from fourbar.studies import equilibrium as module
 from fourbar.studies.circuit_curve import SAMPLES
@@ -95,7 +95,7 @@ def springy(seed: int) -> Scene:
     ends = [SpringEnd(bar, *random.uniform(0.05, 0.4, 2)) for bar in (1, 3, 2, 4)]
     springs = [Spring(ends[i], ends[i + 1], random.uniform(50, 300), random.uniform(0, 0.3)) for i in (0, 2)]
     loads = (Load(3, tuple(random.uniform(0, 9, 2)), (0.1, 1.0)), Load(4, moment=random.uniform(-1, 1)))
-    low, high = fourbar.formulas.mobility.default_range(linkage)
+    low, high = fourbar.formulas.mobility.choose_range(linkage)
     branch = int(random.choice([1, -1]))
     return Scene(linkage, Motion(0.5 * (low + high), branch=branch), 2, loads, (DOWN, Springs(tuple(springs))))
 
@@ -145,7 +145,7 @@ def test_the_potential_energy_is_least_where_stable_and_nowhere_else(
             curvature = (V[0] - 2 * V[1] + V[2]) / 1e-8
             assert abs(V[2] - V[0]) / 2e-4 <= 1e-3 * abs(each.slope)  # zero but for the third derivative
             assert -curvature == pytest.approx(each.slope, rel=1e-2)
-    monkeypatch.setattr(module, "_proven", lambda *_: None)
+    monkeypatch.setattr(module, "_prove_zeros", lambda *_: None)
     sampled = equilibrium(scene)
     assert not sampled.proven and len(sampled.found) == len(found.found)
     for one_of, other in zip(found.found, sampled.found, strict=True):
@@ -258,7 +258,7 @@ def test_released_motions_swing_at_the_frequency() -> None:
     assert ours.time is not None
     # the amplitude changes the frequency by a part of its square
     assert crossings(ours.time, ours.theta_2, rest.place.theta_2) == pytest.approx(rest.frequency, rel=10 * off**2)
-    model = mujoco.MjModel.from_xml_string(mjcf(scene))
+    model = mujoco.MjModel.from_xml_string(write_mjcf(scene))
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     every = max(1, int(period / 100 / model.opt.timestep))

@@ -27,7 +27,7 @@ from fourbar.formulas.arithmetic import namespace
 from fourbar.quantities import OF_LINE, STAGE_OF
 from fourbar.scene.motion import Free
 from fourbar.studies.function import NEVER, function
-from fourbar.studies.keys import at_place, command_key, entries, left_out
+from fourbar.studies.keys import command_key, is_left_out, list_entries, read_place
 from fourbar_validation.lab.stress.forward_error.families import FAMILIES
 
 EPS = 2.0**-52
@@ -97,7 +97,11 @@ ANGLES = np.linspace(0.0, 6.0, 13)
 
 def numbers_of(scene: Scene) -> dict[str, float]:
     """Every number that a scene states, its angle too."""
-    found = {key: at_place(scene, entry.place) for key, entry in entries(scene).items() if not left_out(scene, entry)}
+    found = {
+        key: read_place(scene, entry.place)
+        for key, entry in list_entries(scene).items()
+        if not is_left_out(scene, entry)
+    }
     return {**found, command_key(scene): float(np.ravel(scene.motion.angle)[0])}
 
 

@@ -14,7 +14,7 @@ import fourbar
 from fourbar import InputError, Motion, PinFriction, Scene, Sweep, uniform
 from fourbar.cli import status
 from fourbar.effects import SpringEnd
-from fourbar.mjcf import mjcf, with_mimic
+from fourbar.mjcf import replace_loop, write_mjcf
 from fourbar.scene import Command
 from fourbar.studies.ratio import GearRatio, ratio
 from tests.support.scenes import crank_rocker
@@ -122,7 +122,7 @@ def test_the_mimic_model_compiles_and_follows(name: str) -> None:
     scene = fourbar.load(MODELS / f"{name}.toml")
     gear = ratio(scene)
     fit = gear.fits[-1]
-    text = with_mimic(mjcf(scene), scene, fit.about, fit.joint_A, fit.theta_4)
+    text = replace_loop(write_mjcf(scene), scene, fit.about, fit.joint_A, fit.theta_4)
     assert "connect" not in text and "_pad" not in text
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)

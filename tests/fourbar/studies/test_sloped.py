@@ -32,9 +32,9 @@ from fourbar.errors import LimitError
 from fourbar.studies import sloped
 from fourbar.studies.enclosure import _Search
 from fourbar.studies.interval import require
-from fourbar.studies.keys import at_place, entries, with_numbers
+from fourbar.studies.keys import list_entries, read_place, replace_numbers
 from fourbar.studies.sloped import Sloped, Undecided
-from fourbar_validation.engines.balls import closure, stored, wedge
+from fourbar_validation.engines.balls import closure, make_balls, wedge
 
 STRADDLED = [(0.0, 1.0), (0.5, 1.0), (-1.0, 1e-3), (2.0, 2.0), (0.0, 0.0)]
 """Centres and radii: over 0, over whole and half numbers, at a kink, and none at all."""
@@ -107,7 +107,7 @@ def compared(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[tuple[str, int], 
         return mask
 
     def of_one(mask: Any, x: Any, y: Any) -> Any:
-        pairs = np.broadcast_arrays(sloped.values(x), sloped.values(y), mask.holds | mask.fails)
+        pairs = np.broadcast_arrays(sloped.take_values(x), sloped.take_values(y), mask.holds | mask.fails)
         for one, other, known in zip(*pairs, strict=True):
             differ = one - other != 0
             assert known or not differ, "two forms of one number that differ"
@@ -199,8 +199,8 @@ def held(each: Scene, at: float, radius: float) -> None:
     search = _Search.__new__(_Search)
     search.arb, search.scene, search.boxes, search.branch = flint.arb, each, 0, 1.0
     search.reach = {tolerance.key: tolerance.reach for tolerance in each.tolerances}
-    search.keys = [key for key in entries(each) if key in search.reach]
-    known, random = entries(each), np.random.default_rng(0)
+    search.keys = [key for key in list_entries(each) if key in search.reach]
+    known, random = list_entries(each), np.random.default_rng(0)
     with np.errstate(all="ignore"):
         over = search.evaluate(np.array([flint.arb(at, radius)], dtype=object), None)
         nominal = search.evaluate(np.array([flint.arb(at)], dtype=object), np.zeros((len(search.keys), 1)))
@@ -213,11 +213,11 @@ def held(each: Scene, at: float, radius: float) -> None:
                 assert not sample > tops[0] and not -sample > tops[1], name
     part = part[:, -1]
     numbers = {
-        key: at_place(each, known[key].place) + search.reach[key] * x
+        key: read_place(each, known[key].place) + search.reach[key] * x
         for key, x in zip(search.keys, part[1:], strict=True)
     }
     solution = fourbar.solve(
-        with_numbers(each, numbers),
+        replace_numbers(each, numbers),
         at=fourbar.scene.Command(
             np.array([at + radius * part[0]]),
             np.ones(1, np.int8),
@@ -237,7 +237,7 @@ def test_a_loop_that_just_closes_closes_however_the_ground_is_turned(ground_angl
     """Its discriminant is 0 exactly; from turned directions it was undecided, and read as open."""
     bars = (Bar(length) for length in (1.0, 2.0, 4.0))
     folded = Scene(FourBar(3.0, *bars, ground_angle=ground_angle), Motion(ground_angle, 1.0))  # type: ignore[misc]
-    closed = closure(stored(folded, ground_angle), 1)
+    closed = closure(make_balls(folded, ground_angle), 1)
     assert closed is not None and abs(float(wedge(*closed[1:]).mid())) < 1e-60
     apart = replace(folded, linkage=replace(folded.linkage, ground=3.0 - 1e-15))
-    assert closure(stored(apart, ground_angle), 1) is None
+    assert closure(make_balls(apart, ground_angle), 1) is None

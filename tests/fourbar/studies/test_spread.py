@@ -14,7 +14,7 @@ import fourbar.formulas.mobility
 from fourbar import Bar, FourBar, InputError, Motion, Scene, Sweep, Tolerance, uniform
 from fourbar.cli import status
 from fourbar.files import dump, loads
-from fourbar.show.tolerances import parted
+from fourbar.show.tolerances import describe_parted
 from fourbar.studies import spread as studied
 from fourbar.studies.spread import tolerances
 from tests.support.scenes import crank_rocker
@@ -68,7 +68,7 @@ def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(monkeypatch:
 def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_there() -> None:
     linkage = uniform(0.2, 0.48, 0.55, 0.2)
     edge = fourbar.formulas.mobility.limit_positions(linkage)[0].theta_2
-    at = edge + 2e-4 * np.sign(fourbar.formulas.mobility.default_range(linkage)[0] - edge)
+    at = edge + 2e-4 * np.sign(fourbar.formulas.mobility.choose_range(linkage)[0] - edge)
     of = Scene(linkage, Motion(np.array([at, at + 0.3]), 1.0), tolerances=(Tolerance("lengths.output", 2e-4),))
     found = tolerances(of, 256)
     assert 0 < found.apart == found.without[0] < 256 and found.without[1] == 0
@@ -108,7 +108,7 @@ def test_the_positions_at_which_first_order_fails_are_named_each() -> None:
         theta_2=np.radians(np.arange(0.0, 361.0, 5.0)),
         spreads={"torque": SimpleNamespace(parted=np.isin(np.arange(73), (0, 1, 9, 72)))},
     )
-    assert "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)" in parted(found, "torque")  # type: ignore[arg-type]
+    assert "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)" in describe_parted(found, "torque")  # type: ignore[arg-type]
 
 
 def test_what_the_study_refuses() -> None:

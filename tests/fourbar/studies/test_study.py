@@ -26,7 +26,7 @@ from fourbar.scene.motion import Free, FromLimit
 from fourbar.scene.motion_law import Law
 from fourbar.scene.point import Point
 from fourbar.studies import study as studying
-from fourbar.studies.keys import entries, placed
+from fourbar.studies.keys import list_entries, replace_place
 from fourbar.studies.study import Study, vary
 
 M, ANGLES = 9, np.array([0.2, 0.9, 2.5, 3.9, 5.6])
@@ -76,16 +76,16 @@ def scene(effects: tuple[Any, ...] = (), drive: int = 2, **motion: Any) -> Scene
 
 def spread(of: Scene) -> dict[str, Any]:
     """A random array for each key of RANGES that the scene has."""
-    random, known = np.random.default_rng(3), entries(of)
+    random, known = np.random.default_rng(3), list_entries(of)
     return {key: random.uniform(*ends, M) for key, ends in RANGES.items() if key in known}
 
 
 def alone(study: Study, given: dict[str, Any], member: int) -> Scene:
     """The scene of one member, its numbers floats."""
-    one, known = study.scene, entries(study.scene)
+    one, known = study.scene, list_entries(study.scene)
     for key in known:
         if key in given:
-            one = placed(one, known[key].place, float(given[key][member]))
+            one = replace_place(one, known[key].place, float(given[key][member]))
     return one
 
 
@@ -112,7 +112,7 @@ def test_blocks_over_members_and_positions_change_no_digit(monkeypatch: pytest.M
     study = vary(whole, spread(whole))
     at_once = solve(study)
     for size in (3, 12):  # positions of one member, and members
-        monkeypatch.setattr(studying, "positions_at_once", lambda wanted, size=size: size)
+        monkeypatch.setattr(studying, "choose_block_size", lambda wanted, size=size: size)
         monkeypatch.setattr(studying, "BLOCK", size)
         piece = solve(study)
         for name in at_once.evaluated():
@@ -194,7 +194,7 @@ def test_a_key_has_the_unit_that_a_scene_file_has() -> None:
     acting, points = (*DRIVEN, PinFriction.at(A=(0.1, 0.01))), (Point("P", 3, (0.1, 0.2)),)
     scene = Scene(linkage, Motion(ANGLES, 2.0, alpha_2=0.5), loads=LOADS, effects=acting, points=points, drive=drive)
     written = tomllib.loads(dump(scene))
-    for key, number in entries(scene).items():
+    for key, number in list_entries(scene).items():
         entry: Any = written
         for name in key.split("."):
             entry = entry[int(name) if isinstance(entry, list) else name]

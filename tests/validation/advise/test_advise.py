@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import fourbar
 from fourbar.scene import Command, command
 from fourbar_validation.advise import advise, matters
-from fourbar_validation.advise.errors import errors
+from fourbar_validation.advise.worst_errors import compute_errors
 from fourbar_validation.cli import status as ended
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import FAILS
@@ -20,9 +20,9 @@ from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.lab.cost import measure
-from fourbar_validation.lab.cost.exhaustive import cheapest
-from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
-from fourbar_validation.run import dial
+from fourbar_validation.lab.cost.exhaustive import find_cheapest
+from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
+from fourbar_validation.run import required_error
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import MODELS
 from tests.validation.lab.cost.test_cost import turning
@@ -61,16 +61,16 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
             rows.setdefault(key, []).append(value)
     found = {key: np.array(values) for key, values in rows.items()}
     at = Command(found["theta_2"], np.ones(steps, dtype=np.int8), found["omega_2"], found["alpha_2"])
-    assert steps < 100 and errors(turning(), at, found).worst <= 1e-5
+    assert steps < 100 and compute_errors(turning(), at, found).worst <= 1e-5
 
 
 def test_what_lies_between_two_steps_is_judged_too() -> None:
     """Two steps are right at both of their ends, and miss what the pin forces do amid them."""
     scene = replace(turning(), motion=fourbar.Motion(fourbar.Sweep(0.0, 1.0, 36), 10.0))
-    setup = TrialSetup(scene, advise.looked_at(scene))
-    trial = setup.try_out(advise.dialled(12.0, 6.0))
-    assert trial.steps == 2 and errors(scene, trial.at, trial.quantities).worst < 2e-3
-    assert matters.judged(scene, trial).worst > 0.1
+    setup = TrialSetup(scene, advise.choose_positions(scene))
+    trial = setup.try_out(advise.make_settings(12.0, 6.0))
+    assert trial.steps == 2 and compute_errors(scene, trial.at, trial.quantities).worst < 2e-3
+    assert matters.judge_trial(scene, trial).worst > 0.1
     found = advise.advise(scene, 1e-2, setup)
     assert found.reached and found.best.steps > 4
     largest = [np.linalg.norm(fourbar.solve(scene, "force", at=at).F12, axis=1).max()
@@ -90,7 +90,7 @@ def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path: Path, monke
     scene.write_text(fourbar.dump(still))
     result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
     assert result.return_value == 1 and "nothing to run through" in result.output
-    scene.write_text(fourbar.dump(SPECIMENS["law"]))
+    scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
     result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
     assert result.return_value == 1 and "motion law" in result.output
 
@@ -99,7 +99,7 @@ def test_a_predicted_error_that_is_no_number_is_no_small_one() -> None:
     values = {"torque": np.ones(2), "F12": np.ones((2, 2))}
     predicted = {"torque": np.full(2, 1e-9), "F12": np.array([1e-9, np.nan])}
     answer = Answer("", "", quantities=values, predicted=predicted)
-    assert dial.expected_error(turning(), answer) == math.inf
+    assert required_error.compute_expected_error(turning(), answer) == math.inf
 
 
 @pytest.mark.parametrize("required", [0.0, 1.0, -1e-3, math.nan])
@@ -107,28 +107,28 @@ def test_an_error_is_between_0_and_1(required: float) -> None:
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
         advise.advise(turning(), required)
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
-        dial.dialled(WITNESSES, required)
+        required_error.adjust_witnesses(WITNESSES, required)
 
 
 def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> None:
     """A few of those of `advise --study`, of every type, judged between the positions that the advice saw."""
     costs = {("RK4", True): 1.0}
     for index in range(2):
-        case = measure.case(99, index, costs)
+        case = measure.measure_case(99, index, costs)
         assert case.met and case.cheap, case
 
 
 def test_the_search_knows_when_nothing_serves() -> None:
     scene = turning(positions=12)
     setup = TrialSetup(scene, command(scene))
-    assert cheapest(setup, 1e-3, {("RK4", True): 1.0}) is not None
+    assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is not None
     trials: list[object] = []
     setup.try_out = lambda settings, build=None: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
-    assert cheapest(setup, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
+    assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
 
 
 def hopeless(scene: fourbar.Scene) -> object:
-    made = TrialSetup(scene, command(scene)).try_out(advise.dialled(10.0, 3.0))
+    made = TrialSetup(scene, command(scene)).try_out(advise.make_settings(10.0, 3.0))
     made.broken = "lost"
     return made
 
@@ -137,8 +137,8 @@ def test_a_count_that_cannot_decide_says_which_one_can(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     case = measure.AdviceCase(0, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
-    monkeypatch.setattr(measure, "case", lambda seed, index, costs: replace(case, index=index))
-    monkeypatch.setattr(measure, "relative_costs", lambda setup: {})
+    monkeypatch.setattr(measure, "measure_case", lambda seed, index, costs: replace(case, index=index))
+    monkeypatch.setattr(measure, "time_relative_costs", lambda setup: {})
     for count, status in ((40, 1), (73, 0)):
         assert ended(["advise", "--study", "--count", str(count), "--out", str(tmp_path / str(count))]) == status
         stated = "undecided: with 0 not met the bound is reached from --count 73 on" in capsys.readouterr().out
@@ -152,8 +152,8 @@ def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         made.append(index)
         return measure.AdviceCase(index, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
 
-    monkeypatch.setattr(measure, "case", case)
-    monkeypatch.setattr(measure, "relative_costs", lambda setup: {})
+    monkeypatch.setattr(measure, "measure_case", case)
+    monkeypatch.setattr(measure, "time_relative_costs", lambda setup: {})
     out = tmp_path / "study"
     list(measure.measure(3, 2, out))
     cases = list(measure.measure(3, 4, out))
@@ -167,7 +167,7 @@ def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 def test_a_run_is_no_more_precise_than_required(required: float) -> None:
     scene = turning(positions=90)
     witnesses = [witness for witness in WITNESSES if witness.through_time]
-    record = judge("s", scene, dial.dialled(witnesses, required))
+    record = judge("s", scene, required_error.adjust_witnesses(witnesses, required))
     assert not [row for row in record.rows if row.verdict == FAILS]
     (answer,) = record.answers
     answers = [row for row in record.rows if row.engine == "mujoco-simulated" and row.quantity != "as shipped"]
@@ -179,7 +179,9 @@ def test_a_run_is_no_more_precise_than_required(required: float) -> None:
 
 
 def test_exact_witnesses_stay_exact() -> None:
-    changed = [new for old, new in zip(WITNESSES, dial.dialled(WITNESSES, 1e-3), strict=True) if new != old]
+    changed = [
+        new for old, new in zip(WITNESSES, required_error.adjust_witnesses(WITNESSES, 1e-3), strict=True) if new != old
+    ]
     assert [witness.name for witness in changed] == ["mujoco-simulated"]
     assert changed[0].tolerance.factor == 1e-3 and changed[0].expected == next(
         w.expected for w in WITNESSES if w.through_time
@@ -193,12 +195,12 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
     hood = fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),))
     for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
                                 (turning(10.0, 36), "the timestep", "fourth power")):  # fmt: skip
-        setup = TrialSetup(scene, advise.looked_at(scene))
-        first, *others = found = matters.influences(scene, setup, advise.dialled(40.0, 12.0))
-        assert first.setting == setting and first.times > 10.0 and why in matters.sentence(found)
+        setup = TrialSetup(scene, advise.choose_positions(scene))
+        first, *others = found = matters.measure_influences(scene, setup, advise.make_settings(40.0, 12.0))
+        assert first.setting == setting and first.times > 10.0 and why in matters.write_sentence(found)
         assert all(first.times >= other.times for other in others)
     quiet = [replace(each, times=1.5) for each in found]
-    assert matters.sentence(quiet).startswith("no setting matters by itself")
+    assert matters.write_sentence(quiet).startswith("no setting matters by itself")
 
 
 def test_several_scenes_have_one_table(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import fourbar
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.mobility import limit_positions
 from fourbar.scene import Command, Scene, command
-from fourbar_validation.check.model import ModelReport
+from fourbar_validation.check.mjcf import ModelReport
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer, Released
 from fourbar_validation.compare.columns import read_columns
@@ -24,11 +24,11 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.lab.cost.laws import ErrorLaw
 from fourbar_validation.regression import render
-from fourbar_validation.regression.changes import differences
-from fourbar_validation.report.html import html as page_of
-from fourbar_validation.report.html import markdown
+from fourbar_validation.regression.changes import compare_rows
+from fourbar_validation.report.html import write_html as page_of
+from fourbar_validation.report.html import write_markdown
 from fourbar_validation.run import released as free
-from fourbar_validation.run.judge import judge, judged
+from fourbar_validation.run.judge import judge, judge_for_report
 from tests.support.here import judge_here, summary_of
 from tests.support.scenes import crank_rocker
 from tests.validation.regression.test_regression import HERE, ROW, save
@@ -53,16 +53,16 @@ def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named() -> None
         "three": [("a", "torque", DEGRADED, 0.5), ("b", "torque", REFUSES, NAN)],
     }
     records = [
-        replace(judged("", crank_rocker(), ()), name=name, rows=[row(name, *of) for of in many])
+        replace(judge_for_report("", crank_rocker(), ()), name=name, rows=[row(name, *of) for of in many])
         for name, many in scenes.items()
     ]
     summary = summary_of(records)
     assert (summary.loose, summary.pairs) == (2, 5)
     stated = "2 of 5 quantities of a scene are at best"
-    for form in (markdown(summary), page_of(summary, dict.fromkeys(scenes, 2))):
+    for form in (write_markdown(summary), page_of(summary, dict.fromkeys(scenes, 2))):
         text = html.unescape(form)
         assert stated in text and "torque of three (allowed 5.0e-01), F12 of one (allowed 2.0e-04)" in text
-    assert stated not in markdown(summary_of(records[1:2]))
+    assert stated not in write_markdown(summary_of(records[1:2]))
 
 
 IDENTITY = replace(ROW, engine="formulas", quantity="closure")
@@ -171,7 +171,7 @@ def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
 
 def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "fourbar_validation.run.question.reversing", lambda scene, solution, _: np.ones(len(solution), bool)
+        "fourbar_validation.run.question.mark_reversing", lambda scene, solution, _: np.ones(len(solution), bool)
     )
     verdicts = {row.quantity: row.verdict for row in judge("scene", crank_rocker(), []).rows}
     expected = {"closure": AGREES, "force_sum": UNDECIDED, "moment_sum": UNDECIDED}
@@ -221,14 +221,14 @@ def test_every_form_of_a_report_says_the_same_counts() -> None:
     refused = Witness("echo", Refuses, EQUIVALENCE)
     exact = next(w for w in WITNESSES if w.name == "free-body")
     good, bad = (
-        judged(name, crank_rocker(title=name), witnesses, draw=False)
+        judge_for_report(name, crank_rocker(title=name), witnesses, draw=False)
         for name, witnesses in (("good", (exact, refused)), ("refused", (refused,)))
     )
     summary = summary_of([good, bad])
     # the rows of the formulas themselves stand on both scenes; the others are of the free bodies
     sentence = "All 54 comparisons on 1 of 2 scenes hold: 54 agree; not compared: 2 refuse"
     assert summary.verdict == sentence == summary.counts.sentence() and summary.good
-    assert sentence in markdown(summary)
+    assert sentence in write_markdown(summary)
     page = page_of(summary, {})
     assert sentence in html.unescape(page)
     assert page.count('class="cell refuses"') == 4 and ">nothing compared</span>" in page
@@ -245,13 +245,13 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest
 
     monkeypatch.setattr(free, "ENGINES", {name: (Refusing, *rest) for name, (_, *rest) in free.ENGINES.items()})
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
-    page = judged("free", scene, (), draw=False)
+    page = judge_for_report("free", scene, (), draw=False)
     sentence = "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2 refuse"
     assert summary_of([page]).verdict == sentence
 
 
 def junit(old: list[Row], new: list[Row]) -> ET.Element:
-    return ET.fromstring(render.junit(differences((HERE, old), (HERE, new))))
+    return ET.fromstring(render.write_junit(compare_rows((HERE, old), (HERE, new))))
 
 
 def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> None:
@@ -284,14 +284,14 @@ def test_two_runs_without_a_comparison_in_common_are_no_success(
     folders = [str(save(tmp_path / name, each)) for name, each in (("old", old), ("new", new))]
     assert status(["compare", *folders]) == code
     assert sentence in capsys.readouterr().out
-    found = differences((HERE, old), (HERE, new))
-    sentence = render.verdict(found)
-    assert sentence in html.unescape(render.html(found)) and sentence in render.markdown(found)
+    found = compare_rows((HERE, old), (HERE, new))
+    sentence = render.write_verdict(found)
+    assert sentence in html.unescape(render.write_html(found)) and sentence in render.write_markdown(found)
 
 
 def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
     both = [*rows(fail=1), *rows(agree=1)]
-    assert differences((HERE, rows(agree=1)), (HERE, both)).regressed
+    assert compare_rows((HERE, rows(agree=1)), (HERE, both)).regressed
 
 
 def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -313,6 +313,6 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(
     monkeypatch.setattr("fourbar_validation.lab.cost.cost.write", lambda *_: [])
     law = ErrorLaw("order", "torque", 4.0, 0.1, 4.0, 9)
     for found, code in (([], FAILED), ([replace(law, points=1)], FAILED), ([law], HOLDS)):
-        monkeypatch.setattr("fourbar_validation.lab.cost.cost.laws", lambda _, found=found: found)
+        monkeypatch.setattr("fourbar_validation.lab.cost.cost.fit_laws", lambda _, found=found: found)
         assert status(["cost", "--out", str(tmp_path)]) == code
         assert ("Nothing was compared" in capsys.readouterr().out) == (code == FAILED)

@@ -10,7 +10,7 @@ from fourbar.effects import Friction
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solve import solve
-from fourbar_validation.compare.reversals import broken, reversals
+from fourbar_validation.compare.reversals import break_curve, find_reversals
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
 
@@ -37,7 +37,7 @@ def dead_centres() -> list[float]:
 def test_they_are_where_geometry_puts_them(pin: str, places: list[float]) -> None:
     """The rocker turns at its dead centres; bars 3 and 4 turn together where A lies on the line of centres."""
     posed = scene(pin)
-    found = reversals(posed, command(posed), solve(posed))
+    found = find_reversals(posed, command(posed), solve(posed))
     assert [reversal.theta_2 for reversal in found] == pytest.approx(places, abs=ROUNDING)
     assert {reversal.pin for reversal in found} <= {pin}
 
@@ -45,7 +45,7 @@ def test_they_are_where_geometry_puts_them(pin: str, places: list[float]) -> Non
 def test_the_jump_is_that_of_statics() -> None:
     """The couple on bar 4 changes by 2 f; bar 3 takes the change as a force along itself: 2 f = c |sin mu| |dF43|."""
     posed = scene("O4")
-    for reversal in reversals(posed, command(posed), solve(posed)):
+    for reversal in find_reversals(posed, command(posed), solve(posed)):
         sine = abs(float(reversal.before.sin_mu[0]))
         assert reversal.jump("F43") == pytest.approx(2 * FRICTION / (C * sine), rel=1e-9)
         assert reversal.jump("torque") < 1e-9  # its power f |slip| is continuous
@@ -65,9 +65,9 @@ def test_both_sides_are_judged_and_the_reversal_itself_is_not(start: float) -> N
 def test_a_curve_is_not_drawn_across_the_jump() -> None:
     posed = scene("O4")
     solution = solve(posed)
-    found = reversals(posed, command(posed), solution)
+    found = find_reversals(posed, command(posed), solution)
     assert solution.F43 is not None
-    x, y = broken(solution.theta_2, solution.F43[:, 0], found, lambda side: side.F43[:, 0])  # type: ignore[index]
+    x, y = break_curve(solution.theta_2, solution.F43[:, 0], found, lambda side: side.F43[:, 0])  # type: ignore[index]
     gaps = np.flatnonzero(np.isnan(y))
     assert len(gaps) == len(found) == 2 and len(x) == len(y) == len(solution) + 6
     for gap, reversal in zip(gaps, found, strict=True):

@@ -24,7 +24,7 @@ from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run import pool
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.selection import askable, chosen, selected
+from fourbar_validation.run.selection import choose_witnesses, find_askable, select_scenes
 from tests.support.scenes import crank_rocker
 
 HERE = "tests.validation.engines.test_added:"
@@ -34,7 +34,7 @@ FREE_BODY = tuple(witness for witness in WITNESSES if witness.name == "free-body
 
 def verdicts(scene: fourbar.Scene, *names: str) -> dict[str, dict[str, str]]:
     """By engine and quantity, of the witnesses of these names in this file and the free bodies."""
-    witnesses = (*added.named([name if ":" in name else HERE + name for name in names], ()), *FREE_BODY)
+    witnesses = (*added.read_witnesses([name if ":" in name else HERE + name for name in names], ()), *FREE_BODY)
     found: dict[str, dict[str, str]] = {}
     for row in judge("scene", scene, witnesses).rows:
         found.setdefault(row.engine, {})[row.quantity] = row.verdict
@@ -217,7 +217,7 @@ def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     save(SCENE, tmp_path / "scene.toml")
     limits = []
 
-    over_processes = workers.over_processes
+    over_processes = workers.apply_over_processes
 
     def here(function: Any, chunks: Any, *rest: Any, seconds: float, instead: Any) -> Iterator[Any]:
         if function is not pool.judge_job:
@@ -225,8 +225,8 @@ def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         limits.append(seconds)
         return ((number, [function(job) for job in jobs]) for number, jobs in chunks)
 
-    monkeypatch.setattr(workers, "over_processes", here)
-    monkeypatch.setattr("fourbar_validation.run.run.html", lambda *_, **__: "")
+    monkeypatch.setattr(workers, "apply_over_processes", here)
+    monkeypatch.setattr("fourbar_validation.run.run.write_html", lambda *_, **__: "")
     out = ["--out", str(tmp_path / "out"), "--engines", "free-body", "--time-limit", "2.5", "--no-pictures"]
     assert (
         status(["run", str(tmp_path / "scene.toml"), "--witness", HERE + "Right", "--witness", HERE + "Raises", *out])
@@ -253,7 +253,7 @@ def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 )
 def test_what_is_no_witness_is_refused_in_one_line(adapter: str, part: str) -> None:
     with pytest.raises(InputError) as error:
-        selected((), None, None, 0, "", (adapter,))
+        select_scenes((), None, None, 0, "", (adapter,))
     assert str(error.value).startswith(f"--witness = {adapter!r}: ") and part in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -261,12 +261,12 @@ def test_what_is_no_witness_is_refused_in_one_line(adapter: str, part: str) -> N
 def test_entry_points_join_and_a_broken_one_is_missing_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     points = [EntryPoint("one", HERE + "Right", added.GROUP), EntryPoint("two", "no.such:Class", added.GROUP)]
     monkeypatch.setattr(added, "entry_points", lambda group: [p for p in points if p.group == group])
-    _, witnesses = selected((), None, None, 0, "")
-    present, missing = askable(chosen(None, witnesses), by_name=False)
+    _, witnesses = select_scenes((), None, None, 0, "")
+    present, missing = find_askable(choose_witnesses(None, witnesses), by_name=False)
     assert present[-1].name == "right"
     assert "No module named 'no'" in dict(missing)["two"]
 
 
 def test_the_hard_suite_holds_it_to_what_it_states() -> None:
-    _, witnesses = selected((), "hard", None, 0, "", (HERE + "Right",))
+    _, witnesses = select_scenes((), "hard", None, 0, "", (HERE + "Right",))
     assert witnesses[-1].predictor and witnesses[-1].engine().name == "right"

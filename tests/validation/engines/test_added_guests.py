@@ -24,8 +24,8 @@ from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import pool
 from fourbar_validation.run.run import RunOptions, run
-from fourbar_validation.run.selection import chosen
-from fourbar_validation.scenes.suites import scene_files
+from fourbar_validation.run.selection import choose_witnesses
+from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import ROOT
@@ -292,7 +292,7 @@ def test_what_a_module_does_where_it_is_imported_is_one_line(
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(added, "LONGEST_IMPORT", 5.0)
     with pytest.raises(InputError, match=re.escape(reason)):
-        added.named(["imported:Witness"], ())
+        added.read_witnesses(["imported:Witness"], ())
     assert "imported" not in sys.modules
 
 
@@ -321,12 +321,14 @@ def test_parts_judged_with_another_code_or_limit_are_made_again(
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "mine.py").write_text(WITNESS)
     save(SCENE, tmp_path / "scene.toml")
-    suite = scene_files((tmp_path / "scene.toml",))
+    suite = read_scene_files((tmp_path / "scene.toml",))
     judge_here(monkeypatch)
 
     def notes(factor: str, seconds: float | None = None) -> list[str]:
         (tmp_path / "near.py").write_text(NEAR.replace("FACTOR", factor))
-        steps = run(suite, tmp_path / "out", added.named(["mine:Mine"], ()), RunOptions(seconds=seconds, drawn=False))
+        steps = run(
+            suite, tmp_path / "out", added.read_witnesses(["mine:Mine"], ()), RunOptions(seconds=seconds, drawn=False)
+        )
         found = []
         for step in steps:
             found += [step] if isinstance(step, str) else []
@@ -344,9 +346,12 @@ def test_parts_judged_with_another_code_or_limit_are_made_again(
 def test_a_scene_without_rows_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save(SCENE, tmp_path / "scene.toml")
     judge_here(monkeypatch)
-    monkeypatch.setattr(pool, "judged", lambda name, *_, **__: Record(name))
+    monkeypatch.setattr(pool, "judge_for_report", lambda name, *_, **__: Record(name))
     *_, last = run(
-        scene_files((tmp_path / "scene.toml",)), tmp_path / "out", chosen("free-body"), RunOptions(drawn=False)
+        read_scene_files((tmp_path / "scene.toml",)),
+        tmp_path / "out",
+        choose_witnesses("free-body"),
+        RunOptions(drawn=False),
     )
     assert isinstance(last, Summary) and last.counts.status == FAILED
     assert "nothing was judged" in (tmp_path / "out" / "results.csv").read_text()

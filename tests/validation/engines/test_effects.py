@@ -26,10 +26,10 @@ from fourbar.effects import (
     Torsion,
     Viscous,
 )
-from fourbar.effects.actions import Actions, bodies
+from fourbar.effects.actions import Actions, list_bodies
 from fourbar.files.effects import REGISTRY
 from fourbar.formulas.arithmetic import dot
-from fourbar.formulas.path import state
+from fourbar.formulas.path import compute_state
 from fourbar.linkage import MOVING_BARS
 from fourbar.mjcf.effects import NO_MJCF
 from fourbar.scene import Scene, command
@@ -310,10 +310,10 @@ def test_the_work_of_an_effect_is_that_of_the_forces_on_the_free_bodies(
     """Power = sum of F v + M omega, with F and M of the witness and velocities of the first pins; a sign must show."""
     posed, effect = scene(name), ACTING[name]
     where, linkage = command(posed), posed.linkage
-    moving = state(linkage, where.theta_2, where.branch, 10.0, 3.0)
+    moving = compute_state(linkage, where.theta_2, where.branch, 10.0, 3.0)
     n = len(where.theta_2)
     closed = close(linkage, where.theta_2, where.branch)
-    on = free_body_effects.acting(
+    on = free_body_effects.sum_acting(
         posed, free_body.move(linkage, where.theta_2, np.full(n, 10.0), np.full(n, 3.0), *closed.theta)
     )
     pin = {2: 0.0j, 3: moving.velocity(2, linkage.input.length), 4: 0.0j}
@@ -322,7 +322,7 @@ def test_the_work_of_an_effect_is_that_of_the_forces_on_the_free_bodies(
     expected = np.array([by_bar[2] + others, others])
 
     def off() -> float:
-        actions = Actions(moving, bodies(linkage))
+        actions = Actions(moving, list_bodies(linkage))
         effect.act(actions, moving)
         # of all bars, and of bars 3 and 4 alone
         return max(

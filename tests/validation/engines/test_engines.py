@@ -24,7 +24,7 @@ from fourbar_validation.engines import loop
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
-from fourbar_validation.engines.tree import closed
+from fourbar_validation.engines.tree import solve_closed
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType
@@ -407,11 +407,11 @@ def test_rates_close_the_loop_and_give_the_commanded_bar_its_own() -> None:
     rng = np.random.default_rng(3)
     for _ in range(100):
         jacobian, turn, (rate, x, y) = rng.normal(size=(2, 3)), rng.normal(size=3), rng.normal(size=3)
-        rates = closed(jacobian, rate, turn, x, y)
+        rates = solve_closed(jacobian, rate, turn, x, y)
         np.testing.assert_allclose(jacobian @ rates, (-x, -y), atol=1e-12 * np.abs(rates).max())
         assert turn @ rates == pytest.approx(rate, abs=1e-12 * np.abs(rates).max())
     with pytest.raises(np.linalg.LinAlgError):
-        closed(np.ones((2, 3)), 1.0)
+        solve_closed(np.ones((2, 3)), 1.0)
 
 
 def twice(row: Callable[..., Any]) -> Callable[..., Any]:

@@ -16,7 +16,7 @@ from fourbar.linkage import PINS
 from fourbar.quantities import OF_LINE, STAGE_OF
 from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
-from fourbar_validation.engines.free_body import FreeBody, slide
+from fourbar_validation.engines.free_body import FreeBody, grow_couples
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
@@ -200,7 +200,7 @@ def test_dry_friction_does_nothing_at_rest() -> None:
 )
 def test_friction_of_one_pin(F: complex, C: complex, x: float) -> None:
     """x = |F + C x| by hand; where the couple adds to its own load by as much as it is, the pin jams."""
-    found = slide(np.array([[F]], dtype=complex), np.array([[[C]]], dtype=complex), np.array([1.0]))
+    found = grow_couples(np.array([[F]], dtype=complex), np.array([[[C]]], dtype=complex), np.array([1.0]))
     assert found[0, 0] == pytest.approx(x, rel=1e-14, nan_ok=True)
 
 
@@ -208,7 +208,7 @@ def test_friction_of_several_pins_fulfils_its_equations() -> None:
     rng = np.random.default_rng(0)
     F, C = (rng.normal(size=(200, *shape)) + 1j * rng.normal(size=(200, *shape)) for shape in ((3,), (3, 3)))
     k = np.array([0.05, 0.1, 0.02])
-    x = slide(F, C, k)
+    x = grow_couples(F, C, k)
     load = np.abs(F + (C * x[:, None, :]).sum(axis=-1))
     assert (x > 0.0).all()
     assert np.abs(x - k * load).max() <= DIGITS * np.abs(x).max()
@@ -216,7 +216,7 @@ def test_friction_of_several_pins_fulfils_its_equations() -> None:
 
 def test_a_singular_position_costs_no_other() -> None:
     matrix = np.array([[[1.0, 2.0], [2.0, 4.0]], [[2.0, 0.0], [0.0, 4.0]], [[np.nan, 1.0], [1.0, 1.0]]])
-    x, residual = free_body.solved(matrix, np.ones((3, 2, 1)))
+    x, residual = free_body.solve_system(matrix, np.ones((3, 2, 1)))
     assert np.isnan(x[[0, 2]]).all() and np.array_equal(x[1, :, 0], [0.5, 0.25]) and residual == 0.0
 
 
@@ -245,7 +245,12 @@ def test_without_a_fault_nothing_fails() -> None:
 
 
 def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None:
-    close, matrix, inertia, acting = free_body.close, free_body._matrix, free_body._add_inertia, free_body.acting
+    close, matrix, inertia, acting = (
+        free_body.close,
+        free_body._make_matrix,
+        free_body._add_inertia,
+        free_body.sum_acting,
+    )
 
     def arm_turned(motion: Any, drive_bar: int) -> Any:
         made = matrix(motion, drive_bar)
@@ -260,9 +265,9 @@ def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None
             lambda linkage, theta_2, branch, bar: close(linkage, theta_2, -branch, bar),
             {"theta_3", "theta_4", "torque"},
         ),
-        "_matrix": (arm_turned, {"torque"}),
+        "_make_matrix": (arm_turned, {"torque"}),
         "_add_inertia": (still, {"F12", "F32", "F43", "F14", "torque"}),
-        "acting": (lambda scene, motion: acting(replace(scene, loads=()), motion), {"F43", "torque"}),
+        "sum_acting": (lambda scene, motion: acting(replace(scene, loads=()), motion), {"F43", "torque"}),
     }
     for name, (fault, expected) in faults.items():
         with monkeypatch.context() as patch:

@@ -21,15 +21,15 @@ from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard
 from fourbar_validation.engines.limits import LIMITS
 from fourbar_validation.engines.mujoco import simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
-from fourbar_validation.engines.mujoco.shipped import shipped
-from fourbar_validation.engines.prediction import from_data, in_world_axes
-from fourbar_validation.engines.witnesses import Predictor, Witness, answering_nearby
-from fourbar_validation.report.hard_page import page
+from fourbar_validation.engines.mujoco.shipped import compare_shipped
+from fourbar_validation.engines.prediction import predict_from_data, predict_in_world_axes
+from fourbar_validation.engines.witnesses import Predictor, Witness, make_nearby
+from fourbar_validation.report.hard_page import write_page
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.released import as_pendulum
+from fourbar_validation.run.released import make_pendulum
 from fourbar_validation.scenes import hard_families as families
 from fourbar_validation.scenes.hard_families import FAMILIES, TOGGLE, Family, toggle
-from fourbar_validation.scenes.hard_linkages import at, collinear_3_4, dressed, linkage_of
+from fourbar_validation.scenes.hard_linkages import draw_linkage, dress, find_collinear_3_4, set_angles
 from fourbar_validation.scenes.random import DrawnType
 from tests.support.engine_limits import MEASURED, Measured
 from tests.support.scenes import crank_rocker
@@ -63,9 +63,9 @@ def _fewer(scene: Scene, steps: int = 12) -> Scene:
 
 
 def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
-    lengths = linkage_of(DrawnType.TRIPLE_ROCKER, 0)
-    (psi, stretched), *_ = collinear_3_4(lengths)
-    beyond = at(dressed(lengths), psi + (1.0 if stretched else -1.0) * np.array(TOGGLE))
+    lengths = draw_linkage(DrawnType.TRIPLE_ROCKER, 0)
+    (psi, stretched), *_ = find_collinear_3_4(lengths)
+    beyond = set_angles(dress(lengths), psi + (1.0 if stretched else -1.0) * np.array(TOGGLE))
     assert not fourbar.solve(beyond).assembled.any()
     for witness in EXACT:
         answer = witness.engine().answer(beyond, fourbar.command(beyond))
@@ -79,9 +79,9 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A millionth of the torque stood within what the last digits of theta_2 excuse there, for every engine."""
-    lengths, true = linkage_of(DrawnType.TRIPLE_ROCKER, 0), fourbar_validation.run.question.solve
-    (psi, stretched), *_ = collinear_3_4(lengths)
-    near = at(dressed(lengths), psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]))
+    lengths, true = draw_linkage(DrawnType.TRIPLE_ROCKER, 0), fourbar_validation.run.question.solve
+    (psi, stretched), *_ = find_collinear_3_4(lengths)
+    near = set_angles(dress(lengths), psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]))
     balls = [witness for witness in HARD_WITNESSES if witness.nearby]
 
     def verdicts() -> dict[str, str]:
@@ -102,20 +102,20 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
 
 
 def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
-    scene = dressed(families.PLAIN)
-    command = fourbar.command(at(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13]))
-    formulas, balls = fourbar.solve(at(scene, [0.7] * 3)), HARD_WITNESSES[0]
-    nearby = answering_nearby(balls, scene, command, formulas)
+    scene = dress(families.PLAIN)
+    command = fourbar.command(set_angles(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13]))
+    formulas, balls = fourbar.solve(set_angles(scene, [0.7] * 3)), HARD_WITNESSES[0]
+    nearby = make_nearby(balls, scene, command, formulas)
     assert nearby is not None and np.isfinite(nearby(np.ones(3, dtype=bool))["torque"]).tolist() == [True, True, False]
 
 
 def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
     """Of a shift in many digits: 1e-9 rad from a limit position a sine of the formulas is met to its last digit."""
-    lengths = linkage_of(DrawnType.TRIPLE_ROCKER, 0)
-    (psi, stretched), *_ = collinear_3_4(lengths)
-    near = at(dressed(lengths), psi + (-1.0 if stretched else 1.0) * np.array([0.3, 1e-3, 1e-9]))
+    lengths = draw_linkage(DrawnType.TRIPLE_ROCKER, 0)
+    (psi, stretched), *_ = find_collinear_3_4(lengths)
+    near = set_angles(dress(lengths), psi + (-1.0 if stretched else 1.0) * np.array([0.3, 1e-3, 1e-9]))
     command, formulas = fourbar.command(near), fourbar.solve(near)
-    nearby = answering_nearby(HARD_WITNESSES[0], near, command, formulas)
+    nearby = make_nearby(HARD_WITNESSES[0], near, command, formulas)
     assert nearby is not None
     np.testing.assert_allclose(nearby(np.ones(3, dtype=bool))["sin_mu"], formulas.sin_mu, rtol=1e-15)
 
@@ -155,12 +155,12 @@ def _equivalence() -> Any:
 
 def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses() -> None:
     """1e-8 rad from a toggle K eps/s^3 allows all; roundings of the data allow 4e-5."""
-    lengths = linkage_of(DrawnType.TRIPLE_ROCKER, 1)
-    (psi, _), *_ = collinear_3_4(lengths)
-    scene = at(dressed(lengths, 1), psi - 1e-8)
+    lengths = draw_linkage(DrawnType.TRIPLE_ROCKER, 1)
+    (psi, _), *_ = find_collinear_3_4(lengths)
+    scene = set_angles(dress(lengths, 1), psi - 1e-8)
     assert verdict_of(Wrong, scene, None)[0] == AGREES
-    assert verdict_of(Wrong, scene, in_world_axes)[0] == FAILS
-    verdict, allowed = verdict_of(AlmostRight, scene, in_world_axes)
+    assert verdict_of(Wrong, scene, predict_in_world_axes)[0] == FAILS
+    verdict, allowed = verdict_of(AlmostRight, scene, predict_in_world_axes)
     assert verdict == DEGRADED and allowed < Wrong.part
 
 
@@ -169,9 +169,9 @@ def test_predictions_know_what_no_law_in_sines_knows() -> None:
     for name, scene in toggle(distances=(1e-4,), seeds=range(1)):
         at_ = fourbar.command(scene)
         for quantity in ("torque", "F32"):
-            error = from_data(scene, at_, quantity)
+            error = predict_from_data(scene, at_, quantity)
             known = np.isfinite(error)
-            assert known.any() and (error[known] <= in_world_axes(scene, at_, quantity)[known]).all(), name
+            assert known.any() and (error[known] <= predict_in_world_axes(scene, at_, quantity)[known]).all(), name
 
 
 def test_every_declared_limit_is_measured() -> None:
@@ -250,7 +250,7 @@ def test_a_reset_and_what_caused_it_are_seen(what: str, monkeypatch: pytest.Monk
 
 
 def test_an_alarm_fails_its_row(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulate, "alarms", lambda *_: ["the sky falls"])
+    monkeypatch.setattr(simulate, "list_alarms", lambda *_: ["the sky falls"])
     rows = [r for r in judge("scene", SWEEP, [w for w in HARD_WITNESSES if w.through_time]).rows]
     assert any(row.verdict == FAILS and row.reason == "the sky falls" for row in rows)
 
@@ -258,7 +258,7 @@ def test_an_alarm_fails_its_row(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_free_motion_through_change_points_in_every_engine() -> None:
     """IFToMM A02, one window, ten seconds: lim.ii.udc.es/mbsbenchmark."""
     (name, scene), *_ = families.released(durations=(10.0,), steps=10)
-    pendulum = as_pendulum(scene)
+    pendulum = make_pendulum(scene)
     assert pendulum is not None
     phi, _ = pendulum.motion(np.array([10.0]))
     assert abs(math.cos(phi[0] + math.pi / 2) - 0.478385058) < 1e-9
@@ -288,7 +288,7 @@ def test_an_engine_that_drifts_unpredicted_fails(monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_page_says_every_limit_and_statement() -> None:
-    text = page("<svg></svg>")
+    text = write_page("<svg></svg>")
     assert all(escape(family.statement) in text for family in FAMILIES)
     assert all(escape(limit.of.name) in text for limit in LIMITS)
 
@@ -310,12 +310,12 @@ def test_a_golden_file_of_others_swept_through_its_change_point() -> None:
 def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name: str, why: str | None) -> None:
     suite = Hard()
     scene = next(suite.scene(index) for index in range(len(suite)) if suite.name(index) == name)
-    row = shipped(name, scene, fourbar.command(scene))
+    row = compare_shipped(name, scene, fourbar.command(scene))
     assert row is not None
     assert (row.verdict, why is None or why in row.reason) == (AGREES if why is None else UNDECIDED, True)
 
 
 def test_the_file_of_an_input_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches() -> None:
     scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(fourbar.Sweep(0.1, 6.0, 4), 1e-9, 100.0))
-    row = shipped("quickening", scene, fourbar.command(scene))
+    row = compare_shipped("quickening", scene, fourbar.command(scene))
     assert row is not None and row.verdict == AGREES, row

@@ -8,7 +8,7 @@ import pytest
 import fourbar
 from fourbar.studies.ratio import ratio
 from fourbar_validation.cli import status
-from fourbar_validation.lab.mimic import lost
+from fourbar_validation.lab.mimic import simulate_lost
 from tests.whole.test_imports import ROOT
 
 BONNET = ROOT / "models" / "gallery" / "bonnet_hinge.toml"
@@ -16,7 +16,7 @@ BONNET = ROOT / "models" / "gallery" / "bonnet_hinge.toml"
 
 def test_the_simulations_lose_what_the_formulas_state() -> None:
     scene = fourbar.load(ROOT / "models" / "crank_rocker.toml")
-    gear, (loop, best, one) = ratio(scene), lost(scene)
+    gear, (loop, best, one) = ratio(scene), simulate_lost(scene)
     assert max(loop.parts.values()) < 1e-6 and loop.angle < 1e-6 and set(loop.parts) > {"F43"}
     for fit, found in ((gear.fits[3], best), (gear.fits[0], one)):
         assert "F43" not in found.parts
@@ -24,7 +24,7 @@ def test_the_simulations_lose_what_the_formulas_state() -> None:
         assert found.parts["torque"] == pytest.approx(fit.torque.value / np.abs(gear.torque).max(), rel=0.05)
         assert min(found.parts[name] for name in ("F12", "F32", "F14")) > 0.1
     bonnet = fourbar.load(BONNET)  # where the joints have yet to settle they are wrong by five times as much
-    gear, (_, best, _) = ratio(bonnet), lost(bonnet)
+    gear, (_, best, _) = ratio(bonnet), simulate_lost(bonnet)
     assert best.parts["torque"] == pytest.approx(gear.fits[3].torque.value / np.abs(gear.torque).max(), rel=0.1)
 
 

@@ -11,9 +11,9 @@ from click.testing import CliRunner
 import fourbar
 from fourbar.formulas.mobility import limit_positions
 from fourbar_validation.compare.tolerance import EPS
-from fourbar_validation.lab.ladder import ladder_rows, published
-from fourbar_validation.published import check as command
-from fourbar_validation.published.check import explained, figures, reason
+from fourbar_validation.lab.ladder import list_ladder_rows, published
+from fourbar_validation.published import comparison as command
+from fourbar_validation.published.comparison import explain_difference, is_explained, list_figures
 from fourbar_validation.published.figures import ERRATA, PublishedFigure, compare
 from fourbar_validation.published.program import (
     DATA,
@@ -22,15 +22,15 @@ from fourbar_validation.published.program import (
     THETA_1,
     THETA_2,
     ProgramErrors,
-    equations,
-    ladder,
-    printed,
-    right_unknowns,
+    climb_ladder,
+    compute_right_unknowns,
+    compute_thesis_program,
+    make_equations,
+    make_scene,
+    read_printed,
     round_off,
-    scene,
-    thesis_program,
 )
-from fourbar_validation.published.textbook import SCENES, answers, textbook_figures, value
+from fourbar_validation.published.textbook import SCENES, compare_textbooks, compute_value, list_answers
 from tests.support import scenes
 
 LISTED = 0.5e-12
@@ -45,18 +45,18 @@ T4 = (
 )  # fmt: skip
 F12X = (7.033117757022, 7.033839565011, 161.418472567466, 161.418320162565, 161.418168408309)
 MODELS = Path(__file__).parents[3] / "models"
-ALL = tuple(figures())
+ALL = tuple(list_figures())
 
 
 def test_the_published_torque_error_by_error() -> None:
     for name, listed in (("T4", T4), ("F12x", F12X)):
-        for figure, (_, x), (_, *step) in zip(listed, ladder(), STEPS, strict=name == "T4"):
+        for figure, (_, x), (_, *step) in zip(listed, climb_ladder(), STEPS, strict=name == "T4"):
             assert x[name] == pytest.approx(figure, rel=0.0, abs=LISTED + round_off(*step)[name])
 
 
 def test_the_thesis_without_its_errors_is_ours() -> None:
     """The 13 x 13 system in kg, cm, s against our formulas in SI."""
-    right, program, apart = right_unknowns(), ladder()[0][1], round_off(ProgramErrors())
+    right, program, apart = compute_right_unknowns(), climb_ladder()[0][1], round_off(ProgramErrors())
     assert program.keys() == right.keys()
     for name, unknown in program.items():
         assert unknown == pytest.approx(right[name], rel=0.0, abs=apart[name])
@@ -64,7 +64,7 @@ def test_the_thesis_without_its_errors_is_ours() -> None:
 
 def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise() -> None:
     """Against fifty digits: rows in any order, each number moved by a rounding; the bound is not idle either."""
-    matrix, sides = equations(ProgramErrors())
+    matrix, sides = make_equations(ProgramErrors())
     with mpmath.workdps(50):
         exact = [float(x) for x in mpmath.lu_solve(mpmath.matrix(matrix.tolist()), mpmath.matrix(sides.tolist()))]
     order, worst = np.random.default_rng(0), np.zeros(13)
@@ -77,7 +77,7 @@ def test_round_off_holds_for_other_pivots_and_inputs_typed_otherwise() -> None:
 
 
 def test_rows_for_the_report() -> None:
-    rows = ladder_rows()
+    rows = list_ladder_rows()
     assert [row.erratum for row in rows] == ["", "3", "1", "2", "4", "5", "manual", "5b"]
     assert f"{rows[0].torque:.3f}" == "309.309" and f"{rows[-1].torque:.3f}" == "308.804"
     assert [f"{x:.3f}" for x in rows[-1].F12] == ["161.418", "-156.506"]
@@ -124,7 +124,7 @@ def test_every_figure_is_compared() -> None:
 def test_every_difference_is_what_its_errata_make_of_ours() -> None:
     """Save three misprints, for which no computation is known; an agreement needs no misprint to explain it."""
     differ = [figure for figure in ALL if figure.verdict() == "differs"]
-    assert all(explained(figure) for figure in differ)
+    assert all(is_explained(figure) for figure in differ)
     misprints = {figure.name: figure.errata for figure in differ if not figure.reproduced()}
     assert misprints == {"k3_2_in_eq_5_6": ("12b",), "k4_1": ("12b",), "tetaDos_deg": ("17",)}
     assert {name for name, entry in ERRATA.items() if not entry.reproduced} == {"12b", "17"}
@@ -162,7 +162,7 @@ def solve_as_printed(sides: list[str], arms: list[list[str]]) -> float:
 
 def test_torques_that_the_errata_state() -> None:
     def program(*made: int) -> float:
-        return thesis_program(ProgramErrors(*(number in made for number in (3, 1, 2, 4, 5))))["T4"]
+        return compute_thesis_program(ProgramErrors(*(number in made for number in (3, 1, 2, 4, 5))))["T4"]
 
     right = program()
     states = {name: entry.effect for name, entry in ERRATA.items()}
@@ -172,7 +172,7 @@ def test_torques_that_the_errata_state() -> None:
     assert f"{program(4) - right:.6f}" in states["4"] and f"{program(1, 4) - program(1):.6f}" in states["4"]
     assert f"{program(5) - right:.6f}" in states["5"] and f"{program(1, 5) - program(1):.6f}" in states["5"]
 
-    source = printed()["published"]
+    source = read_printed()["published"]
     k, matrix = source["section_5_7_hand_constants"], source["section_5_7_matrix_as_printed"]
     names = [f"k{bar}{key}" for bar in (2, 3, 4) for key in ("x", "y", "_5")]
     arms = [[k[f"k{bar}_{n}"] for n in (1, 2, 3, 4)] for bar in (2, 3, 4)]
@@ -206,7 +206,7 @@ def test_open_loops_that_the_errata_state() -> None:
 
 
 def test_limits_that_the_errata_state() -> None:
-    linkage = scene(THETA_2).linkage
+    linkage = make_scene(THETA_2).linkage
     for bar, title in ((4, "limits"), (2, "dead centres")):
         found = {f"{np.degrees(limit.theta_2) % 360.0:.4f}" for limit in limit_positions(linkage, bar)}
         stated = ERRATA["16"].right.split(title)[1].split(" deg")[0]
@@ -214,9 +214,9 @@ def test_limits_that_the_errata_state() -> None:
 
 
 def test_public_test_cases_agree_to_the_last_digit() -> None:
-    assert {figure.name: figure.verdict() for figure in textbook_figures() if figure.verdict() != "rounded"} == {}
-    assert {answer.scene for answer in answers()} == {path.stem for path in SCENES.glob("*.toml")}
-    assert len({answer.where.split(",")[0] for answer in answers()}) >= 3
+    assert {figure.name: figure.verdict() for figure in compare_textbooks() if figure.verdict() != "rounded"} == {}
+    assert {answer.scene for answer in list_answers()} == {path.stem for path in SCENES.glob("*.toml")}
+    assert len({answer.where.split(",")[0] for answer in list_answers()}) >= 3
 
 
 def test_answers_that_sympy_leaves_to_be_solved() -> None:
@@ -229,21 +229,21 @@ def test_answers_that_sympy_leaves_to_be_solved() -> None:
         ]
     )
     forcing = np.array([-0.031211821321648, -0.00066022608181, 0.001813559741243])
-    relative = [answer for answer in answers() if answer.note.startswith("the printed mass matrix")]
+    relative = [answer for answer in list_answers() if answer.note.startswith("the printed mass matrix")]
     assert [f"{x:.8f}" for x in np.linalg.solve(mass, forcing)] == [answer.printed for answer in relative]
 
 
 def test_quantities_of_an_answer() -> None:
     s = fourbar.solve(scenes.thesis())
     assert s.F14 is not None and s.omega_2 is not None and s.omega_3 is not None
-    assert value(s, "-F14_y", 0) == -s.F14[0, 1]
-    assert value(s, "omega_3 - omega_2", 0) == s.omega_3[0] - s.omega_2[0]
-    assert value(s, "v_A_x", 0) == pytest.approx(-0.2244 * 0.48 * np.sin(THETA_2), rel=TYPED)
+    assert compute_value(s, "-F14_y", 0) == -s.F14[0, 1]
+    assert compute_value(s, "omega_3 - omega_2", 0) == s.omega_3[0] - s.omega_2[0]
+    assert compute_value(s, "v_A_x", 0) == pytest.approx(-0.2244 * 0.48 * np.sin(THETA_2), rel=TYPED)
 
 
 @pytest.mark.parametrize("other", [scenes.thesis(), fourbar.load(MODELS / "thesis.toml")], ids=["code", "file"])
 def test_inputs_are_those_of_the_model(other: fourbar.Scene) -> None:
-    ours = scene(THETA_2)
+    ours = make_scene(THETA_2)
     assert ours.linkage.lengths == pytest.approx(other.linkage.lengths, rel=TYPED)
     assert ours.linkage.ground_angle == pytest.approx(other.linkage.ground_angle, rel=TYPED)
     for number in (2, 3, 4):
@@ -276,6 +276,6 @@ def test_the_command_explains_every_difference() -> None:
 def test_a_difference_without_an_erratum_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = PublishedFigure("2.4 positions", "1 theta3_1", "167.877224", 167.8772234, ("4",), 167.8)
     for figure in (wrong, wrong._replace(errata=()), wrong._replace(errata=("99",), made=167.877224)):
-        assert figure.verdict() == "differs" and not explained(figure) and reason(figure)
-        monkeypatch.setattr(command, "figures", lambda figure=figure: iter([figure]))
+        assert figure.verdict() == "differs" and not is_explained(figure) and explain_difference(figure)
+        monkeypatch.setattr(command, "list_figures", lambda figure=figure: iter([figure]))
         assert CliRunner().invoke(published, standalone_mode=False).return_value == 1

@@ -10,24 +10,24 @@ from fourbar_validation.compare.rows import DEGRADED
 from fourbar_validation.compare.tolerance import EPS, K
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.regression import render
-from fourbar_validation.regression.changes import differences
-from fourbar_validation.regression.record import ACCEPTED, about, baseline, read_run
+from fourbar_validation.regression.changes import compare_rows
+from fourbar_validation.regression.record import ACCEPTED, describe_run, find_baseline, read_run
 from fourbar_validation.run.judge import judge
-from fourbar_validation.scenes.suites import model_files
+from fourbar_validation.scenes.suites import list_model_files
 
-SCENES = [(file.stem, fourbar.load(file)) for file in model_files()]
+SCENES = [(file.stem, fourbar.load(file)) for file in list_model_files()]
 EXACT = [witness for witness in WITNESSES if not witness.through_time]
 """A simulation through time takes longer than all of them; `validation run --against accepted` asks it too."""
 
 
 def test_nothing_got_worse_since_the_accepted_state() -> None:
     left_out = {witness.name for witness in WITNESSES} - {witness.name for witness in EXACT}
-    record, accepted = read_run(baseline(ACCEPTED))
+    record, accepted = read_run(find_baseline(ACCEPTED))
     kept = [row for row in accepted if row.engine not in left_out]
     rows = [row for scene in SCENES for row in judge(*scene, EXACT).rows]
-    found = differences((record, kept), (about((), "models"), rows))
+    found = compare_rows((record, kept), (describe_run((), "models"), rows))
     assert {row.engine for row in kept} == {"formulas", *(witness.name for witness in EXACT)}
-    assert not found.regressed, render.text(found)
+    assert not found.regressed, render.write_text(found)
 
 
 @pytest.mark.parametrize("turns", [0, 800])

@@ -29,24 +29,32 @@ from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.regression import record, render
 from fourbar_validation.regression.accept import accept_command, compare
 from fourbar_validation.regression.change import Kind
-from fourbar_validation.regression.changes import compared, differences
+from fourbar_validation.regression.changes import compare_rows, compare_runs
 from fourbar_validation.regression.history import HISTORY, append, read_history
-from fourbar_validation.regression.record import About, Recorded, about, baseline, read_run, recorded, write_about
-from fourbar_validation.regression.scenes import description
+from fourbar_validation.regression.record import (
+    About,
+    Recorded,
+    describe_run,
+    find_baseline,
+    open_run,
+    read_run,
+    write_about,
+)
+from fourbar_validation.regression.scenes import describe_changes
 from fourbar_validation.regression.times import TimeChange
-from fourbar_validation.report.junit import cases
+from fourbar_validation.report.junit import list_cases
 from fourbar_validation.run.store import Store
-from fourbar_validation.scenes.suites import scene_files
+from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.another_machine import CORES, ROOT, environment, why_not
 from tests.support.here import judge_here
 
 WithRows = tuple[About, list[Row]]
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
-HERE = about([Witness("engine", FreeBody, EQUIVALENCE)], "suite")
+HERE = describe_run([Witness("engine", FreeBody, EQUIVALENCE)], "suite")
 
 
 def kinds(old: list[Row], new: list[Row]) -> list[Kind]:
-    return [change.kind for change in differences((HERE, old), (HERE, new)).changes]
+    return [change.kind for change in compare_rows((HERE, old), (HERE, new)).changes]
 
 
 @pytest.mark.parametrize(
@@ -73,18 +81,18 @@ def test_round_off_grows_with_the_condition() -> None:
 
 def test_better_and_new_rows_are_no_regression_but_a_new_failure_is() -> None:
     simulated = replace(ROW, error=4e-6, allowed=1e-5)
-    found = differences((HERE, [simulated]), (HERE, [replace(simulated, error=1e-6), replace(ROW, quantity="F12")]))
+    found = compare_rows((HERE, [simulated]), (HERE, [replace(simulated, error=1e-6), replace(ROW, quantity="F12")]))
     assert {change.kind for change in found.changes} == {Kind.BETTER, Kind.NEW}
     assert not found.regressed
     failing = replace(ROW, quantity="F12", verdict=FAILS)
-    assert differences((HERE, [ROW]), (HERE, [ROW, failing])).regressed
+    assert compare_rows((HERE, [ROW]), (HERE, [ROW, failing])).regressed
 
 
 def test_other_versions_are_reported_first() -> None:
     other = About({**HERE.versions, "mujoco": "3.3.7"}, HERE.machine, HERE.settings)
-    found = differences((other, [ROW]), (HERE, [ROW]))
+    found = compare_rows((other, [ROW]), (HERE, [ROW]))
     assert [what for what, _, _ in found.surroundings] == ["mujoco"]
-    assert render.text(found).startswith("mujoco: 3.3.7 -> ")
+    assert render.write_text(found).startswith("mujoco: 3.3.7 -> ")
 
 
 MODEL = [str(Path(__file__).parents[3] / "models" / "crank_rocker.toml")]
@@ -124,11 +132,11 @@ def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(tmp_path
     for options, kept in (([], tmp_path / "accepted"), (["--to", str(tmp_path / "mine")], tmp_path / "mine")):
         assert runner.invoke(accept_command, [str(run), *options]).exit_code == 0
         assert read_run(kept) == read_run(run)
-        assert dict(recorded(kept).times()) == {"scene": [("engine", 3.0)]}
+        assert dict(open_run(kept).times()) == {"scene": [("engine", 3.0)]}
         assert json.loads((kept / "record.json").read_text())["machine"] == HERE.machine
         assert runner.invoke(compare, [str(kept), str(run)], standalone_mode=False).return_value == 0
     assert runner.invoke(accept_command, [str(run), "--to", str(run)]).exit_code != 0
-    assert baseline("accepted").parent == Path(record.__file__).parent  # of this project, where no such folder is
+    assert find_baseline("accepted").parent == Path(record.__file__).parent  # of this project, where no such folder is
 
 
 def damaged(folder: Path) -> Iterator[tuple[Path, str]]:
@@ -266,9 +274,9 @@ def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
 def test_what_stood_for_a_failure_and_is_gone_is_no_regression() -> None:
     alarm = replace(ROW, quantity="watch", verdict=FAILS, error=math.nan)
     assert kinds([ROW, alarm], [ROW]) == [Kind.SAME, Kind.GONE_FAILURE]
-    assert not differences((HERE, [ROW, alarm]), (HERE, [ROW])).regressed
+    assert not compare_rows((HERE, [ROW, alarm]), (HERE, [ROW])).regressed
     failed = replace(ROW, verdict=FAILS)
-    assert differences((HERE, [failed]), (HERE, [])).regressed  # a comparison that failed and is not made any more
+    assert compare_rows((HERE, [failed]), (HERE, [])).regressed  # a comparison that failed and is not made any more
 
 
 def test_another_python_without_the_libraries_is_one_line_and_status_3(
@@ -298,7 +306,7 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path: 
     write_about(HERE, tmp_path)
     from_columns = read_run(tmp_path)
     assert from_columns[0] == from_text[0] and repr(from_columns[1]) == repr(from_text[1])
-    assert not differences(from_text, from_columns).regressed
+    assert not compare_rows(from_text, from_columns).regressed
     (tmp_path / "results.parquet").write_bytes(b"no columns")
     with pytest.raises(InputError, match="is damaged: no rows that can be read of 2"):
         read_run(tmp_path)
@@ -325,7 +333,7 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
         write_about(HERE, tmp_path / name)
         assert not (tmp_path / name / "results.csv").exists() and len(columns.first_lines) < 60
     alive = most = 0
-    before, after = (recorded(tmp_path / name) for name in ("old", "new"))
+    before, after = (open_run(tmp_path / name) for name in ("old", "new"))
 
     def watched(run: Recorded) -> Iterator[tuple[str, list[Row]]]:
         nonlocal alive, most
@@ -335,11 +343,11 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
             yield scene, rows
             alive -= 1
 
-    found = compared((HERE, watched(before)), (HERE, watched(after)), {"engine"}, [], kept)
+    found = compare_runs((HERE, watched(before)), (HERE, watched(after)), {"engine"}, [], kept)
     assert most == 2 and found.rows == 2 * scenes and found.regressed == found.kinds[Kind.WORSE] == scenes - 1
     assert [change.key[0][-3:] for change in found.of(Kind.WORSE)] == ["999", "998", "997", "996", "995"]
     assert len(found.changes) == 2 * kept
-    cases = ET.fromstring(render.junit(found))
+    cases = ET.fromstring(render.write_junit(found))
     assert cases.findall(".//testcase")[-1].get("name") == f"{2 * (scenes - kept)} rows more: see results.parquet"
     arguments = ["compare", str(tmp_path / "old"), str(tmp_path / "new")]
     assert [status(arguments), status([*arguments, "--only", "random-0-000000000"])] == [1, 0]
@@ -399,9 +407,9 @@ def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
 )
 def test_the_report_says_who_is_at_fault(worse: set[tuple[str, str]], sentence: str) -> None:
     old, new = disagreeing(worse)
-    found = differences((HERE, old), (HERE, new))
+    found = compare_rows((HERE, old), (HERE, new))
     assert found.fault.sentences == [sentence]
-    for form in (render.text, render.markdown, render.html):
+    for form in (render.write_text, render.write_markdown, render.write_html):
         assert sentence in html.unescape(form(found))
 
 
@@ -409,8 +417,8 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> 
     old, new = disagreeing({("sim", "F12"), ("sim", "torque"), ("one", "torque")})
     better = [replace(row, error=1e-9) if row.engine == "two" else row for row in old]
     new = [replace(row, error=1.0) if row.failed and row.engine == "one" and row.scene == "b" else row for row in new]
-    found = differences((HERE, better), (HERE, new))
-    groups = [line for line in render.text(found).splitlines() if "scenes, " in line and "rows (" in line]
+    found = compare_rows((HERE, better), (HERE, new))
+    groups = [line for line in render.write_text(found).splitlines() if "scenes, " in line and "rows (" in line]
     cause = "agrees -> fails: # where # was predicted"
     assert groups == [
         f"verdict got worse: one, 3 of 3 scenes, 3 rows (torque 3), {cause}",
@@ -418,7 +426,7 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> 
         "better: two, 3 of 3 scenes, 6 rows (F12 3, torque 3)",
     ]
     assert found.of(Kind.VERDICT_WORSE)[0].key[:2] == ("b", "one")
-    assert groups[0].partition(": ")[2] in html.unescape(render.html(found))
+    assert groups[0].partition(": ")[2] in html.unescape(render.write_html(found))
 
 
 SCENE = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
@@ -426,7 +434,7 @@ SCENE = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 
 def made(rows: list[Row], scenes: dict[str, fourbar.Scene], engines: tuple[str, ...] = ("engine",)) -> WithRows:
     witnesses = [Witness(engine, FreeBody, EQUIVALENCE) for engine in engines]
-    return about(witnesses, "suite", {name: description(s) for name, s in scenes.items()}), rows
+    return describe_run(witnesses, "suite", {name: describe_changes(s) for name, s in scenes.items()}), rows
 
 
 def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> None:
@@ -435,12 +443,12 @@ def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> Non
     before = replace(SCENE, linkage=replace(SCENE.linkage, output=replace(output, inertia=0.048)))
     other, wrong = replace(ROW, scene="other"), replace(ROW, error=1e-9, allowed=1e-8)
     old = made([ROW, other], {"scene": before, "other": SCENE})
-    found = differences(old, made([wrong, other], {"scene": heavier, "other": SCENE}))
-    assert render.text(found).splitlines()[0] == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
+    found = compare_rows(old, made([wrong, other], {"scene": heavier, "other": SCENE}))
+    assert render.write_text(found).splitlines()[0] == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
     assert found.status == 0 and found.not_compared == ["scene scene changed (1 rows)"]
-    assert differences(old, made([replace(wrong, verdict=FAILS), other], {"scene": heavier})).regressed
-    assert differences(made([ROW], {"scene": before}), made([wrong], {"scene": heavier})).nothing
-    for form in (render.markdown, render.html):
+    assert compare_rows(old, made([replace(wrong, verdict=FAILS), other], {"scene": heavier})).regressed
+    assert compare_rows(made([ROW], {"scene": before}), made([wrong], {"scene": heavier})).nothing
+    for form in (render.write_markdown, render.write_html):
         assert "bars.output.inertia 0.048" in form(found)
 
 
@@ -463,15 +471,15 @@ def test_a_renamed_scene_is_found_by_what_it_states(tmp_path: Path, capsys: pyte
 def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
     """Another kernel of the BLAS turns 3.4e-7 into 5.2e-7 where 1 is allowed; a wider allowance excuses nothing."""
     shipped = replace(ROW, quantity="as shipped", error=3.4e-7, allowed=1.0)
-    found = differences((HERE, [shipped]), (HERE, [replace(shipped, error=5.2e-7)]))
+    found = compare_rows((HERE, [shipped]), (HERE, [replace(shipped, error=5.2e-7)]))
     assert [change.kind for change in found.changes] == [Kind.GREW] and found.status == 0
-    assert "grew within its allowance: scene / engine / exact / as shipped" in render.text(found)
+    assert "grew within its allowance: scene / engine / exact / as shipped" in render.write_text(found)
     assert kinds([replace(shipped, allowed=4e-7)], [replace(shipped, error=6e-7)]) == [Kind.WORSE]
 
 
 def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None:
     """In two fresh processes, one of which takes this CPU for another."""
-    code = "from fourbar_validation.report.machine import kernels; print(kernels())"
+    code = "from fourbar_validation.report.machine import find_kernels; print(find_kernels())"
     possible = [core for core in CORES if why_not(core) is None]
     if not possible:
         pytest.skip("this CPU can pass for no other")
@@ -482,7 +490,7 @@ def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None
     one, other = map(ast.literal_eval, found)
     assert set(one) == {"cpu_features", "blas_kernel"} and one != other
     old, new = (replace(HERE, versions=HERE.versions | kernels) for kernels in (one, other))
-    text = render.text(differences((old, [ROW]), (new, [ROW])))
+    text = render.write_text(compare_rows((old, [ROW]), (new, [ROW])))
     assert any(f"{name}: {one[name]} -> {other[name]}" in text for name in one)
     assert set(one) <= set(HERE.versions)
 
@@ -490,37 +498,37 @@ def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None
 def test_more_positions_and_other_settings_are_named_so() -> None:
     finer = replace(SCENE, motion=replace(SCENE.motion, theta_2=fourbar.Sweep(0.0, 2.0 * math.pi, 720)))
     worse = replace(ROW, error=1e-9, allowed=1e-8)
-    found = differences(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
+    found = compare_rows(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
     assert found.not_compared == ["scene scene has other positions (1 rows)"] and not found.regressed
     assert "360} -> " in str(found.scenes[0]) or "steps" in str(found.scenes[0])
     old, new = replace(ROW, setting="RK4 628/rev"), replace(worse, setting="RK4 1256/rev")
-    found = differences(made([old], {"scene": SCENE}), made([new], {"scene": SCENE}))
+    found = compare_rows(made([old], {"scene": SCENE}), made([new], {"scene": SCENE}))
     assert found.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 rows)"] and not found.regressed
 
 
 def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
     old = About(HERE.versions, HERE.machine, {**HERE.settings, "suite": "0123456789abcdef"})
-    found = differences((old, [ROW]), made([ROW], {"scene": SCENE}))
+    found = compare_rows((old, [ROW]), made([ROW], {"scene": SCENE}))
     assert not found.scenes and not found.regressed
     first, note = found.notes
     assert "0123456789ab -> suite" in note and "the older record does not say what they ask" in note
     assert first == "1 of 1 rows are compared: the others are of one run alone"
     others = [replace(ROW, scene=f"another {k}") for k in range(3)]
-    found = differences((old, [ROW, others[0]]), made([ROW, *others[1:]], {"scene": SCENE}))
-    assert render.text(found).startswith("1 of 4 rows are compared") and "No regression in 1 of 4 rows" in render.text(
-        found
-    )
+    found = compare_rows((old, [ROW, others[0]]), made([ROW, *others[1:]], {"scene": SCENE}))
+    assert render.write_text(found).startswith(
+        "1 of 4 rows are compared"
+    ) and "No regression in 1 of 4 rows" in render.write_text(found)
 
 
 def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
     rows = [replace(ROW, scene=scene, engine=engine) for scene in ("a", "b") for engine in ("engine", "formulas")]
     rows.append(replace(ROW, scene="a", engine="other"))
     old = made(rows, dict.fromkeys("ab", SCENE), ("engine", "other"))
-    found = differences(old, made(rows[:2], {"a": SCENE}))
+    found = compare_rows(old, made(rows[:2], {"a": SCENE}))
     assert found.not_run == ["scene b (2 rows)", "other (1 rows)"] and found.status == 0
-    gone = differences(old, made(rows[1:2], {"a": SCENE}))
+    gone = compare_rows(old, made(rows[1:2], {"a": SCENE}))
     assert [change.key[1] for change in gone.changes if change.regression] == ["engine"]
-    assert differences(old, (HERE, rows[:2])).not_run[0] == "scene b (2 rows)"  # without a record its rows say so
+    assert compare_rows(old, (HERE, rows[:2])).not_run[0] == "scene b (2 rows)"  # without a record its rows say so
 
 
 def test_what_is_compared_can_be_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -540,7 +548,7 @@ def test_an_engine_is_slower_only_beyond_the_scatter_of_its_times() -> None:
 
     def ratios(*factors: float) -> list[TimeChange]:
         new = {key: 100.0 * factor for key, factor in zip(old, factors, strict=False)}
-        return differences((HERE, [ROW]), (HERE, [ROW]), (old, new)).other_times
+        return compare_rows((HERE, [ROW]), (HERE, [ROW]), (old, new)).other_times
 
     (slower,) = ratios(1.9, 2.1, 2.0, 2.0, 1.9, 2.1)
     assert str(slower).startswith("engine is 2.00 times slower") and slower.ratio > 1.0
@@ -567,7 +575,7 @@ def test_a_slower_engine_is_a_regression_on_the_same_machine_and_slower_formulas
     both = {("a", "b"): 100.0}
     halved, doubled = ({(s, e): t for s in "abcd" for e in ("engine", "other")} for t in (50.0, 200.0))
     for one, other, word in ((doubled, halved, "slower"), (halved, doubled, "faster")):
-        (change,) = differences((HERE, [ROW]), (HERE, [ROW]), ({**both, **one}, {**both, **other})).times
+        (change,) = compare_rows((HERE, [ROW]), (HERE, [ROW]), ({**both, **one}, {**both, **other})).times
         assert str(change).startswith(f"formulas is 4.00 times {word}")
 
 
@@ -582,7 +590,7 @@ def test_the_run_itself_is_written_as_junit(tmp_path: Path, monkeypatch: pytest.
     assert names == [row.quantity for row in rows[:10]] + [f"{len(rows) - 10} rows more: see results.parquet"]
     assert found.get("failures") == "0" and found.get("name", "").startswith("All ")
     failing = [replace(row, verdict=FAILS, reason="not held") for row in rows[20:22]]
-    kinds = [(case.outcome, case.message.partition(": ")[2]) for case in cases([*rows, *failing])][10:]
+    kinds = [(case.outcome, case.message.partition(": ")[2]) for case in list_cases([*rows, *failing])][10:]
     assert kinds == [("failure", "not held")] * 2 + [("skipped", "")]
 
 
@@ -630,7 +638,7 @@ def test_a_history_is_read_by_pandas_and_keeps_what_each_scene_states(nights: Pa
     assert errors.tolist() == pytest.approx([1e-9 * 1.1**night for night in range(8)], rel=1e-15)
     assert set(table.version_mujoco) == {"4.0.0", "4.1.0"}
     runs = read_history(nights / HISTORY)
-    assert runs[0].about.scenes["scene 2"] == description(SCENE) and len(runs[3].rows) == 1
+    assert runs[0].about.scenes["scene 2"] == describe_changes(SCENE) and len(runs[3].rows) == 1
     before = (nights / HISTORY).read_bytes()
     append(nights / HISTORY, (runs[4].about, runs[4].rows), runs[4].times)  # it is in it
     assert (nights / HISTORY).read_bytes() == before
@@ -664,11 +672,11 @@ def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
     cells = [list(csv.reader((run / name).read_text().splitlines())) for name in ("results.csv", "timings.csv")]
     assert not any(cell.startswith(("=", "+", "@")) for rows in cells for row in rows for cell in row)
     assert all(len(row) == len(rows[0]) for rows in cells for row in rows)
-    kept = recorded(run)
+    kept = open_run(run)
     assert [name for name, _ in kept.scenes()] == [name for name, _ in kept.times()] == printed == [*kept.about.scenes]
     (tmp_path / "a\\x1b.toml").write_text(text)
     with pytest.raises(InputError, match="must have a name of its own"):
-        scene_files([tmp_path / "a\x1b.toml", tmp_path / "a\\x1b.toml"])
+        read_scene_files([tmp_path / "a\x1b.toml", tmp_path / "a\\x1b.toml"])
 
 
 @pytest.mark.parametrize("name", ["lock", "run.json", "results.csv", "timings.csv", "report.html"])
@@ -713,5 +721,5 @@ def test_a_full_disk_names_the_file_that_does_not_fit(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr("fourbar_validation.regression.record.shutil.copyfile", full)
     with pytest.raises(OSError) as caught:
-        record.accept(recorded(run), tmp_path / "kept")
+        record.accept(open_run(run), tmp_path / "kept")
     assert (caught.value.filename, caught.value.filename2) == (str(tmp_path / "kept" / "results.csv"), None)

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from fourbar_validation.compare.rows import to_csv
+from fourbar_validation.compare.rows import write_rows
 from fourbar_validation.report.html import ALL_OPEN
 from tests.validation.report.test_report import copies, report
 
@@ -82,7 +82,7 @@ def test_the_download_is_results_csv(browse) -> None:
     driver = browse(report(pages)[1])
     script = "return document.querySelector('a[download]').href"
     data = driver.execute_script(script).partition(";base64,")[2]
-    assert base64.b64decode(data).decode() == to_csv(row for page in pages for row in page.rows)
+    assert base64.b64decode(data).decode() == write_rows(row for page in pages for row in page.rows)
 
 
 def test_200_scenes_open_quickly_and_a_scene_when_opened(browse) -> None:

@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar_validation.compare.rows import FAILS, to_csv
+from fourbar_validation.compare.rows import FAILS, write_rows
 from fourbar_validation.engines import added
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
 from fourbar_validation.report import colours
-from fourbar_validation.report.colours import style_of
-from fourbar_validation.report.costs import cost_points
-from fourbar_validation.report.figures import STRETCHES, worst_of_stretches
-from fourbar_validation.report.html import ALL_OPEN, Section, html, markdown
+from fourbar_validation.report.colours import choose_style
+from fourbar_validation.report.costs import collect_cost_points
+from fourbar_validation.report.figures import STRETCHES, find_worst_of_segments
+from fourbar_validation.report.html import ALL_OPEN, Section, write_html, write_markdown
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.svg import FLOOR
-from fourbar_validation.run.judge import judged
+from fourbar_validation.run.judge import judge_for_report
 from tests.support.here import summary_of
 from tests.support.scenes import crank_rocker
 
@@ -37,7 +37,7 @@ HOSTILE = "</script><img src=x onerror=alert(1)>\"'&|`*"
 def demo(*, draw: bool = True) -> Record:
     """A small scene as two exact engines and the free bodies judge it."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
-    return judged("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"), draw=draw)
+    return judge_for_report("demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"), draw=draw)
 
 
 def copies(count: int, *, failing: int = 0) -> list[Record]:
@@ -60,7 +60,7 @@ def report(pages: list[Record], **more) -> tuple[Summary, str]:
         lines[each.name] = line
         line += len(each.rows)
     summary = summary_of(pages)
-    return summary, html(summary, lines, **more)
+    return summary, write_html(summary, lines, **more)
 
 
 def unpacked(text: str) -> str:
@@ -78,7 +78,7 @@ def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(
     pages = copies(count, failing=1)
     _, text = report(pages)
     text = unpacked(text)
-    lines = list(csv.reader(io.StringIO(to_csv(row for each in pages for row in each.rows))))
+    lines = list(csv.reader(io.StringIO(write_rows(row for each in pages for row in each.rows))))
     rows = dict(re.findall(r'<tr id="row-(\d+)"[^>]*>(.*?)</tr>', text))
     assert {int(line) for line in rows} == set(range(2, len(lines) + 1))
     for line, shown in rows.items():
@@ -95,7 +95,7 @@ def test_the_page_carries_results_csv_to_the_byte() -> None:
     _, text = report(pages)
     data = re.search(r'download="results.csv" href="data:text/csv;base64,([^"]*)"', text)
     assert data is not None
-    assert base64.b64decode(data.group(1)).decode() == to_csv(row for each in pages for row in each.rows)
+    assert base64.b64decode(data.group(1)).decode() == write_rows(row for each in pages for row in each.rows)
 
 
 def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() -> None:
@@ -111,7 +111,7 @@ def test_a_scene_cannot_write_into_the_demo() -> None:
     summary, text = report([hostile], sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])])
     assert "<img src=x" not in text
     assert len(re.findall("<script", text)) == 1
-    assert "<img" not in markdown(summary)
+    assert "<img" not in write_markdown(summary)
 
 
 def test_nothing_is_fetched() -> None:
@@ -122,7 +122,7 @@ def test_nothing_is_fetched() -> None:
 
 
 def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail() -> None:
-    assert len(markdown(summary_of(copies(200, failing=200)))) < COMMENT_LIMIT
+    assert len(write_markdown(summary_of(copies(200, failing=200)))) < COMMENT_LIMIT
 
 
 def test_a_section_of_another_module_is_shown_and_linked() -> None:
@@ -133,18 +133,18 @@ def test_a_section_of_another_module_is_shown_and_linked() -> None:
 def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
     error = np.random.default_rng(1).uniform(size=1000)
     for phase in (0.0, 0.3, 0.9):
-        found = worst_of_stretches(error, phase)
+        found = find_worst_of_segments(error, phase)
         assert STRETCHES <= len(found) <= STRETCHES + 1
         assert int(np.argmax(error)) in found
         assert np.all(np.diff(found) > 0)
     error[found[3]] = np.nan
-    assert found[3] not in worst_of_stretches(error, 0.9)
-    assert len(worst_of_stretches(np.full(40, np.nan), 0.0)) == 0
-    assert len(worst_of_stretches(np.array([FLOOR]), 0.5)) == 1
+    assert found[3] not in find_worst_of_segments(error, 0.9)
+    assert len(find_worst_of_segments(np.full(40, np.nan), 0.0)) == 0
+    assert len(find_worst_of_segments(np.array([FLOOR]), 0.5)) == 1
 
 
 def test_costs_are_those_of_the_run() -> None:
-    points, formulas = cost_points([demo()])
+    points, formulas = collect_cost_points([demo()])
     timings = {timing.engine: timing for timing in demo().timings}
     errors = {row.engine: row.error for row in demo().rows if row.quantity == "torque"}
     assert formulas == [1e6 * timings["formulas"].seconds / 37]
@@ -165,7 +165,7 @@ def test_costs_are_those_of_the_run() -> None:
 )
 def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> None:
     witnesses = tuple(w for w in WITNESSES if w.name == "free-body")
-    made = judged("kind", crank_rocker(motion=motion), witnesses)
+    made = judge_for_report("kind", crank_rocker(motion=motion), witnesses)
     assert made.figure is not None and made.figure.count("<svg") == pictures
     _, text = report([made])
     assert "kind: crank-rocker" in text
@@ -173,7 +173,7 @@ def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> 
 
 def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
     absent = replace(WITNESSES[0], engine=lambda: import_module("fourbar_validation.engines.absent").Absent())
-    summary, text = report([judged("demo", crank_rocker(), (absent,), draw=False)])
+    summary, text = report([judge_for_report("demo", crank_rocker(), (absent,), draw=False)])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text
 
@@ -192,8 +192,8 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.Monkey
     assert summary.refusals == [("mujoco-simulated", "falls to 0.0e+00; below 0.05 it is not simulated", 100)]
     assert [cost.setting for cost in summary.costs if cost.engine == "sim"] == ["RK4 628/rev to 727/rev"]
     assert summary.orders[0][0] == "scene-000"
-    assert "the 80 of 1200 scenes and engines" in markdown(summary)
-    assert markdown(summary).count("\n") < 150
+    assert "the 80 of 1200 scenes and engines" in write_markdown(summary)
+    assert write_markdown(summary).count("\n") < 150
     assert len(text) < 1.8e6  # 20 scenes, each with a figure of 20 kB and some 55 kB of rows of eleven engines
 
 
@@ -201,12 +201,14 @@ def test_every_witness_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.Mon
     """Whoever is drawn first, and in whatever process: the witness says its number."""
     monkeypatch.setattr(colours, "NUMBERS", {})
     guests = "tests.validation.engines.test_added_guests:"
-    witnesses = added.named([f"{guests}Right", f"{guests}Leaves"], [each.name for each in (*WITNESSES, *FURTHER)])
+    witnesses = added.read_witnesses(
+        [f"{guests}Right", f"{guests}Leaves"], [each.name for each in (*WITNESSES, *FURTHER)]
+    )
     names = [each.name for each in (*WITNESSES, *FURTHER, *witnesses)]
-    colours.NUMBERS.update(added.numbers(witnesses))
-    marks = {name: (style_of(name).symbol, style_of(name).marker) for name in names}
+    colours.NUMBERS.update(added.list_numbers(witnesses))
+    marks = {name: (choose_style(name).symbol, choose_style(name).marker) for name in names}
     assert len({mark for mark, _ in marks.values()}) == len({marker for _, marker in marks.values()}) == len(names)
     colours.NUMBERS.clear()
-    colours.NUMBERS.update(added.numbers(witnesses[1:]))  # a scene in which the first broke down
-    assert style_of(names[-1]).symbol == marks[names[-1]][0]
-    assert all(style_of(name).colour in colours.VARIABLES for name in names)
+    colours.NUMBERS.update(added.list_numbers(witnesses[1:]))  # a scene in which the first broke down
+    assert choose_style(names[-1]).symbol == marks[names[-1]][0]
+    assert all(choose_style(name).colour in colours.VARIABLES for name in names)

@@ -9,9 +9,9 @@ import pytest
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard
 from fourbar_validation.engines.witnesses import FURTHER, WORK
-from fourbar_validation.report.costs import cost_figure
-from fourbar_validation.report.html import html
-from fourbar_validation.report.sections import LARGEST, hard_cases, sections
+from fourbar_validation.report.costs import draw_costs
+from fourbar_validation.report.html import write_html
+from fourbar_validation.report.sections import LARGEST, collect_hard_cases, collect_sections
 from fourbar_validation.report.templating import count_or_size
 from fourbar_validation.scenes.hard_families import FAMILIES
 from tests.support.here import summary_of
@@ -25,7 +25,7 @@ def judged(scene: str, verdict: str) -> Row:
 def test_every_scene_is_counted_in_its_family_alone() -> None:
     hard = Hard()
     rows = [judged(hard.name(index), AGREES) for index in range(len(hard))]
-    table = {row[0]: row for row in hard_cases(rows).rows}
+    table = {row[0]: row for row in collect_hard_cases(rows).rows}
     for family in FAMILIES:
         count = str(sum(1 for _ in family.scenes()))
         assert table[family.name][1:3] == (count, count) and table[family.name][7:] == ("holds", family.statement)
@@ -34,38 +34,40 @@ def test_every_scene_is_counted_in_its_family_alone() -> None:
 
 def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
     rows = [judged("toggle-near-a", AGREES), judged("toggle-near-a", REFUSES), judged("toggle-b", FAILS)]
-    toggle, near = hard_cases(rows).rows
+    toggle, near = collect_hard_cases(rows).rows
     assert toggle[:8] == ("toggle", "1", "0", "0", "0", "0", "1", "1 fail")
     assert near[:8] == ("toggle-near", "1", "1", "0", "0", "1", "0", "holds")
-    (refused,) = hard_cases([judged("toggle-near-a", REFUSES), judged("toggle-near-a", UNDECIDED)]).rows
+    (refused,) = collect_hard_cases([judged("toggle-near-a", REFUSES), judged("toggle-near-a", UNDECIDED)]).rows
     assert refused[:8] == ("toggle-near", "1", "0", "0", "1", "1", "0", "nothing compared")
-    assert sections(None, tmp_path) == []
+    assert collect_sections(None, tmp_path) == []
     (tmp_path / "hard").mkdir()
     write_results(rows, tmp_path / "hard" / "results.csv")
-    assert sections(None, tmp_path) == []  # unfinished: its page is not written yet
+    assert collect_sections(None, tmp_path) == []  # unfinished: its page is not written yet
     (tmp_path / "hard" / "hard.html").touch()
-    (found,) = sections(None, tmp_path)
-    assert found.rows == hard_cases(rows).rows
+    (found,) = collect_sections(None, tmp_path)
+    assert found.rows == collect_hard_cases(rows).rows
     assert [file for _, file in found.links] == ["hard/hard.html", "hard/report.html"]
 
 
 def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fourbar_validation.report.hard_page.picture", lambda: "<svg><text>the picture</text></svg>")
-    (part,) = sections([judged("toggle-b", AGREES)], tmp_path)
+    monkeypatch.setattr(
+        "fourbar_validation.report.hard_page.draw_picture", lambda: "<svg><text>the picture</text></svg>"
+    )
+    (part,) = collect_sections([judged("toggle-b", AGREES)], tmp_path)
     assert (part.key, part.links[0][1]) == ("hard", "hard.html")
     assert (
         "the picture" in (tmp_path / "hard.html").read_text(encoding="utf-8") and "the picture" in part.figures[0].svg
     )
-    text = html(summary_of([]), {}, sections=[part])
+    text = write_html(summary_of([]), {}, sections=[part])
     assert 'href="#hard"' in text and 'href="hard.html"' in text and "<text>the picture</text>" in text
 
 
 def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
     assert set(WORK) == {"formulas", *(witness.name for witness in (*HARD_WITNESSES, *FURTHER))}
     summary, text = report([demo(draw=False)])
-    drawn = cost_figure([demo(draw=False)])
+    drawn = draw_costs([demo(draw=False)])
     assert drawn is not None
     for engine in ("formulas", "pinocchio-inverse", "mujoco-inverse", "free-body"):
         assert f"{engine}: {WORK[engine].short}" in drawn
@@ -79,13 +81,13 @@ def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
 
 
 def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> None:
-    assert sections(None, tmp_path) == []
+    assert collect_sections(None, tmp_path) == []
     folder = tmp_path / "cost" / "demo"
     folder.mkdir(parents=True)
     (folder / "cost.csv").touch()
     (folder / "sources.svg").write_text("<svg onload='alert(1)'/>")
     (folder / "work-precision-force.svg").write_bytes(bytes(LARGEST + 1))
-    _, text = report([demo(draw=False)], sections=sections(None, tmp_path))
+    _, text = report([demo(draw=False)], sections=collect_sections(None, tmp_path))
     assert "The study of demo" in text and 'href="cost/demo/cost.md"' in text
     data = base64.b64encode(b"<svg onload='alert(1)'/>").decode()
     # an image runs no script; what is too large stays outside

@@ -12,11 +12,11 @@ from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import COMPARED
-from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, to_csv, write_results
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results, write_rows
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, FULL_ACCURACY, K
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.witnesses import WITNESSES, Witness, predicting_from
-from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.engines.witnesses import WITNESSES, Witness, make_prediction
+from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
@@ -212,7 +212,7 @@ def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-
     rows = judge("scene", crank_rocker(), [Witness("echo", Echo, EQUIVALENCE)]).rows
     write_results(rows, tmp_path / "results.csv")
     again = list(read_columns(tmp_path / "results.csv"))
-    assert to_csv(again) == to_csv(rows)
+    assert write_rows(again) == write_rows(rows)
     assert [(r.scene, r.engine, r.setting, r.quantity) for r in again] == sorted(
         (r.scene, r.engine, r.setting, r.quantity) for r in rows
     )
@@ -223,10 +223,10 @@ def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own()
     at = command(scene)
     witness = next(witness for witness in WITNESSES if witness.residuals)
     answer = Answer(witness.name, "RK4", at, predicted={"torque": np.ones(len(at.theta_2))})
-    predicted = predicting_from(witness, scene, at, answer)
+    predicted = make_prediction(witness, scene, at, answer)
     assert predicted is not None and predicted("torque", np.ones(len(at.theta_2), bool))[0] == 1.0
     answer.alarms.append("the loop is open")
-    assert predicting_from(witness, scene, at, answer) is None
+    assert make_prediction(witness, scene, at, answer) is None
 
 
 class AnswersAnyway(Echo):
@@ -304,7 +304,7 @@ def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch: 
         return answering(engine, scene, at)
 
     monkeypatch.setattr(FreeBody, "answer", seen)
-    rows = judge("", SPECIMENS["stroke"], [witness for witness in WITNESSES if witness.name == "free-body"]).rows
+    rows = judge("", FAULT_SCENES["stroke"], [witness for witness in WITNESSES if witness.name == "free-body"]).rows
     assert not [row for row in rows if row.failed]
     assert sum(row.engine == "free-body" and row.compared for row in rows) > 20
     assert given

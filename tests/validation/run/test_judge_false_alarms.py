@@ -13,11 +13,11 @@ from fourbar.scene.motion import Free, Motion
 from fourbar.solution import Solution
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
 from fourbar_validation.engines.witnesses import WITNESSES
-from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from fourbar_validation.run import printed, released
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import Question
-from fourbar_validation.scenes.random import random_scene
+from fourbar_validation.scenes.random import draw_random_scene
 
 EXACT = [witness for witness in WITNESSES if not witness.through_time]
 BY_ITSELF = [witness for witness in EXACT if not witness.library]
@@ -45,7 +45,7 @@ def test_engines_that_are_right_raise_no_alarm(name: str) -> None:
 
 def test_ratios_over_ten_decades_raise_no_alarm() -> None:
     """As `run --random N --type uneven`. In the last the forces were summed more strictly than its coupler allows."""
-    scenes = [(index, random_scene(0, index, ())) for index in (1, 6, 8, 9, 10, 32, 36, 61)]
+    scenes = [(index, draw_random_scene(0, index, ())) for index in (1, 6, 8, 9, 10, 32, 36, 61)]
     lengths = [scene.linkage.lengths for _, scene in scenes]
     assert max(max(each) / min(each) for each in lengths) > 1e8
     kinds = {effect.key for _, scene in scenes for effect in scene.effects}
@@ -57,7 +57,7 @@ def test_ratios_over_ten_decades_raise_no_alarm() -> None:
 def test_a_free_motion_near_a_limit_raises_no_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
     """The engines get theta_2, omega_2 and alpha_2 of the independent theta_4, rounded: what that costs is computed."""
     monkeypatch.setattr(released, "ENGINES", {})
-    scene = SPECIMENS["double rocker released"]
+    scene = FAULT_SCENES["double rocker released"]
     often = replace(scene, motion=replace(scene.motion, free=Free(1.0, 1000)))  # nearer to its limits
     rows = judge("released", often, BY_ITSELF).rows
     assert not [row for row in rows if row.failed] and DEGRADED in {row.verdict for row in rows}
@@ -79,7 +79,7 @@ def test_what_is_wrong_by_more_than_is_predicted_fails(monkeypatch: pytest.Monke
 
 
 def test_an_error_bar_of_no_error_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = replace(SPECIMENS["crank-rocker"], motion=Motion(POSITIONS, 10.0))
+    scene = replace(FAULT_SCENES["crank-rocker"], motion=Motion(POSITIONS, 10.0))
     true = printed.solve
 
     def judged() -> str:

@@ -19,7 +19,7 @@ import fourbar_validation.run.run
 from fourbar.errors import InputError
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines import workers
-from fourbar_validation.report.machine import code
+from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import machines
 from fourbar_validation.run.machines import ClusterError
@@ -161,6 +161,6 @@ def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
 def test_a_worker_of_another_code_or_library_is_refused(
     cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(machines, "code", lambda: code() | {"numpy": "1.0"})
+    monkeypatch.setattr(machines, "name_code", lambda: name_code() | {"numpy": "1.0"})
     with pytest.raises(ClusterError, match=r"not set up as this machine: numpy is [2-9]\S+ there and 1\.0 here"):
         list(run(Random(1, SEED, TYPES), tmp_path, EXACT, RunOptions(drawn=False, scheduler=cluster.scheduler_address)))  # type: ignore[attr-defined]

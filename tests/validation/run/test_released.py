@@ -14,7 +14,7 @@ from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED, Row
 from fourbar_validation.engines.loop import LimitDetector
 from fourbar_validation.report.record import Record
 from fourbar_validation.run import released as free
-from fourbar_validation.run.judge import judge, judged
+from fourbar_validation.run.judge import judge, judge_for_report
 
 
 def falling(coupler: float = 0.15, **motion: Any) -> Scene:
@@ -35,7 +35,7 @@ def test_every_engine_is_judged_up_to_the_limit_and_by_its_instant(coupler: floa
     solution = solve(scene)
     assert solution.stopped_at is not None and solution.time is not None
     assert solution.time[-1] <= solution.stopped_at < solution.time[-1] + 0.01
-    page = judged("falling", scene)
+    page = judge_for_report("falling", scene)
     assert {row.engine for row in page.rows} > set(free.ENGINES)
     assert all(row.passed for row in page.rows)
     for engine in free.ENGINES:
@@ -130,15 +130,15 @@ def test_a_limit_is_seen_once_and_between_two_steps() -> None:
 
 
 def test_the_table_says_that_the_motion_ended() -> None:
-    from fourbar.show.tables import heading
-    from fourbar.solution import json_text
+    from fourbar.show.tables import write_heading
+    from fourbar.solution import write_json
 
     scene = falling()
     solution, free = solve(scene), scene.motion.free
     assert free is not None and len(solution) <= free.steps
     wanted = f"{free.steps + 1} instants were wanted: the motion stops at a limit position at t = 0.43991 s"
-    assert any(line.startswith(wanted) for line in heading(scene, solution))
-    assert json.loads(json_text(solution))["stopped_at"] == solution.stopped_at
+    assert any(line.startswith(wanted) for line in write_heading(scene, solution))
+    assert json.loads(write_json(solution))["stopped_at"] == solution.stopped_at
 
 
 def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -146,6 +146,6 @@ def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypa
 
     scene = falling()
     shown: list[str] = []
-    monkeypatch.setattr(figures, "_picture", lambda quantity, *_: shown.append(quantity) or "")
-    figures.scene_figure(Record("falling", scene, solution=solve(scene)))
+    monkeypatch.setattr(figures, "_draw_picture", lambda quantity, *_: shown.append(quantity) or "")
+    figures.draw_scene_figure(Record("falling", scene, solution=solve(scene)))
     assert shown == ["theta_4", "F32"]

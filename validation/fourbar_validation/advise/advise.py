@@ -12,14 +12,22 @@ import click
 import numpy as np
 
 from fourbar.errors import InputError, LimitError
-from fourbar.mjcf import Settings, mjcf
+from fourbar.mjcf import Settings, write_mjcf
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import require_file, write_text
-from fourbar_validation.advise.errors import WorstErrors
-from fourbar_validation.advise.matters import MATTERS, influences, judged, sentence
-from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, LONGEST, ORDER, SHORTEST, TrialSetup, dialled, guess
-from fourbar_validation.report.terminal import lined_up
+from fourbar_validation.advise.matters import MATTERS, judge_trial, measure_influences, write_sentence
+from fourbar_validation.advise.worst_errors import WorstErrors
+from fourbar_validation.engines.mujoco.trial import (
+    FEWEST_STEPS,
+    LONGEST,
+    ORDER,
+    SHORTEST,
+    TrialSetup,
+    guess,
+    make_settings,
+)
+from fourbar_validation.report.terminal import make_table
 
 MARGIN = 0.7
 """The run must stay within this part of the required error: elsewhere it may be larger."""
@@ -64,15 +72,15 @@ class Advice:
         """One line for the reader."""
         s, e = self.best.settings, self.best.errors
         result = f"torque {e.torque:.1e}, worst pin force {e.force:.1e}"
-        dial = (
+        setting = (
             f"RK4, {self.best.steps} steps ({self.best.steps_per_revolution:.0f} per revolution), "
             f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad}, tolerance 0, flywheel {s.flywheel:g}"
         )
         if self.reached:
-            return f"{dial}: {result}, required {self.required:g}"
+            return f"{setting}: {result}, required {self.required:g}"
         return (
             f"no setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.required:g}; "
-            f"the best was {dial}: {result}. "
+            f"the best was {setting}: {result}. "
             f"The formulas, and inverse dynamics of either engine with loop multipliers, reach round-off"
         )
 
@@ -84,10 +92,10 @@ def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> Advic
     """
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")
-    return _CheapestSearch(scene, error, setup or TrialSetup(scene, looked_at(scene))).advice()
+    return _CheapestSearch(scene, error, setup or TrialSetup(scene, choose_positions(scene))).advice()
 
 
-def looked_at(scene: Scene) -> Command:
+def choose_positions(scene: Scene) -> Command:
     """Take the scene's positions and others between them: the error peaks there, most near a pole of T3, T4."""
     own = command_of(scene)
     if np.ptp(own.branch) != 0:
@@ -112,15 +120,15 @@ class _CheapestSearch:
             other = min(max(tc * factor, SHORTEST), LONGEST)
             if other != tc:
                 self._polish(other)
-        served = self._served()
-        best = min(served, key=lambda a: a.steps) if served else _nearest(self.attempts)
+        served = self._is_served()
+        best = min(served, key=lambda a: a.steps) if served else _find_nearest(self.attempts)
         return Advice(self.error, best, tuple(self.attempts), bool(served))
 
     def _polish(self, tc: float) -> None:
         """Try whether another time constant serves with fewer steps, or serves at all."""
-        served = self._served()
+        served = self._is_served()
         if not served:
-            self._bisect(tc, _nearest(self.attempts).settings.steps_per_revolution)
+            self._bisect(tc, _find_nearest(self.attempts).settings.steps_per_revolution)
             return
         fewest = min(served, key=lambda a: (a.steps, a.errors.worst))
         n = fewest.settings.steps_per_revolution / CLOSE_ENOUGH
@@ -139,7 +147,7 @@ class _CheapestSearch:
                 serves = n
                 ahead = n * min(max(step, 0.4), 1.0 / CLOSE_ENOUGH)
             else:
-                if last is not None and n > (fails or 0.0) and self._floored(last, attempt):
+                if last is not None and n > (fails or 0.0) and self._is_floored(last, attempt):
                     return
                 fails, last = n, attempt
                 ahead = n * min(max(step, CLOSE_ENOUGH), 3.0)
@@ -153,7 +161,7 @@ class _CheapestSearch:
                 return
             n = max(ahead, FEWEST_STEPS)
 
-    def _floored(self, before: Attempt, after: Attempt) -> bool:
+    def _is_floored(self, before: Attempt, after: Attempt) -> bool:
         """Tell whether more steps bought nothing."""
         worst = after.errors.worst
         return worst < 1e-2 and worst > LEAST_GAIN * before.errors.worst and after.steps > 1.3 * before.steps
@@ -161,21 +169,21 @@ class _CheapestSearch:
     def _serves(self, attempt: Attempt) -> bool:
         return attempt.errors.worst <= MARGIN * self.error
 
-    def _served(self) -> list[Attempt]:
+    def _is_served(self) -> list[Attempt]:
         return [attempt for attempt in self.attempts if self._serves(attempt)]
 
     def _try(self, n: float, tc: float) -> Attempt:
-        settings = dialled(n, tc)
+        settings = make_settings(n, tc)
         steps = self.setup.steps(settings)
         if steps > MOST_STEPS:
-            settings = dialled(n * MOST_STEPS / steps, tc)
+            settings = make_settings(n * MOST_STEPS / steps, tc)
         trial = self.setup.try_out(settings)
-        attempt = Attempt(settings, max(trial.steps, 1), judged(self.scene, trial), trial.steps_per_revolution)
+        attempt = Attempt(settings, max(trial.steps, 1), judge_trial(self.scene, trial), trial.steps_per_revolution)
         self.attempts.append(attempt)
         return attempt
 
 
-def _nearest(attempts: Sequence[Attempt]) -> Attempt:
+def _find_nearest(attempts: Sequence[Attempt]) -> Attempt:
     return min(attempts, key=lambda a: a.errors.worst)
 
 
@@ -202,7 +210,7 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
     rows, reached = [], True
     for file, scene in loaded:
         try:
-            setup = TrialSetup(scene, looked_at(scene))
+            setup = TrialSetup(scene, choose_positions(scene))
             advice = advise(scene, wanted, setup)
         except LimitError as error:
             reason = f"cannot be simulated: {error}; inverse dynamics with loop multipliers can answer it"
@@ -210,18 +218,18 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
             rows.append((file.name, "-", "-", "-", "cannot be simulated"))
             reached = False
             continue
-        result = influences(scene, setup, advice.best.settings)
+        result = measure_influences(scene, setup, advice.best.settings)
         click.echo(f"{file.name}: {advice.reason}")
-        click.echo(f"{sentence(result)}")
+        click.echo(f"{write_sentence(result)}")
         click.echo(f"{len(advice.attempts)} runs of the scene, {sum(a.steps for a in advice.attempts)} steps")
         reached &= advice.reached
         rows.append((file.name, *advice.cells(), result[0].setting if result[0].times >= MATTERS else "none by itself"))
         if output is not None and advice.reached:
-            write_text(output, mjcf(scene, advice.best.settings))
+            write_text(output, write_mjcf(scene, advice.best.settings))
             click.echo(f"written to {output}")
     if len(rows) > 1:
         from rich.console import Console
 
         head = ("scene", "error", "steps/turn", "tc, steps", "matters most")
-        Console().print(lined_up(head, rows, show_edge=False))
+        Console().print(make_table(head, rows, show_edge=False))
     return 0 if reached else 1

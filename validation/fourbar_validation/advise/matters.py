@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fourbar.mjcf import Settings
-from fourbar.mjcf.document import load_ratio, mass_ratio
+from fourbar.mjcf.document import compute_load_ratio, compute_mass_ratio
 from fourbar.mjcf.settings import LIGHT
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
-from fourbar_validation.advise.errors import NO_ANSWER, WorstErrors, errors
+from fourbar_validation.advise.worst_errors import NO_ANSWER, WorstErrors, compute_errors
 from fourbar_validation.engines.loop import Trial
 from fourbar_validation.engines.mujoco.trial import LONGEST, SHORTEST, TrialSetup
 
@@ -42,17 +42,17 @@ class SettingInfluence:
         return f"{self.setting} matters most here: {self.changed} {lost}, because {self.why}"
 
 
-def judged(scene: Scene, trial: Trial) -> WorstErrors:
+def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
     """Compute the errors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
     if trial.broken:
         return NO_ANSWER
-    result = [errors(scene, trial.at, trial.quantities)]
+    result = [compute_errors(scene, trial.at, trial.quantities)]
     if scene.drive_bar == 2:  # the torque of another bar has poles, through which no curve can be drawn
-        result += [each for segment in trial.segments for each in between(scene, trial, *segment)]
+        result += [each for segment in trial.segments for each in compute_errors_between(scene, trial, *segment)]
     return WorstErrors(*map(max, *result)) if len(result) > 1 else result[0]
 
 
-def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[WorstErrors]:
+def compute_errors_between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[WorstErrors]:
     """Compute errors amid the steps of a segment, where they are fewer than its positions: by a spline.
 
     A largest force that lies between two steps is not seen at either of them.
@@ -73,33 +73,35 @@ def between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[
     there = {name: make_interp_spline(theta_2, values, degree)(where) for name, values in read.items()}
     branch = np.full(where.shape, trial.at.branch[samples][0], dtype=np.int8)
     at = Command(where, branch, there.pop("omega_2"), there.pop("alpha_2"))
-    yield errors(scene, at, there)
+    yield compute_errors(scene, at, there)
 
 
-def influences(scene: Scene, setup: TrialSetup, settings: Settings) -> list[SettingInfluence]:
+def measure_influences(scene: Scene, setup: TrialSetup, settings: Settings) -> list[SettingInfluence]:
     """Every setting changed alone, the one that matters most first."""
-    before = judged(scene, setup.try_out(settings)).worst
+    before = judge_trial(scene, setup.try_out(settings)).worst
     result = []
-    for name, changed, other, why in _changes(scene, settings):
-        worst = judged(scene, setup.try_out(other)).worst
+    for name, changed, other, why in _describe_changes(scene, settings):
+        worst = judge_trial(scene, setup.try_out(other)).worst
         times = worst / before if before > 0.0 and math.isfinite(before) else math.nan
         result.append(SettingInfluence(name, changed, worst, times, why(setup)))
     return sorted(result, key=lambda each: -each.times if each.times == each.times else math.inf)
 
 
-def sentence(found: list[SettingInfluence]) -> str:
+def write_sentence(found: list[SettingInfluence]) -> str:
     """Name the setting that matters most, and why."""
     if found and found[0].times >= MATTERS:
         return str(found[0])
     return f"no setting matters by itself here: changed alone none makes the error {MATTERS:g} times as large"
 
 
-def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Settings, Callable[[TrialSetup], str]]]:
+def _describe_changes(
+    scene: Scene, settings: Settings
+) -> Iterator[tuple[str, str, Settings, Callable[[TrialSetup], str]]]:
     """Say what is changed to what, and what a growth of the error would come from."""
     steps, tc = settings.steps_per_revolution, settings.time_constant_steps
     window = max(settings.steps_per_window // 2, 1)
     coarse = replace(settings, steps_per_revolution=steps / 2.0, steps_per_window=window)
-    yield "the timestep", "twice as long", coarse, _why_timestep
+    yield "the timestep", "twice as long", coarse, _explain_timestep
     if tc / 2.0 >= SHORTEST / 2.0:
         stiff = replace(settings, time_constant_steps=tc / 2.0)
         yield (
@@ -110,13 +112,13 @@ def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Setti
         )
     if 2.0 * tc <= LONGEST:
         slow = replace(settings, time_constant_steps=2.0 * tc)
-        yield "the closure's time constant", "twice as long", slow, lambda _: _yields(scene, "a slow closure")
+        yield "the closure's time constant", "twice as long", slow, lambda _: _find_yielding(scene, "a slow closure")
     if settings.pad is not None:
         yield (
             "the stiffness by pads",
             "without it",
             replace(settings, pad=None),
-            lambda _: _yields(scene, "without pads the closure"),
+            lambda _: _find_yielding(scene, "without pads the closure"),
         )
     if settings.tolerance == 0.0:
         loose = replace(settings, tolerance=MUJOCO_TOLERANCE)
@@ -128,7 +130,7 @@ def _changes(scene: Scene, settings: Settings) -> Iterator[tuple[str, str, Setti
         )
 
 
-def _why_timestep(setup: TrialSetup) -> str:
+def _explain_timestep(setup: TrialSetup) -> str:
     motion = solve(setup.scene, "position", at=setup.command)
     sines = np.abs(motion.sin_mu)
     nearest = int(np.nanargmin(sines))
@@ -138,9 +140,9 @@ def _why_timestep(setup: TrialSetup) -> str:
     return "the error of RK4 goes as the fourth power of it"
 
 
-def _yields(scene: Scene, what: str) -> str:
+def _find_yielding(scene: Scene, what: str) -> str:
     """To what a soft closure yields, of this scene."""
-    loads, masses = load_ratio(scene), mass_ratio(scene.linkage)
+    loads, masses = compute_load_ratio(scene), compute_mass_ratio(scene.linkage)
     if masses > LIGHT:
         return f"{what} is soft at the lighter of coupler and output, whose inertia is {masses:.1e} times smaller"
     if loads > 1.0:

@@ -32,7 +32,7 @@ class Cause:
     def line(self) -> str:
         """Write the entry, and both values where they are short."""
         d = self.difference
-        return f"{d.key}: {value(d.theirs)}, generated {value(d.generated)}"
+        return f"{d.key}: {write_value(d.theirs)}, generated {write_value(d.generated)}"
 
     def texts(self) -> list[str]:
         """Say what it is in their file, and what it does."""
@@ -43,10 +43,12 @@ class Cause:
         """For a row of the page."""
         d = self.difference
         key = f"{d.key} ({d.written})" if d.written else d.key
-        return self.percent(), key, value(d.generated), value(d.theirs), d.remark
+        return self.percent(), key, write_value(d.generated), write_value(d.theirs), d.remark
 
 
-def causes(differences: Sequence[Difference], before: Sequence[Row], after: Sequence[Sequence[Row]]) -> list[Cause]:
+def order_causes(
+    differences: Sequence[Difference], before: Sequence[Row], after: Sequence[Sequence[Row]]
+) -> list[Cause]:
     """Order differences by their shares, the one whose correction gains most first; the others keep their order.
 
     Parameters
@@ -54,10 +56,10 @@ def causes(differences: Sequence[Difference], before: Sequence[Row], after: Sequ
     before : rows of the file as it is.
     after : for each difference, rows of the file with that one mended; empty where it was not.
     """
-    errors = _errors(before)
+    errors = _collect_errors(before)
     result = []
     for number, difference in enumerate(differences):
-        mended = _errors(after[number]) if number < len(after) else {}
+        mended = _collect_errors(after[number]) if number < len(after) else {}
         gains = {key: errors[key] - mended[key] for key in errors if key in mended and errors[key] > 0.0}
         if not gains:
             result.append(Cause(difference))
@@ -68,14 +70,14 @@ def causes(differences: Sequence[Difference], before: Sequence[Row], after: Sequ
     return sorted(result, key=lambda cause: (cause.share is None, -cause.gain))
 
 
-def _errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
+def _collect_errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
     """Collect the error of the torque and of each pin force, by method."""
     return {
         (row.engine, row.quantity): row.error for row in rows if row.quantity in FORCES and math.isfinite(row.error)
     }
 
 
-def value(entry: Value) -> str:
+def write_value(entry: Value) -> str:
     """Numbers with the digits that set them apart, or the word itself."""
     if isinstance(entry, str):
         return entry

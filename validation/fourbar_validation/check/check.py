@@ -10,15 +10,15 @@ from fourbar.errors import InputError
 from fourbar.files import load
 from fourbar.writing import require_file, write_text
 from fourbar_validation.check.judge import Allowance, Discrepancy
-from fourbar_validation.check.judgement import Judgement, as_json, as_junit, judge_table
+from fourbar_validation.check.judgement import Judgement, judge_table, write_json, write_junit
 from fourbar_validation.check.mistakes import NEARER, Explanation
 from fourbar_validation.check.theirs import TheirTable, read_table
-from fourbar_validation.compare.rows import plain
+from fourbar_validation.compare.rows import make_plain
 
 SHOWN = 3
 
 
-def extent(explanation: Explanation) -> str:
+def write_extent(explanation: Explanation) -> str:
     """How far a mistake explains what differs."""
     if explanation.complete:
         return "explains everything that differs: " + ", ".join(explanation.quantities)
@@ -30,7 +30,7 @@ def extent(explanation: Explanation) -> str:
     return "; ".join(parts)
 
 
-def tolerance_of(rtol: float | None, atol: float | None) -> Allowance | None:
+def read_tolerance(rtol: float | None, atol: float | None) -> Allowance | None:
     """Read the tolerance of the options; None where they give none."""
     for option, value in (("--rtol", rtol), ("--atol", atol)):
         if value is not None and not 0.0 <= value < math.inf:
@@ -59,11 +59,11 @@ def check(
     for path in (json, junit):
         if path is not None:
             require_file(path, scene, theirs)
-    judgement = judge_table(load(scene), table, tolerance_of(rtol, atol))
+    judgement = judge_table(load(scene), table, read_tolerance(rtol, atol))
     if json is not None:
-        write_text(json, as_json(judgement, table))
+        write_text(json, write_json(judgement, table))
     if junit is not None:
-        write_text(junit, as_junit(judgement, theirs.name))
+        write_text(junit, write_junit(judgement, theirs.name))
     show(judgement, table, theirs.name)
     return judgement.status
 
@@ -78,32 +78,32 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
     console = Console(soft_wrap=True)
     for why in dict.fromkeys(table.left_out.values()):
         headings = ", ".join(heading for heading, reason in table.left_out.items() if reason == why)
-        console.print(f"left out ({why}): {escape(plain(headings))}")
+        console.print(f"left out ({why}): {escape(make_plain(headings))}")
     differing = judgement.differing
     if differing:
-        title = f"{escape(plain(name))}: what differs, the {SHOWN} worst of each quantity"
+        title = f"{escape(make_plain(name))}: what differs, the {SHOWN} worst of each quantity"
         shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
         for heading in ("line", "theta_2\ndeg", "quantity", "theirs", "ours", "error", "allowed"):
             shown.add_column(heading, justify="right")
-        for finding in worst_of_each(differing):
-            theirs, ours = in_their_unit(finding, table)
+        for finding in choose_worst(differing):
+            theirs, ours = write_in_their_unit(finding, table)
             numbers = (theirs, ours, f"{finding.error:.1e}", f"{finding.allowed:.1e}")
             where = f"{math.degrees(finding.theta_2):.7g}"
-            shown.add_row(str(finding.line), where, escape(with_unit(finding, table)), *numbers)
+            shown.add_row(str(finding.line), where, escape(write_with_unit(finding, table)), *numbers)
         console.print(shown)
         counted = Counter(finding.quantity for finding in differing)
         console.print("in all: " + ", ".join(f"{count} of {quantity}" for quantity, count in counted.items()))
     for line in judgement.not_assembled:
         console.print(f"line {line}: the linkage has no motion there (it does not assemble, or is singular)")
     for explanation in judgement.explanations:
-        console.print(f"looks like: {escape(explanation.text)} ({extent(explanation)})")
+        console.print(f"looks like: {escape(explanation.text)} ({write_extent(explanation)})")
     if differing and not any(explanation.complete for explanation in judgement.explanations):
         together = "these together explain all of it" if judgement.together() else "no single known mistake explains it"
         console.print(together)
     console.print(f"[bold]{judgement.sentence()}[/]")
 
 
-def worst_of_each(differing: list[Discrepancy]) -> list[Discrepancy]:
+def choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
     """Choose the largest differences of each quantity, the worst quantity first."""
     by_quantity: dict[str, list[Discrepancy]] = {}
     for finding in sorted(differing, key=lambda f: -f.error):
@@ -111,18 +111,18 @@ def worst_of_each(differing: list[Discrepancy]) -> list[Discrepancy]:
     return [finding for findings in by_quantity.values() for finding in findings[:SHOWN]]
 
 
-def with_unit(finding: Discrepancy, table: TheirTable) -> str:
+def write_with_unit(finding: Discrepancy, table: TheirTable) -> str:
     """Write the quantity with the unit of their column."""
-    return f"{finding.quantity} [{plain(table.units[_key(finding, table)].text)}]"
+    return f"{finding.quantity} [{make_plain(table.units[_make_key(finding, table)].text)}]"
 
 
-def in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, str]:
+def write_in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, str]:
     """Write both numbers in the unit of their column, with the digits that set them apart."""
-    factor = table.units[_key(finding, table)].factor
+    factor = table.units[_make_key(finding, table)].factor
     theirs, ours = ([x / factor for x in numbers] for numbers in (finding.theirs, finding.ours))
     digits = next((d for d in (4, 6, 9, 12) if any(f"{a:.{d}g}" != f"{b:.{d}g}" for a, b in zip(theirs, ours))), 15)  # noqa: B905
     return tuple(", ".join(f"{x:.{digits}g}" for x in numbers) for numbers in (theirs, ours))  # type: ignore[return-value]
 
 
-def _key(finding: Discrepancy, table: TheirTable) -> str:
+def _make_key(finding: Discrepancy, table: TheirTable) -> str:
     return next(key for key in table.values if table.label(key) == finding.quantity)

@@ -50,20 +50,29 @@ class Difference:
     """Element and attribute in their file, where there is one."""
 
 
-def differences(generated: Described, theirs: Described, called: Mapping[str, str] | None = None) -> list[Difference]:
+def find_differences(
+    generated: Described, theirs: Described, called: Mapping[str, str] | None = None
+) -> list[Difference]:
     """Find what differs, in the order of the description; `called`: what their file calls a part of a key."""
     scale = max(value for key, value in generated.items() if _is_length(key) and isinstance(value, float))
-    generated = _numbered_like(theirs, generated)
+    generated = _renumber_like(theirs, generated)
     result = []
     for key in [*theirs, *(key for key in generated if key not in theirs)]:
-        ours, other = (file.get(key, _without(key)) for file in (generated, theirs))
-        if ours is not None and other is not None and not _same(key, ours, other, scale) and _acts(key, theirs):
-            name = _named(key, theirs if key in theirs else generated)
-            result.append(Difference(name, ours, other, _remark(key, ours, other), _written(key, theirs, called or {})))
+        ours, other = (file.get(key, _describe_missing(key)) for file in (generated, theirs))
+        if (
+            ours is not None
+            and other is not None
+            and not _is_same(key, ours, other, scale)
+            and _has_effect(key, theirs)
+        ):
+            name = _write_name(key, theirs if key in theirs else generated)
+            result.append(
+                Difference(name, ours, other, _remark(key, ours, other), _find_written(key, theirs, called or {}))
+            )
     return result
 
 
-def _numbered_like(theirs: Described, generated: Described) -> Described:
+def _renumber_like(theirs: Described, generated: Described) -> Described:
     """Renumber the generated file's actuators and tendons as their counterparts: same role, if possible name.
 
     One without a counterpart keeps a number that theirs does not have.
@@ -87,7 +96,7 @@ def _numbered_like(theirs: Described, generated: Described) -> Described:
     return renumbered
 
 
-def _without(key: str) -> Value | None:
+def _describe_missing(key: str) -> Value | None:
     """Give what a file has that lacks the key; None: it is left out."""
     if attached := ATTACHED.fullmatch(key):
         return None if attached[2] else "none"
@@ -96,7 +105,7 @@ def _without(key: str) -> Value | None:
     return "none"
 
 
-def _acts(key: str, theirs: Described) -> bool:
+def _has_effect(key: str, theirs: Described) -> bool:
     """Whether what the key says has an effect in their file; a name has none."""
     if ATTACHED.fullmatch(key) and key.endswith(".name"):
         return False
@@ -106,14 +115,14 @@ def _acts(key: str, theirs: Described) -> bool:
     return True
 
 
-def _named(key: str, described: Described) -> str:
+def _write_name(key: str, described: Described) -> str:
     attached = ATTACHED.fullmatch(key)
     if not attached or not (name := described[f"{attached[1]}.name"]):
         return key
     return f"{key.partition('.')[0]}.{name}{attached[2] or ''}"
 
 
-def _written(key: str, theirs: Described, called: Mapping[str, str]) -> str:
+def _find_written(key: str, theirs: Described, called: Mapping[str, str]) -> str:
     """Element and attribute as they stand in their MJCF, where the key does not say so itself."""
     if key not in theirs:
         return ""
@@ -126,7 +135,7 @@ def _is_length(key: str) -> bool:
     return key.startswith("lengths.") and not key.endswith("angle")
 
 
-def _same(key: str, ours: Value, theirs: Value, length: float) -> bool:
+def _is_same(key: str, ours: Value, theirs: Value, length: float) -> bool:
     if isinstance(ours, str) or isinstance(theirs, str) or ours == theirs:
         return ours == theirs
     one, other = np.atleast_1d(ours), np.atleast_1d(theirs)

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from fourbar.errors import FourBarError
 from fourbar.linkage import Bar
 from fourbar.quantities import FORCES, UNITS
-from fourbar.quantities.units import factor_to
+from fourbar.quantities.units import find_factor
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.check.judge import Judge, Mistake
-from fourbar_validation.check.theirs import Array, quantity_of
-from fourbar_validation.compare.tolerance import difference, in_own_unit
-from fourbar_validation.scenes.hard_linkages import with_bars
+from fourbar_validation.check.theirs import Array, name_quantity
+from fourbar_validation.compare.tolerance import compute_difference, replace_zero_size
+from fourbar_validation.scenes.hard_linkages import replace_bars
 
 OTHER_UNITS = {
     "rad": ("deg",),
@@ -50,16 +50,16 @@ MOST_ROWS = 1000
 """Rows among which another order is looked for: every one is held against every other."""
 
 
-def fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
+def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     """Every mistake whose number the table gives, the simplest first."""
-    yield from _ratios(judge, differing)
-    yield from _order(judge)
-    if any(quantity_of(key) in FORCES for key in differing):
-        yield from _factors(judge, differing)
-    yield from _offset(judge)
+    yield from _find_ratios(judge, differing)
+    yield from _try_order(judge)
+    if any(name_quantity(key) in FORCES for key in differing):
+        yield from _try_factors(judge, differing)
+    yield from _try_offset(judge)
 
 
-def _ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
+def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     """Columns that are one number times ours: a unit, by name where a pair of units has that ratio."""
     by_ratio: dict[tuple[str, float], set[str]] = {}
     for key in differing:
@@ -69,14 +69,14 @@ def _ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
         ours, theirs = ours[there], theirs[there]
         if not where.any() or not (squares := float(ours @ ours)):
             continue
-        announced, unit = judge.table.units[key], UNITS[quantity_of(key)]
+        announced, unit = judge.table.units[key], UNITS[name_quantity(key)]
         near = float(ours @ theirs) / squares
-        named = _named_ratio(judge, key, announced.text, announced.factor, unit, near)
+        named = _name_ratio(judge, key, announced.text, announced.factor, unit, near)
         if named is None and np.count_nonzero(ours) >= ENOUGH and near:
-            named = _plain_ratio(judge, key, near)
+            named = _round_ratio(judge, key, near)
         if named is not None:
             group = next((g for g in by_ratio if g[0] == named[0]), named)
-            by_ratio.setdefault(group, set()).add(quantity_of(key))
+            by_ratio.setdefault(group, set()).add(name_quantity(key))
     for (text, ratio), quantities in by_ratio.items():
         yield Mistake(
             text,
@@ -88,18 +88,18 @@ def _ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
         )
 
 
-def _named_ratio(
+def _name_ratio(
     judge: Judge, key: str, announced: str, factor: float, unit: str, near: float
 ) -> tuple[str, float] | None:
     for other in OTHER_UNITS.get(unit, ()):
-        ratio = math.copysign(factor / factor_to(unit, other), near)
+        ratio = math.copysign(factor / find_factor(unit, other), near)
         if abs(near / ratio - 1.0) < PLAIN and abs(ratio) != 1.0 and judge.explained(key, ratio * judge.ours(key)):
             reversed_too = ", and reversed" if near < 0.0 else ""
             return f"units: numbers in {other} where {announced} was announced ({ratio:.6g} times){reversed_too}", ratio
     return None
 
 
-def _plain_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | None:
+def _round_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | None:
     """Round to a power of ten, or keep the ratio as fitted; a reversed sign is a mistake of its own."""
     if judge.explained(key, -judge.ours(key)):
         return None
@@ -110,12 +110,12 @@ def _plain_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | Non
     return (f"every number is {near:.6g} times ours", near) if judge.explained(key, near * judge.ours(key)) else None
 
 
-def _change(judge: Judge, wrong: Solution, keys: list[str]) -> Array:
+def _compute_change(judge: Judge, wrong: Solution, keys: list[str]) -> Array:
     """Compute what a changed scene adds to the right numbers, each quantity over its scale, in one line."""
-    return np.concatenate([_residual(judge, key, judge.ours(key, wrong), judge.ours(key)) for key in keys])
+    return np.concatenate([_compute_residual(judge, key, judge.ours(key, wrong), judge.ours(key)) for key in keys])
 
 
-def _residual(judge: Judge, key: str, one: Array, other: Array) -> Array:
+def _compute_residual(judge: Judge, key: str, one: Array, other: Array) -> Array:
     scale = judge.size(key)
     where = judge.where(key) & (scale > 0.0)
     scaled = (one[where] - other[where]) / (scale[where][:, None] if one.ndim == 2 else scale[where])
@@ -123,11 +123,11 @@ def _residual(judge: Judge, key: str, one: Array, other: Array) -> Array:
     return np.asarray(np.where(stated, scaled, 0.0)).ravel()
 
 
-def _factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
+def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     """Try a moment of inertia or a mass times a factor: forces and torque are linear in each."""
     scene = judge.scene
-    keys = [key for key in differing if quantity_of(key) in FORCES]
-    theirs = np.concatenate([_residual(judge, key, judge.table.values[key], judge.ours(key)) for key in keys])
+    keys = [key for key in differing if name_quantity(key) in FORCES]
+    theirs = np.concatenate([_compute_residual(judge, key, judge.table.values[key], judge.ours(key)) for key in keys])
     if np.count_nonzero(theirs) < ENOUGH:
         return
     bars = ("input", "coupler", "output")
@@ -136,10 +136,10 @@ def _factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     for which, (word, change) in (*(((bar,), each) for bar in bars for each in (inertia, mass)), (bars, inertia)):
 
         def scaled(f: float, which: Sequence[str] = which, change: Callable[[Bar, float], Bar] = change) -> Scene:
-            return with_bars(scene, **{bar: change(getattr(scene.linkage, bar), f) for bar in which})
+            return replace_bars(scene, **{bar: change(getattr(scene.linkage, bar), f) for bar in which})
 
         try:
-            moves = _change(judge, solve(scaled(2.0), "force", at=judge.at), keys)
+            moves = _compute_change(judge, solve(scaled(2.0), "force", at=judge.at), keys)
             slope = float(moves @ moves)
             factor = 1.0 + float(moves @ theirs) / slope if slope else math.nan
             if not 0.0 < factor < math.inf or factor == 1.0:
@@ -159,7 +159,7 @@ def _factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
             continue
 
 
-def _offset(judge: Judge) -> Iterator[Mistake]:
+def _try_offset(judge: Judge) -> Iterator[Mistake]:
     """Try the crank angle from another zero: the offset at which theirs fit best, refined by Gauss and Newton."""
     keys = [key for key in judge.table.values if judge.size(key).any()]
     rows = np.unique(np.linspace(0, len(judge.at.theta_2) - 1, TRIED).round().astype(int))
@@ -178,9 +178,9 @@ def _offset(judge: Judge) -> Iterator[Mistake]:
         for key in keys:
             theirs = judge.table.values[key][rows].reshape(len(rows), -1)
             apart = judge.ours(key, moved).reshape(m, *theirs.shape) - theirs
-            if quantity_of(key).startswith("theta"):
+            if name_quantity(key).startswith("theta"):
                 apart = np.remainder(apart + np.pi, 2.0 * np.pi) - np.pi
-            scaled = apart / in_own_unit(judge.size(key)[rows])[:, None]
+            scaled = apart / replace_zero_size(judge.size(key)[rows])[:, None]
             parts.append(np.where(np.isfinite(theirs), scaled, 0.0).reshape(m, -1))
         return np.concatenate(parts, axis=1)
 
@@ -209,7 +209,7 @@ def _offset(judge: Judge) -> Iterator[Mistake]:
     )
 
 
-def _order(judge: Judge) -> Iterator[Mistake]:
+def _try_order(judge: Judge) -> Iterator[Mistake]:
     """Try the right numbers in other rows: each row of theirs goes to the nearest of ours."""
     table, n = judge.table, len(judge.at.theta_2)
     keys = [key for key in table.values if judge.where(key).all() and judge.size(key).all()]
@@ -220,7 +220,7 @@ def _order(judge: Judge) -> Iterator[Mistake]:
         ours, theirs, scale = judge.ours(key), table.values[key], judge.size(key).max()
         for i in range(n):
             there = np.where(np.isnan(theirs[i]), ours, theirs[i]) if ours.ndim == 2 else np.full(n, theirs[i])
-            apart[i] += difference(quantity_of(key), ours, there) / scale
+            apart[i] += compute_difference(name_quantity(key), ours, there) / scale
     nearest = np.argmin(apart, axis=1)
     if len(np.unique(nearest)) < n - 1 or np.array_equal(nearest, np.arange(n)):  # a revolution ends where it began
         return
@@ -232,9 +232,9 @@ def _order(judge: Judge) -> Iterator[Mistake]:
         text = f"the rows are shifted by {rows:+d}: each has the numbers of another theta_2"
     else:
         text = "the rows are in another order than their theta_2"
-    yield Mistake(text, lambda quantity, right: _in_rows(quantity, right, nearest))
+    yield Mistake(text, lambda quantity, right: _take_rows(quantity, right, nearest))
 
 
-def _in_rows(quantity: str, right: Solution, rows: Array) -> Array | None:
+def _take_rows(quantity: str, right: Solution, rows: Array) -> Array | None:
     values = None if quantity == "theta_2" else getattr(right, quantity, None)
     return None if values is None else np.asarray(values[rows])

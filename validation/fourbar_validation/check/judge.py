@@ -9,22 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
-from fourbar.formulas.mobility import on_smooth_path
+from fourbar.formulas.mobility import follow_smooth_path
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.check.theirs import Array, TheirTable, quantity_of
+from fourbar_validation.check.theirs import Array, TheirTable, name_quantity
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
     NOTHING_TO_TELL,
-    condition_of,
-    difference,
-    in_own_unit,
+    compute_difference,
+    divide,
+    find_condition,
     magnitude,
-    relative,
+    replace_zero_size,
 )
 
 Mask = NDArray[np.bool_]
@@ -82,30 +82,30 @@ class Judge:
 
     def __init__(self, scene: Scene, table: TheirTable, tolerance: Allowance | None) -> None:
         self.scene, self.table, self.tolerance = scene, table, tolerance
-        self.at = positions(scene, table)
+        self.at = make_command(scene, table)
         self.stage = "position" if self.at.omega_2 is None else "force"
         self.right = solve(scene, self.stage, at=self.at)
         self.ok = self.right.status_code == OK
         self._sizes: dict[str, Array] = {}
         for key in table.values:
-            if getattr(self.right, quantity_of(key)) is None:
+            if getattr(self.right, name_quantity(key)) is None:
                 if self.at.omega_2 is None:
                     raise InputError("motion.omega_2", None, f"is needed in the scene to judge {key}")
                 raise InputError("header", key, "does not exist in this scene: it has no dry friction")
 
     def ours(self, key: str, solution: Solution | None = None) -> Array:
         """Give the formulas' values of a key of the table."""
-        values: Array = getattr(self.right if solution is None else solution, quantity_of(key))
+        values: Array = getattr(self.right if solution is None else solution, name_quantity(key))
         return magnitude(values) if key.startswith("|") else values
 
     def where(self, key: str) -> Mask:
         """Mark the rows in which both have a number, (n,)."""
-        return np.asarray(self._answered(key) & self.table.stated(key))
+        return np.asarray(self._answer(key) & self.table.stated(key))
 
     def size(self, key: str) -> Array:
         """Compute what the error of a key is divided by at each position, (n,)."""
         if key not in self._sizes:
-            quantity = quantity_of(key)
+            quantity = name_quantity(key)
             self._sizes[key] = scale_of(quantity, self.scene, self.right, getattr(self.right, quantity))
         return self._sizes[key]
 
@@ -120,22 +120,22 @@ class Judge:
 
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
         """(error, allowed, apart) of the table where `ours` is taken for the right numbers, each (n,)."""
-        quantity, size = quantity_of(key), self.size(key)
-        scale = in_own_unit(size)  # what all its terms leave 0
+        quantity, size = name_quantity(key), self.size(key)
+        scale = replace_zero_size(size)  # what all its terms leave 0
         theirs = self.table.values[key]
         theirs = np.where(np.isnan(theirs), ours, theirs)  # a component that their table does not have
-        apart = difference(quantity, ours, theirs)
-        condition = condition_of(quantity, self.scene.linkage, self.right)
+        apart = compute_difference(quantity, ours, theirs)
+        condition = find_condition(quantity, self.scene.linkage, self.right)
         # what a mistake would have printed is rounded at its own size, however much larger
         there = self.ours(key)
         larger: Array | float = 1.0
         if ours is not there and not quantity.startswith("theta"):
             larger = np.maximum(np.nanmax(magnitude(ours)[self.ok], initial=0.0) / scale, 1.0)
-        moves = [difference(quantity, there, self.ours(key, other)) for other in self.near]
-        spread = relative(np.fmax.reduce(moves), scale) if moves else 0.0
+        moves = [compute_difference(quantity, there, self.ours(key, other)) for other in self.near]
+        spread = divide(np.fmax.reduce(moves), scale) if moves else 0.0
         exact = np.where(size == 0.0, 0.0, EQUIVALENCE.allowed(condition))
-        allowed = (exact + spread) * larger + relative(self.table.rounding[key], scale)
-        return relative(apart, scale), np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf), apart
+        allowed = (exact + spread) * larger + divide(self.table.rounding[key], scale)
+        return divide(apart, scale), np.where(condition * NOTHING_TO_TELL > EPS, allowed, np.inf), apart
 
     def permitted(self, key: str, ours: Array) -> Array | None:
         """Compute the difference that the given tolerance allows, (n,), in the quantity's unit."""
@@ -172,15 +172,15 @@ class Judge:
 
     def without_answer(self) -> list[int]:
         """Lines that state a number where this linkage does not assemble, or is singular: none is right there."""
-        missing = [self.table.stated(key) & ~self._answered(key) for key in self.table.values]
+        missing = [self.table.stated(key) & ~self._answer(key) for key in self.table.values]
         return [self.table.lines[i] for i in np.flatnonzero(np.any(missing, axis=0))]
 
-    def _answered(self, key: str) -> Mask:
+    def _answer(self, key: str) -> Mask:
         there = np.isfinite(self.ours(key))
         return np.asarray(there.all(axis=1) if there.ndim == 2 else there)
 
 
-def positions(scene: Scene, table: TheirTable) -> Command:
+def make_command(scene: Scene, table: TheirTable) -> Command:
     """Build the command at each row of the table: the scene's own where it has the same positions."""
     base = command(scene)
     if scene.motion.free is not None:
@@ -193,7 +193,7 @@ def positions(scene: Scene, table: TheirTable) -> Command:
         raise InputError("motion.law", scene.title, allowed)
     branch = np.full(len(theta_2), scene.motion.branch, dtype=np.int8)
     if scene.motion.through == "follow":
-        branch = on_smooth_path(scene.linkage, theta_2, scene.motion.branch)
+        branch = follow_smooth_path(scene.linkage, theta_2, scene.motion.branch)
     return Command(theta_2, branch, base.omega_2, base.alpha_2)
 
 
@@ -211,5 +211,5 @@ class Mistake:
 
     def prediction(self, key: str, right: Solution) -> Array | None:
         """For a key of the table."""
-        predicted = self.predict(quantity_of(key), right)
+        predicted = self.predict(name_quantity(key), right)
         return magnitude(predicted) if predicted is not None and key.startswith("|") else predicted

@@ -10,7 +10,7 @@ from fourbar.scene import Scene
 from fourbar_validation.check.judge import Allowance, Discrepancy, Judge
 from fourbar_validation.check.mistakes import Explanation, explain
 from fourbar_validation.check.theirs import TheirTable
-from fourbar_validation.report.junit import JunitCase, document
+from fourbar_validation.report.junit import JunitCase, write_document
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ def judge_table(scene: Scene, table: TheirTable, tolerance: Allowance | None = N
     return Judgement(findings, judge.without_answer(), known, tolerance)
 
 
-def as_json(judgement: Judgement, table: TheirTable) -> str:
+def write_json(judgement: Judgement, table: TheirTable) -> str:
     """One object in SI: the counts, every number that differs with theirs and ours, and what explains it."""
     tolerance = judgement.tolerance
     result = {
@@ -110,12 +110,12 @@ def _is_json(value: object) -> bool:
     return not isinstance(value, float) or math.isfinite(value)
 
 
-def as_junit(judgement: Judgement, name: str) -> str:
+def write_junit(judgement: Judgement, name: str) -> str:
     """One case per quantity: a failure where any of its numbers differs, skipped where none could be judged."""
-    return document(judgement.sentence(), _cases(judgement, name))
+    return write_document(judgement.sentence(), _list_cases(judgement, name))
 
 
-def _cases(judgement: Judgement, name: str) -> Iterator[JunitCase]:
+def _list_cases(judgement: Judgement, name: str) -> Iterator[JunitCase]:
     by_quantity = {quantity: [f for f in judgement.findings if f.quantity == quantity] for quantity in
                    dict.fromkeys(f.quantity for f in judgement.findings)}  # fmt: skip
     for quantity, findings in by_quantity.items():

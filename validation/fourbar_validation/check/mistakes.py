@@ -13,10 +13,10 @@ from fourbar.quantities import FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.check.fitted import fitted
+from fourbar_validation.check.fitted import find_fitted
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import Array
-from fourbar_validation.scenes.hard_linkages import moving, with_bars
+from fourbar_validation.scenes.hard_linkages import list_moving, replace_bars
 
 SHOWN = 5
 """Explanations that are printed."""
@@ -24,22 +24,24 @@ NEARER = 10.0
 """A mistake that brings every row of a quantity this much nearer is named, though it does not explain it wholly."""
 
 
-def hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
+def list_hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
     """Every mistake that can be made on this scene, the simplest first."""
     for text, change, of in COLUMN_MISTAKES:
         yield Mistake(
             text,
-            lambda quantity, right, change=change, of=of: _where(quantity, right, change) if of(quantity) else None,  # type: ignore[misc]
+            lambda quantity, right, change=change, of=of: (
+                _choose_where(quantity, right, change) if of(quantity) else None
+            ),  # type: ignore[misc]
             whole=False,
         )
     for bar in (2, 3):
         yield Mistake(
             f"relative to bar {bar} instead of the ground",
-            lambda quantity, right, bar=bar: _relative(quantity, right, bar),  # type: ignore[misc]
+            lambda quantity, right, bar=bar: _take_relative(quantity, right, bar),  # type: ignore[misc]
             whole=False,
         )
-    yield from _inertial(scene, at)
-    for text, changed, where in _other_problems(scene, at):
+    yield from _scale_inertial(scene, at)
+    for text, changed, where in _list_other_problems(scene, at):
         try:
             wrong = solve(changed, "position" if where.omega_2 is None else "force", at=where)
         except FourBarError:  # what the mistake makes of this scene is none
@@ -47,14 +49,14 @@ def hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
         yield Mistake(text, lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None))  # type: ignore[misc]
 
 
-def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
+def _scale_inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
     """Inertial forces in another unit than the loads they are added to: forces and torque are linear in each."""
     if at.omega_2 is None:
         return
     bare = replace(scene, loads=(), effects=())
-    massless = {name: replace(bar, mass=0.0, inertia=bar.moment_of_inertia) for name, bar in moving(bare)}
-    pointlike = {name: replace(bar, inertia=0.0) for name, bar in moving(bare)}
-    of_mass, of_inertia = (solve(with_bars(bare, **bars), "force", at=at) for bars in (pointlike, massless))
+    massless = {name: replace(bar, mass=0.0, inertia=bar.moment_of_inertia) for name, bar in list_moving(bare)}
+    pointlike = {name: replace(bar, inertia=0.0) for name, bar in list_moving(bare)}
+    of_mass, of_inertia = (solve(replace_bars(bare, **bars), "force", at=at) for bars in (pointlike, massless))
 
     def scaled(by_mass: float, by_inertia: float) -> Callable[[str, Solution], Array | None]:
         def predict(quantity: str, right: Solution) -> Array | None:
@@ -76,7 +78,7 @@ def _inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
     yield Mistake("I alpha with the wrong sign", scaled(1.0, -1.0))
 
 
-def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Command]]:
+def _list_other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Command]]:
     """Evaluate the same formulas on the scene that the mistake amounts to."""
     yield "the other branch", scene, at._replace(branch=-at.branch)
     yield "theta_2 read as degrees", scene, at._replace(angle=np.radians(at.theta_2))
@@ -95,9 +97,9 @@ def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Com
             kept = tuple(other for other in scene.loads if other is not load)
             yield f"load {number} (bar {load.bar}) is missing", replace(scene, loads=kept), at
         if len(scene.loads) > 1:
-            yield "the loads are reversed", replace(scene, loads=tuple(map(_reversed, scene.loads))), at
+            yield "the loads are reversed", replace(scene, loads=tuple(map(_reverse, scene.loads))), at
         for number, load in enumerate(scene.loads, 1):
-            turned = tuple(_reversed(other) if other is load else other for other in scene.loads)
+            turned = tuple(_reverse(other) if other is load else other for other in scene.loads)
             yield f"load {number} (bar {load.bar}) is reversed", replace(scene, loads=turned), at
     if at.omega_2 is not None:
         yield "no inertial forces (statics)", scene, at._replace(speed=0.0, acceleration=0.0)
@@ -105,47 +107,47 @@ def _other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Com
             yield "alpha_2 is left out", scene, at._replace(acceleration=0.0)
         rpm = np.pi / 30.0
         yield "omega_2 in rev/min taken for rad/s", scene, at._replace(speed=at.omega_2 / rpm)
-    for name, bar in moving(scene):
+    for name, bar in list_moving(scene):
         for text, change in BAR_MISTAKES:
             if (changed := change(bar)) is not None:
-                yield f"{name}: {text}", with_bars(scene, **{name: changed}), at
+                yield f"{name}: {text}", replace_bars(scene, **{name: changed}), at
     for drive in {2, 3, 4} - {scene.drive_bar} if scene.drive is None else ():
         yield f"the torque acts on bar {drive} instead of bar {scene.drive_bar}", replace(scene, drive_bar=drive), at
 
 
-def _reversed(load: Load) -> Load:
+def _reverse(load: Load) -> Load:
     force = None if load.force is None else (-load.force[0], load.force[1])
     return replace(load, force=force, moment=-load.moment)
 
 
-def _relative(quantity: str, right: Solution, bar: int) -> Array | None:
+def _take_relative(quantity: str, right: Solution, bar: int) -> Array | None:
     if not _is_angular(quantity) or quantity.endswith(str(bar)):
         return None
     base = getattr(right, f"{quantity[:-1]}{bar}", None)
-    return None if base is None else _where(quantity, right, lambda values: values - base)
+    return None if base is None else _choose_where(quantity, right, lambda values: values - base)
 
 
-def _from_other_pin(bar: Bar) -> Bar | None:
+def _measure_from_other_pin(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
     x, y = bar.length - r * np.cos(phi), r * np.sin(phi)
     return replace(bar, centre=(float(np.hypot(x, y)), float(np.arctan2(y, x)))) if bar.mass else None
 
 
-def _turned(bar: Bar) -> Bar | None:
+def _rotate(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
     return replace(bar, centre=(r, phi + np.pi)) if bar.mass and r else None
 
 
-def _mirrored(bar: Bar) -> Bar | None:
+def _mirror(bar: Bar) -> Bar | None:
     r, phi = bar.mass_centre
     return replace(bar, centre=(r, -phi)) if bar.mass and r and np.sin(phi) else None
 
 
 BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
-    ("mass centre measured from the wrong pin", _from_other_pin),
+    ("mass centre measured from the wrong pin", _measure_from_other_pin),
     ("mass centre taken at mid-bar", lambda bar: replace(bar, centre=(bar.length / 2.0, 0.0)) if bar.mass else None),
-    ("mass centre turned by 180 deg about the bar's first pin", _turned),
-    ("mass centre on the other side of the bar's line", _mirrored),
+    ("mass centre turned by 180 deg about the bar's first pin", _rotate),
+    ("mass centre on the other side of the bar's line", _mirror),
     (
         "inertia about the pin used as the inertia about G",
         lambda bar: (
@@ -160,7 +162,7 @@ def _is_angular(quantity: str) -> bool:
     return quantity.startswith(("theta", "omega", "alpha"))
 
 
-def _where(quantity: str, right: Solution, change: Callable[[Array], Array]) -> Array | None:
+def _choose_where(quantity: str, right: Solution, change: Callable[[Array], Array]) -> Array | None:
     values = getattr(right, quantity, None)
     return None if values is None else change(values)
 
@@ -198,7 +200,7 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
     """
     result: list[Explanation] = []
     table = judge.table
-    for mistake in chain(hypotheses(judge.scene, judge.at), fitted(judge, differing)):
+    for mistake in chain(list_hypotheses(judge.scene, judge.at), find_fitted(judge, differing)):
         explained, nearer, broken = [], [], False
         for key in table.values:
             predicted = mistake.prediction(key, judge.right)

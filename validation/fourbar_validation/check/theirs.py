@@ -84,20 +84,20 @@ class TheirTable:
         return np.asarray(there.any(axis=1) if there.ndim == 2 else there)
 
 
-def quantity_of(key: str) -> str:
+def name_quantity(key: str) -> str:
     """Name the quantity of a key of `TheirTable.values`."""
     return key.strip("|")
 
 
 def read_table(path: Path) -> TheirTable:
     """Read a CSV table; InputError names the column or line that cannot be read."""
-    (_, headings), *rows = _lines(path)
+    (_, headings), *rows = _read_lines(path)
     unit_line = [""] * len(headings)
     if rows and _is_unit_line(rows[0][1]):
         unit_line = rows.pop(0)[1]
     if not rows:
         raise InputError("table", path.name, "needs a header and at least one row", str(path))
-    columns, left_out = _columns(path, headings, unit_line)
+    columns, left_out = _read_columns(path, headings, unit_line)
     names = [name for name, _ in columns.values()]
     if len(set(names)) != len(names):
         raise InputError("header", headings, "names a column twice", str(path))
@@ -109,20 +109,20 @@ def read_table(path: Path) -> TheirTable:
         if len(cells) < len(headings) or any(cell.strip() for cell in cells[len(headings) :]):
             raise InputError(f"line {line}", cells, f"needs {len(headings)} cells", str(path))
         for index, (name, unit) in columns.items():
-            value, half = _number(path, line, cells[index])
+            value, half = _read_number(path, line, cells[index])
             numbers[name][row], halves[name][row] = value * unit.factor, half * unit.factor
         if math.isnan(numbers["theta_2"][row]):
             raise InputError(f"line {line}", cells, "needs a theta_2", str(path))
     units = {name: unit for name, unit in columns.values()}
     left_out |= {headings[index]: BLANK for index, (name, _) in columns.items() if np.isnan(numbers[name]).all()}
-    lines, rounded = [line for line, _ in rows], _rounded(halves["theta_2"], units["theta_2"])
+    lines, rounded = [line for line, _ in rows], _find_rounding(halves["theta_2"], units["theta_2"])
     table = TheirTable(numbers["theta_2"], {}, {}, {}, lines, rounded, left_out)
     for name in names:
         if name != "theta_2" and not np.isnan(numbers[name]).all():
             _put(table, name, units[name], numbers[name], halves[name])
     if not table.values:
         known = "torque, F12_x and F12_y, or F12 (its magnitude)"
-        raise InputError("header", headings, f"needs a result, such as {known}; known are {_known()}", str(path))
+        raise InputError("header", headings, f"needs a result, such as {known}; known are {_find_known()}", str(path))
     return table
 
 
@@ -139,7 +139,7 @@ def _put(table: TheirTable, name: str, unit: Unit, numbers: Array, halves: Array
     table.units.setdefault(vector, unit)
 
 
-def _rounded(halves: Array, unit: Unit) -> Array:
+def _find_rounding(halves: Array, unit: Unit) -> Array:
     """Half a unit of each theta_2; of a cell whose zeros were left off, that of the column."""
     least = halves.min()
     if least > 0.5 * unit.factor * 10.0**-DECIMALS * (1.0 + EPS):
@@ -147,7 +147,7 @@ def _rounded(halves: Array, unit: Unit) -> Array:
     return np.where(halves <= 0.5 * unit.factor * 10.0 ** (1 - DECIMALS) * (1.0 + EPS), halves, least)
 
 
-def _lines(path: Path) -> list[tuple[int, list[str]]]:
+def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
     """Read the lines that hold anything, with their numbers; at least a header."""
     text = read_text(path, "table", LARGEST_FILE)
     header = next((line for line in text.splitlines() if line.strip()), "")
@@ -169,7 +169,7 @@ def _is_unit_line(cells: list[str]) -> bool:
     return not any(re.search("[0-9]", re.sub(r"[\^*][0-9]|[²³]", "", cell)) for cell in cells)
 
 
-def _columns(
+def _read_columns(
     path: Path, headings: list[str], unit_line: list[str]
 ) -> tuple[dict[int, tuple[str, Unit]], dict[str, str]]:
     """By its place in a row, each column's name and unit; and the headings that are left out, each with the reason."""
@@ -186,26 +186,26 @@ def _columns(
             continue
         below = unit_line[index].strip(" []()") if index < len(unit_line) else ""
         text = (result["square"] or result["round"] or below).strip()
-        columns[index] = f"|{name}|" if name in VECTORS else name, _unit(path, heading, quantity, text)
+        columns[index] = f"|{name}|" if name in VECTORS else name, _read_unit(path, heading, quantity, text)
     return columns, left_out
 
 
-def _unit(path: Path, heading: str, quantity: str, text: str) -> Unit:
+def _read_unit(path: Path, heading: str, quantity: str, text: str) -> Unit:
     if not text or text == UNITS[quantity]:
         return Unit(UNITS[quantity], 1.0)
-    from fourbar.quantities.units import factor_to
+    from fourbar.quantities.units import find_factor
 
     try:
-        return Unit(text, factor_to(UNITS[quantity], text))
+        return Unit(text, find_factor(UNITS[quantity], text))
     except InputError as error:
         raise InputError("header", heading, f"{text}: {error.allowed}", str(path)) from None
 
 
-def _known() -> str:
+def _find_known() -> str:
     return ", ".join(f"{q}_x, {q}_y" if q in VECTORS else q for q in UNITS if q not in NOT_JUDGED)
 
 
-def _number(path: Path, line: int, cell: str) -> tuple[float, float]:
+def _read_number(path: Path, line: int, cell: str) -> tuple[float, float]:
     """Read the number in a cell and half a unit of its last printed digit; NaN for a blank."""
     text = cell.strip().replace("\N{MINUS SIGN}", "-")
     if not text:

@@ -56,7 +56,7 @@ class Engine(Protocol):
         """Its answer; it is given the description and the command, never a result of the formulas."""
 
 
-def not_taken(engine: Engine, at: Command) -> str:
+def explain_refusal(engine: Engine, at: Command) -> str:
     """Say why an engine cannot be asked: it does not declare that it takes what is commanded; empty where it does."""
     takes = getattr(engine, "commands", ("theta_2",))
     if at.commanded in takes:

@@ -13,8 +13,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from fourbar.writing import naming
-from fourbar_validation.compare.rows import COLUMNS, MADE_OF, Row, from_text, plain, to_csv
+from fourbar.writing import name_file
+from fourbar_validation.compare.rows import COLUMNS, MADE_OF, Row, make_plain, read_cell_text, write_rows
 
 GROUP_ROWS = 100_000
 """Rows of a row group of the Parquet file: each costs some kilobytes of footer, whatever it holds."""
@@ -43,11 +43,11 @@ class Columns:
         self._schema = pa.schema([(field.name, kinds[field.type]) for field in fields(Row)])  # type: ignore[index]
         self._text, self._columns = (self.out / f".results.{kind}.part" for kind in ("csv", "parquet"))
         with self._files:
-            self._files.enter_context(naming(self.out / "results.csv"))  # what fails on closing is named too
+            self._files.enter_context(name_file(self.out / "results.csv"))  # what fails on closing is named too
             self._csv = self._files.enter_context(self._text.open("w", encoding="utf-8", newline=""))
-            self._files.enter_context(naming(self.out / "results.parquet"))
+            self._files.enter_context(name_file(self.out / "results.parquet"))
             self._parquet = self._files.enter_context(pq.ParquetWriter(self._columns, self._schema))
-            self._csv.write(to_csv([]))
+            self._csv.write(write_rows([]))
             self._files = self._files.pop_all()
         return self
 
@@ -59,16 +59,16 @@ class Columns:
             self._line += 1
         self._waiting += rows
         if self._line <= CSV_ROWS:
-            with naming(self.out / "results.csv"):
-                self._csv.write(to_csv(rows).partition("\n")[2])
+            with name_file(self.out / "results.csv"):
+                self._csv.write(write_rows(rows).partition("\n")[2])
         if len(self._waiting) >= GROUP_ROWS:
             self._write_group()
 
     def _write_group(self) -> None:
         import pyarrow as pa
 
-        by_column = {name: [or_null(getattr(row, name)) for row in self._waiting] for name in COLUMNS}
-        with naming(self.out / "results.parquet"):
+        by_column = {name: [null_nan(getattr(row, name)) for row in self._waiting] for name in COLUMNS}
+        with name_file(self.out / "results.parquet"):
             self._parquet.write_table(pa.table(by_column, schema=self._schema))
         self._waiting.clear()
 
@@ -87,47 +87,47 @@ class Columns:
             (self.out / "results.csv").unlink(missing_ok=True)
 
 
-def or_null(value: object) -> object:
+def null_nan(value: object) -> object:
     """Give a missing number as null: no greatest error is NaN by it, and every reader takes it for none."""
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def read_columns(path: Path) -> Iterator[Row]:
     """Read the rows of a results.parquet or results.csv, some thousands at a time; words that recur are kept once."""
-    for cells in _batches(path, list(MADE_OF)):
+    for cells in _read_batches(path, list(MADE_OF)):
         words: dict[str, str] = {}
         columns = [
-            [math.nan if cell is None else cell for cell in column] if kind is float else _words(column, words)
+            [math.nan if cell is None else cell for cell in column] if kind is float else _read_words(column, words)
             for column, kind in zip(cells, MADE_OF.values(), strict=True)
         ]
         yield from map(Row, *columns)
 
 
-def column_of(path: Path, column: str) -> Iterator[str]:
+def read_column(path: Path, column: str) -> Iterator[str]:
     """Read the words in a column, each once in every batch."""
-    for (cells,) in _batches(path, [column]):
-        yield from dict.fromkeys(_words(cells, {}))
+    for (cells,) in _read_batches(path, [column]):
+        yield from dict.fromkeys(_read_words(cells, {}))
 
 
-def rows_in(path: Path) -> int:
+def count_rows(path: Path) -> int:
     """How many rows a table of scenes has."""
-    return sum(len(cells) for (cells,) in _batches(path, ["scene"]))
+    return sum(len(cells) for (cells,) in _read_batches(path, ["scene"]))
 
 
-def _batches(path: Path, columns: list[str]) -> Iterator[list[list[Any]]]:
+def _read_batches(path: Path, columns: list[str]) -> Iterator[list[list[Any]]]:
     with ExitStack() as files:
-        batches = _of_parquet if path.suffix == ".parquet" else _of_text
+        batches = _read_parquet if path.suffix == ".parquet" else _read_text
         for batch in batches(path, columns, files):
             yield [batch.column(name).to_pylist() for name in columns]
 
 
-def _of_parquet(path: Path, columns: list[str], files: ExitStack) -> Any:
+def _read_parquet(path: Path, columns: list[str], files: ExitStack) -> Any:
     import pyarrow.parquet as pq
 
     return files.enter_context(pq.ParquetFile(path)).iter_batches(BATCH_ROWS, columns=columns)
 
 
-def _of_text(path: Path, columns: list[str], files: ExitStack) -> Any:
+def _read_text(path: Path, columns: list[str], files: ExitStack) -> Any:
     import pyarrow as pa
     from pyarrow import csv
 
@@ -138,8 +138,8 @@ def _of_text(path: Path, columns: list[str], files: ExitStack) -> Any:
     )
 
 
-def _words(cells: list[str], known: dict[str, str]) -> list[str]:
+def _read_words(cells: list[str], known: dict[str, str]) -> list[str]:
     for cell in dict.fromkeys(cells):
         if cell not in known:
-            known[cell] = sys.intern(plain(from_text(cell)))
+            known[cell] = sys.intern(make_plain(read_cell_text(cell)))
     return [known[cell] for cell in cells]

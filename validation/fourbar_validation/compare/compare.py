@@ -25,9 +25,9 @@ from fourbar.quantities import (
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.reversals import reversing
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, plain
-from fourbar_validation.compare.scales import reference_of, smallest_scale, strictest_condition
+from fourbar_validation.compare.reversals import mark_reversing
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, Row, make_plain
+from fourbar_validation.compare.scales import make_reference, take_smallest_scale, take_strictest_condition
 from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -36,15 +36,15 @@ from fourbar_validation.compare.tolerance import (
     Array,
     ErrorBound,
     Mask,
-    closing_gap,
-    half_turns,
-    in_own_unit,
+    count_half_turns,
+    divide,
+    find_error,
+    find_gap,
+    find_used,
+    find_worst,
     magnitude,
-    relative,
-    relative_error,
-    touching,
-    used,
-    worst,
+    mark_touching,
+    replace_zero_size,
 )
 
 Predicted = Callable[[str, Mask], Array]
@@ -112,7 +112,7 @@ class Comparison:
         if self.scene.drive is not None:
             answered = answer.quantities
             held = (*held, *(name for name, other in OF_THE_LINE.items() if other in held or name in answered))
-        self.own = reference_of(self.scene, answer)
+        self.own = make_reference(self.scene, answer)
         if self.reference is None:
             self.reference, self.scales = self.own, {}
         rows = [self.assembled()]
@@ -124,7 +124,9 @@ class Comparison:
         """Make a row of this answer."""
         error, allowed, theta_2, condition = (float(numbers.get(key, math.nan)) for key in NUMBERS)
         engine, setting = self.answer.engine, self.answer.setting or "-"
-        return Row(self.name, engine, setting, quantity, error, allowed, verdict, plain(reason), theta_2, condition)
+        return Row(
+            self.name, engine, setting, quantity, error, allowed, verdict, make_plain(reason), theta_2, condition
+        )
 
     def closure(self) -> Row:
         """Check that the own angles of an engine close the loop."""
@@ -132,8 +134,8 @@ class Comparison:
         assert answer.at is not None and answer.assembled is not None
         theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else answer.quantities["theta_2"]
         theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
-        error = np.where(answer.assembled, closing_gap(linkage, theta_2, theta_3, theta_4), 0.0)
-        index, condition = worst(error), 1.0 / half_turns(linkage.ground_angle, theta_2)
+        error = np.where(answer.assembled, find_gap(linkage, theta_2, theta_3, theta_4), 0.0)
+        index, condition = find_worst(error), 1.0 / count_half_turns(linkage.ground_angle, theta_2)
         allowed = (IDENTITY if answer.setting == "exact" else self.tolerance).factor / condition
         verdict = AGREES if error[index] <= allowed else FAILS
         verdict, reason = (verdict, f"identity: {CLOSURE}") if answer.assembled.any() else (UNDECIDED, NOWHERE)
@@ -144,7 +146,7 @@ class Comparison:
         """Compare where both close the loop."""
         theirs, ours, at = self.answer.assembled, self.formulas, self.answer.at
         assert theirs is not None and at is not None
-        differ = (theirs != ours.assembled) & ~touching(self.scene.linkage, at.angle, at.bar)
+        differ = (theirs != ours.assembled) & ~mark_touching(self.scene.linkage, at.angle, at.bar)
         count = np.count_nonzero(differ)
         return self.row(
             "assembled",
@@ -170,14 +172,14 @@ class Comparison:
             return
         assert self.answer.assembled is not None
         both = formulas.assembled & self.answer.assembled
-        judged = both & _stated(quantity, formulas, ours)
+        judged = both & _mark_stated(quantity, formulas, ours)
         self.numbers += int(np.count_nonzero(both))
         withheld = _count(formulas.status_code[both & ~judged])
         if withheld and not judged.any():
             yield self.row(quantity, REFUSES, f"the formulas state no value: {withheld}")
             return
-        where = judged & _answerable(quantity, scene, formulas, tolerance)
-        jumping = where & _jumping(quantity, scene, formulas, tolerance)
+        where = judged & _mark_answerable(quantity, scene, formulas, tolerance)
+        jumping = where & _mark_jumping(quantity, scene, formulas, tolerance)
         where &= ~jumping
         note = f"; not judged: {withheld}" if withheld else ""
         if jumping.any():
@@ -187,37 +189,37 @@ class Comparison:
         if not where.any():
             yield self.row(quantity, UNDECIDED, "no position at which both may be held to it" + note)
             return
-        result, error, condition = self._measured(quantity, ours, theirs, where)
+        result, error, condition = self._measure(quantity, ours, theirs, where)
         self.decided += result.decided
         at = {"theta_2": formulas.theta_2[result.worst], "condition": condition[result.worst]}
         yield self.row(
             quantity, result.verdict, result.reason + note, error=error[result.worst], allowed=result.allowed, **at
         )
 
-    def _measured(self, quantity: str, ours: Array, theirs: Array, where: Mask) -> "tuple[_Finding, Array, Array]":
+    def _measure(self, quantity: str, ours: Array, theirs: Array, where: Mask) -> "tuple[_Finding, Array, Array]":
         """Compare at the positions `where`: the result, the errors and the conditions, (n,)."""
         if quantity not in self.scales:
             self.scales[quantity] = (
-                smallest_scale(quantity, self.scene, self.formulas, self.reference),
-                strictest_condition(quantity, self.scene.linkage, self.formulas, self.reference),
+                take_smallest_scale(quantity, self.scene, self.formulas, self.reference),
+                take_strictest_condition(quantity, self.scene.linkage, self.formulas, self.reference),
             )
         size, condition = self.scales[quantity]
         full, predicted, expected = self.tolerance.allowed(condition), self.predicted, None
         if predicted is not None:
-            full, size = np.where(size == 0.0, 0.0, full), in_own_unit(size)
-        error = relative_error(quantity, ours, theirs, size)
+            full, size = np.where(size == 0.0, 0.0, full), replace_zero_size(size)
+        error = find_error(quantity, ours, theirs, size)
         beyond, again, note = where & (error > full), np.full_like(error, np.nan), ""
         if self.nearby is not None and beyond.any():
             if self.again is None:
                 self.again = self.nearby(self.formulas.assembled)
-            again = relative_error(quantity, ours, self.again[quantity], size)
+            again = find_error(quantity, ours, self.again[quantity], size)
             error = np.where(beyond, np.fmin(error, again), error)
             mended = np.count_nonzero(beyond & (again <= full))
             note = f"; {mended} positions within the rounding of theta_2" if mended else ""
         if predicted is not None:
 
             def expected(where: Mask) -> Array:
-                of_data = relative(predicted(quantity, where), size)
+                of_data = divide(predicted(quantity, where), size)
                 return np.where(np.isfinite(again), np.fmin(of_data, full), of_data)
 
         result = _judge_errors(error, condition, where, full, self.tolerance, expected)
@@ -265,13 +267,13 @@ def _judge_errors(
         index = int(np.flatnonzero(where)[0])
         return _Finding(index, UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}", full[index], 0)
     if not beyond.any():
-        index = int(np.argmax(np.where(decidable, used(error, full), -1.0)))
+        index = int(np.argmax(np.where(decidable, find_used(error, full), -1.0)))
         return _Finding(index, AGREES, tolerance.name + note, full[index], int(np.count_nonzero(decidable)))
     expected = np.zeros_like(error)
     if predicted is not None:
         expected = np.nan_to_num(predicted(beyond), nan=0.0, posinf=np.inf)
     allowed = np.maximum(full, TIMES_PREDICTED * expected)
-    ratio = used(error, allowed)
+    ratio = find_used(error, allowed)
     # first order says that no digit is left, no more
     lost = beyond & np.isfinite(error) & np.where(full > 0.0, expected >= 1.0, expected == np.inf)
     ratio[lost] = np.minimum(ratio[lost], 1.0)
@@ -289,7 +291,7 @@ def _judge_errors(
     return _Finding(index, verdict, reason + note, allowed[index], int(np.count_nonzero(decidable & ~lost)))
 
 
-def _stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
+def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
     """Mark where the formulas have one value: beyond the range of doubles the motion, up to the stage that met it."""
     if quantity in OF_FORCES:
         # at rest a jam is of the motion that would begin
@@ -307,24 +309,24 @@ def _count(codes: NDArray[np.uint8]) -> str:
     return ", ".join(f"{count} {name}" for name, count in zip(STATUS_NAMES, counts, strict=True) if count)
 
 
-def _jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
+def _mark_jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
     """Mark where dry friction reverses and a force may have either value; the motion is prescribed and has one."""
     near_jamming = quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects)
     if quantity not in OF_FORCES and not near_jamming:
         return np.zeros(len(formulas), dtype=bool)
-    return reversing(scene, formulas, tolerance.factor, in_time=tolerance.in_time)
+    return mark_reversing(scene, formulas, tolerance.factor, in_time=tolerance.in_time)
 
 
-def _answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
+def _mark_answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
     """Mark where a quantity may be demanded of an engine of this class."""
     if quantity in FORCES and scene.drive_bar != 2 and tolerance.in_time:
         speed = {3: formulas.omega_3, 4: formulas.omega_4}.get(scene.drive_bar, formulas.stroke_speed)
         assert speed is not None
-        return turning(speed)
+        return mark_turning(speed)
     return np.ones(len(formulas), dtype=bool)
 
 
-def turning(speed: Array) -> Mask:
+def mark_turning(speed: Array) -> Mask:
     """Mark where a driven bar turns fast enough that its torque and the pin forces are no pole's, (n,)."""
     fast = np.abs(np.nan_to_num(speed))
     return np.asarray(fast > SLOW_DRIVE * fast.max())

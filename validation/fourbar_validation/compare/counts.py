@@ -80,26 +80,26 @@ class Counts:
         """Give the verdict in one sentence: "all hold" is stated only of what was compared."""
         total, failed = self.compared, self[FAILS]
         if failed:
-            verdict = f"FAILS: {failed} of {total} comparisons{self._where()} do not hold"
+            verdict = f"FAILS: {failed} of {total} comparisons{self._write_where()} do not hold"
         elif self.nothing:
-            verdict = f"Nothing was compared{self._where()}"
+            verdict = f"Nothing was compared{self._write_where()}"
         else:
-            verdict = f"All {total} comparisons{self._where()} hold"
+            verdict = f"All {total} comparisons{self._write_where()} hold"
         if self.nothing:
             held = [f"{total} of the formulas' own identities hold"] if total else []
         else:
-            held = self._worded(COMPARED)
-        apart = self._worded((UNDECIDED, REFUSES))
+            held = self._write_worded(COMPARED)
+        apart = self._write_worded((UNDECIDED, REFUSES))
         if apart and not self.nothing:
             apart[0] = "not compared: " + apart[0]
         parts = "; ".join(", ".join(each) for each in (held, apart) if each)
         return f"{verdict}: {parts}" if parts else verdict
 
-    def _where(self) -> str:
+    def _write_where(self) -> str:
         if not self.scenes:
             return ""
         of = "" if self.nothing or self.scenes_compared == self.scenes else f"{self.scenes_compared} of "
         return f" on {of}{self.scenes} scene{'s' if self.scenes != 1 else ''}"
 
-    def _worded(self, verdicts: Iterable[str]) -> list[str]:
+    def _write_worded(self, verdicts: Iterable[str]) -> list[str]:
         return [f"{self[each]} {WORDING[each][self[each] != 1]}" for each in verdicts if self[each]]

@@ -11,19 +11,19 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, FourBar
 from fourbar.solution import Solution
-from fourbar_validation.compare.reversals import slip_at
+from fourbar_validation.compare.reversals import compute_slip
 from fourbar_validation.compare.tolerance import Array, magnitude
 
 if TYPE_CHECKING:
     from fourbar.effects import Effect
 
 
-def _shortest(linkage: FourBar) -> float:
+def _find_shortest(linkage: FourBar) -> float:
     """Find the least length of a moving bar, m."""
     return min(linkage.bar(number).length for number in MOVING_BARS)
 
 
-def _levers(linkage: FourBar, places: Iterable[tuple[int, float]]) -> float:
+def _multiply_levers(linkage: FourBar, places: Iterable[tuple[int, float]]) -> float:
     """Of forces at distances along bars: with their couples, as a multiple of the force."""
     return sum(1.0 + abs(distance) / linkage.bar(bar).length for bar, distance in places if bar != 1)
 
@@ -34,19 +34,20 @@ def _pin_force(formulas: Solution, pin: str) -> Array:
 
 SIZE_OF: dict[str, Callable[[Any, FourBar, Solution], Array | float]] = {
     "gravity": lambda gravity, linkage, _: sum(
-        bar.mass * abs(gravity.magnitude) * _levers(linkage, [(number, bar.mass_centre[0])])
+        bar.mass * abs(gravity.magnitude) * _multiply_levers(linkage, [(number, bar.mass_centre[0])])
         for number, bar in ((number, linkage.bar(number)) for number in MOVING_BARS)
     ),
     "viscous": lambda viscous, linkage, formulas: sum(
-        k * np.abs(slip_at(formulas, pin)) / _shortest(linkage) for pin, k in viscous.coefficients
+        k * np.abs(compute_slip(formulas, pin)) / _find_shortest(linkage) for pin, k in viscous.coefficients
     ),
-    "friction": lambda friction, linkage, _: sum(torque for _, torque in friction.torques) / _shortest(linkage),
+    "friction": lambda friction, linkage, _: sum(torque for _, torque in friction.torques) / _find_shortest(linkage),
     "pin_friction": lambda friction, linkage, formulas: sum(
-        mu * r * _pin_force(formulas, pin) / _shortest(linkage) for pin, mu, r in friction.pins
+        mu * r * _pin_force(formulas, pin) / _find_shortest(linkage) for pin, mu, r in friction.pins
     ),
-    "torsion": lambda torsion, linkage, _: torsion.greatest_couple / _shortest(linkage),
+    "torsion": lambda torsion, linkage, _: torsion.greatest_couple / _find_shortest(linkage),
     "springs": lambda springs, linkage, _: sum(
-        spring.greatest_tension(linkage) * _levers(linkage, [(p.bar, p.distance) for p in (spring.start, spring.end)])
+        spring.greatest_tension(linkage)
+        * _multiply_levers(linkage, [(p.bar, p.distance) for p in (spring.start, spring.end)])
         for spring in springs.springs
     ),
     "flywheel": lambda flywheel, linkage, formulas: (
@@ -57,7 +58,7 @@ SIZE_OF: dict[str, Callable[[Any, FourBar, Solution], Array | float]] = {
 """By the key of an effect."""
 
 
-def size(effect: "Effect", linkage: FourBar, formulas: Solution) -> Array | float:
+def find_size(effect: "Effect", linkage: FourBar, formulas: Solution) -> Array | float:
     """Its forces, N, (n,) or one for all; FourBarError where it has no row: nothing is judged by another's scale."""
     if effect.key not in SIZE_OF:
         raise FourBarError(f"the effect {effect.key!r} has no size to judge forces by")

@@ -74,7 +74,7 @@ class DriveLine(NamedTuple):
         return np.abs(self.speed(omega)) / self.most
 
 
-def line_of(linkage: FourBar, drive: "LinearDrive", theta: dict[int, Array]) -> DriveLine:
+def place_line(linkage: FourBar, drive: "LinearDrive", theta: dict[int, Array]) -> DriveLine:
     """Place the ends at angles of bars 2, 3, 4, each (n,)."""
     directions = {bar: np.exp(1j * angle) for bar, angle in theta.items()}
     directions[1] = np.full(len(theta[2]), np.exp(1j * linkage.ground_angle))

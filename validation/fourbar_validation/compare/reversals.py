@@ -44,7 +44,7 @@ class Reversal:
         return f"dry friction reverses at {where}: {most} jumps from ({ends[0]}) to ({ends[1]}) N"
 
 
-def reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
+def find_reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
     """Every reversal between two positions of a sweep, in their order.
 
     A position at which the pin is at rest lies within its reversal and ends no stretch.
@@ -54,20 +54,20 @@ def reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
         return []
     result = []
     for pin in dict.fromkeys(pins):
-        slip = slip_at(solution, pin)
-        at_rest = _resting(solution, pin, EPS * K)
+        slip = compute_slip(solution, pin)
+        at_rest = _mark_resting(solution, pin, EPS * K)
         last = None
         for i in range(len(solution)):
             if solution.status_code[i] != OK:
                 last = None
             elif not at_rest[i]:
                 if last is not None and slip[last] * slip[i] < 0.0 and at.branch[last] == at.branch[i]:
-                    result.append(_between(scene, at, pin, last, i, float(slip[last])))
+                    result.append(_bisect(scene, at, pin, last, i, float(slip[last])))
                 last = i
     return sorted(result, key=lambda reversal: reversal.position)
 
 
-def reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bool = False) -> NDArray[np.bool_]:
+def mark_reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bool = False) -> NDArray[np.bool_]:
     """Where a dry pin of a moving linkage slips by no more than this part of the two speeds over sin^2 mu, (n,).
 
     There the sense of friction is anything's guess, and the forces on both sides of the jump are right. An engine
@@ -76,21 +76,21 @@ def reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bool = 
     """
     where = np.zeros(len(solution), dtype=bool)
     for pin in {pin for effect in scene.effects for pin in effect.dry_pins}:
-        where |= _resting(solution, pin, slip)
+        where |= _mark_resting(solution, pin, slip)
         if in_time:
-            speeds = np.max([np.abs(_speeds(solution)[bar]) for bar in MOVING_BARS], axis=0)
+            speeds = np.max([np.abs(_compute_speeds(solution)[bar]) for bar in MOVING_BARS], axis=0)
             speeds = np.nan_to_num(speeds)
             where |= speeds <= slip * speeds.max()
     return where
 
 
-def _resting(solution: Solution, pin: str, slip: float) -> NDArray[np.bool_]:
-    one, other = (_speeds(solution)[bar] for bar in PINS[pin])
-    speeds = np.abs(one) + np.abs(other) + np.abs(_speeds(solution)[2])
+def _mark_resting(solution: Solution, pin: str, slip: float) -> NDArray[np.bool_]:
+    one, other = (_compute_speeds(solution)[bar] for bar in PINS[pin])
+    speeds = np.abs(one) + np.abs(other) + np.abs(_compute_speeds(solution)[2])
     return np.asarray((np.abs(other - one) * solution.condition**2 <= slip * speeds) & (speeds > 0.0))
 
 
-def broken(
+def break_curve(
     theta_2: Array, values: Array, jumps: list[Reversal], value: Callable[[Solution], Array]
 ) -> tuple[Array, Array]:
     """Give a curve, (n,), both ends of each jump and NaN between them: no line is drawn across.
@@ -108,17 +108,17 @@ def broken(
     return theta_2, values
 
 
-def slip_at(solution: Solution, pin: str) -> Array:
+def compute_slip(solution: Solution, pin: str) -> Array:
     """omega_j - omega_i of the bars that meet at a pin, rad/s, (n,)."""
-    one, other = (_speeds(solution)[bar] for bar in PINS[pin])
+    one, other = (_compute_speeds(solution)[bar] for bar in PINS[pin])
     return np.asarray(other - one)
 
 
-def _speeds(solution: Solution) -> dict[int, Any]:
+def _compute_speeds(solution: Solution) -> dict[int, Any]:
     return {1: 0.0, 2: solution.omega_2, 3: solution.omega_3, 4: solution.omega_4}
 
 
-def _between(scene: Scene, at: Command, pin: str, i: int, j: int, slip: float) -> Reversal:
+def _bisect(scene: Scene, at: Command, pin: str, i: int, j: int, slip: float) -> Reversal:
     """Halve the interval between positions i and j; there, friction in the sense of either side."""
 
     def look(theta_2: float, side: int, stage: str) -> Solution:
@@ -130,7 +130,7 @@ def _between(scene: Scene, at: Command, pin: str, i: int, j: int, slip: float) -
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
-        if float(slip_at(look(middle, 0, "velocity"), pin)[0]) * slip > 0.0:
+        if float(compute_slip(look(middle, 0, "velocity"), pin)[0]) * slip > 0.0:
             low = middle
         else:
             high = middle

@@ -59,7 +59,7 @@ class Row:
     def unmeasured(cls, scene: str, engine: str, setting: str, quantity: str, verdict: str, reason: str) -> "Row":
         """Make a verdict without numbers: a refusal, a breakdown, an answer that is missing."""
         nan = math.nan
-        return cls(scene, engine, setting or "-", quantity, nan, nan, verdict, plain(reason), nan, nan)
+        return cls(scene, engine, setting or "-", quantity, nan, nan, verdict, make_plain(reason), nan, nan)
 
     @property
     def compared(self) -> bool:
@@ -72,7 +72,7 @@ class Row:
         return self.verdict == FAILS
 
 
-def breakdown(scene: str, engine: str, error: BaseException, part: str = "") -> Row:
+def make_breakdown(scene: str, engine: str, error: BaseException, part: str = "") -> Row:
     """Make the row of an engine that raised, took its process with it, or never came back; `part`: in what."""
     if isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
@@ -81,26 +81,26 @@ def breakdown(scene: str, engine: str, error: BaseException, part: str = "") -> 
     elif type(error).__name__ == "KilledWorker":  # of Dask
         reason = "the engine crashed its process, or hung and was stopped"
     else:
-        reason = str(error) if isinstance(error, WitnessError) else in_words(error)
+        reason = str(error) if isinstance(error, WitnessError) else say_error(error)
     return Row.unmeasured(scene, engine, part, "all", FAILS, reason)
 
 
-def in_words(error: BaseException) -> str:
+def say_error(error: BaseException) -> str:
     """Kind and message of an error, whatever its message raises."""
     try:
         message = str(error)
     except BaseException as another:
         message = f"its message raises {type(another).__name__}"
-    return one_line(f"{type(error).__name__}: {message}")
+    return write_one_line(f"{type(error).__name__}: {message}")
 
 
-def one_line(text: str) -> str:
+def write_one_line(text: str) -> str:
     """Somebody's text in one line that prints, its middle left out where it is long."""
-    line = plain(" ".join(text.split()))
+    line = make_plain(" ".join(text.split()))
     return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
 
 
-def plain(text: str) -> str:
+def make_plain(text: str) -> str:
     """Somebody's text with every character that does not print, but for the ends of lines, written as its escape.
 
     Characters that would steer a terminal or a reader are shown, not sent.
@@ -112,39 +112,39 @@ FORMULA = ("=", "+", "-", "@")
 """What a spreadsheet takes for the beginning of a formula, and calculates."""
 
 
-def as_text(cell: str) -> str:
+def write_cell_text(cell: str) -> str:
     """Somebody's text as a cell that stays text in a spreadsheet: with an apostrophe before what begins a formula."""
     return f"'{cell}" if cell.startswith(FORMULA) and len(cell) > 1 else cell
 
 
-def from_text(cell: str) -> str:
-    """Give back what `as_text` was given."""
+def read_cell_text(cell: str) -> str:
+    """Give back what `write_cell_text` was given."""
     return cell[1:] if cell.startswith(tuple("'" + first for first in FORMULA)) else cell
 
 
 COLUMNS = tuple(column.name for column in fields(Row))
 
 
-def sorted_rows(rows: Iterable[Row]) -> list[Row]:
+def sort_rows(rows: Iterable[Row]) -> list[Row]:
     """Sort rows by scene, engine, setting and quantity."""
     return sorted(rows, key=lambda row: (row.scene, row.engine, row.setting, row.quantity))
 
 
-def to_csv(rows: Iterable[Row]) -> str:
+def write_rows(rows: Iterable[Row]) -> str:
     """Write the table as text, sorted, floats as repr, a missing number left empty."""
-    return csv_text(COLUMNS, ([_cell(getattr(row, name)) for name in COLUMNS] for row in sorted_rows(rows)))
+    return write_csv(COLUMNS, ([_write_cell(getattr(row, name)) for name in COLUMNS] for row in sort_rows(rows)))
 
 
-def csv_text(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+def write_csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     """Write a table as CSV, floats as repr, nothing for None, no text that a spreadsheet would calculate."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([columns] if columns else [])
-    writer.writerows([as_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
+    writer.writerows([write_cell_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
     return text.getvalue()
 
 
-def _cell(value: object) -> object:
+def _write_cell(value: object) -> object:
     if isinstance(value, bool):
         return "true" if value else "false"
     return None if isinstance(value, float) and math.isnan(value) else value
@@ -156,4 +156,4 @@ MADE_OF = {column.name: column.type for column in fields(Row) if column.init}
 
 def write_results(rows: Iterable[Row], path: Path) -> None:
     """Write the table, all of it or nothing."""
-    write_text(path, to_csv(rows))
+    write_text(path, write_rows(rows))

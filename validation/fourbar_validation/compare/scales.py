@@ -19,9 +19,9 @@ from fourbar.quantities import LINE, OK, UNITS
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.effects import size as size_of
-from fourbar_validation.compare.line import line_of
-from fourbar_validation.compare.tolerance import WELL_CONDITIONED, Array, K, condition_of, magnitude, of_length
+from fourbar_validation.compare.effects import find_size as size_of
+from fourbar_validation.compare.line import place_line
+from fourbar_validation.compare.tolerance import WELL_CONDITIONED, Array, K, find_condition, magnitude, sum_lengths
 
 VANISHING = 1.0 / K
 """A quantity below this part of the sum of its terms has lost more to cancellation than K covers."""
@@ -32,7 +32,7 @@ def scale_of(quantity: str, scene: Scene, formulas: Solution, values: Array) -> 
     if UNITS[quantity] in ("rad", "1"):
         return np.ones(len(formulas))
     size = magnitude(values)
-    terms = term_sizes(quantity, scene, formulas)
+    terms = sum_terms(quantity, scene, formulas)
     well = (formulas.condition >= WELL_CONDITIONED) & np.isfinite(size)
     if UNITS[quantity] in ("N m", "W") or quantity == LINE.value:  # its poles are not where sin_mu vanishes
         assert formulas.drive_condition is not None
@@ -45,7 +45,7 @@ def scale_of(quantity: str, scene: Scene, formulas: Solution, values: Array) -> 
     return np.where(well, most if scale < VANISHING * most else scale, own)
 
 
-def term_sizes(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def sum_terms(quantity: str, scene: Scene, formulas: Solution) -> Array:
     """Sum of the absolute terms of the equation that a quantity is computed from, (n,), in its unit.
 
     Raises KeyError for a quantity of a unit that has no such sum here: nothing is judged by another's scale.
@@ -54,16 +54,16 @@ def term_sizes(quantity: str, scene: Scene, formulas: Solution) -> Array:
         return np.asarray(TERMS[UNITS[quantity]](quantity, scene, formulas), dtype=float)
 
 
-def _one(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _return_one(quantity: str, scene: Scene, formulas: Solution) -> Array:
     return np.ones(len(formulas))
 
 
-def _lengths(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    arms = sum(_arm(scene, number) for number in MOVING_BARS) + sum(_drive_arms(scene).values())
-    return np.full(len(formulas), of_length(scene.linkage) + arms)
+def _sum_lengths(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    arms = sum(_compute_arm(scene, number) for number in MOVING_BARS) + sum(_compute_drive_arms(scene).values())
+    return np.full(len(formulas), sum_lengths(scene.linkage) + arms)
 
 
-def _speeds(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _sum_speeds(quantity: str, scene: Scene, formulas: Solution) -> Array:
     _, a, b, c = scene.linkage.lengths
     assert formulas.omega_2 is not None
     omega_2 = np.abs(formulas.omega_2)
@@ -72,7 +72,7 @@ def _speeds(quantity: str, scene: Scene, formulas: Solution) -> Array:
     )
 
 
-def _angular_accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _sum_angular_accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
     _, a, b, c = scene.linkage.lengths
     w2, w3, w4, a2 = formulas.omega_2, formulas.omega_3, formulas.omega_4, formulas.alpha_2
     assert w2 is not None and w3 is not None and w4 is not None and a2 is not None
@@ -82,68 +82,68 @@ def _angular_accelerations(quantity: str, scene: Scene, formulas: Solution) -> A
     return np.asarray(terms / ((b if quantity == "alpha_3" else c) * formulas.condition))
 
 
-def _velocities(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    total, drive = np.zeros(len(formulas)), _drive_arms(scene)
+def _sum_velocities(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    total, drive = np.zeros(len(formulas)), _compute_drive_arms(scene)
     for number in MOVING_BARS:
-        arm = scene.linkage.bar(number).length + _arm(scene, number) + drive.get(number, 0.0)
+        arm = scene.linkage.bar(number).length + _compute_arm(scene, number) + drive.get(number, 0.0)
         total += arm * np.abs(getattr(formulas, f"omega_{number}"))
     return total
 
 
-def _accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _sum_accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array:
     total = np.zeros(len(formulas))
     for number in MOVING_BARS:
         omega, alpha = getattr(formulas, f"omega_{number}"), getattr(formulas, f"alpha_{number}")
-        total += (scene.linkage.bar(number).length + _arm(scene, number)) * (omega * omega + np.abs(alpha))
+        total += (scene.linkage.bar(number).length + _compute_arm(scene, number)) * (omega * omega + np.abs(alpha))
     return total
 
 
-def _forces(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _sum_forces(quantity: str, scene: Scene, formulas: Solution) -> Array:
     assert formulas.drive_condition is not None
     gain = 1.0
     if scene.drive is not None:  # of a short lever the force is as many times larger
-        short = line_of(scene.linkage, scene.drive, {bar: np.zeros(1) for bar in MOVING_BARS}).most
+        short = place_line(scene.linkage, scene.drive, {bar: np.zeros(1) for bar in MOVING_BARS}).most
         gain = max(1.0, max(scene.linkage.lengths) / short)
-    return np.asarray(gain * _force_terms(scene, formulas) / formulas.drive_condition)
+    return np.asarray(gain * _sum_force_terms(scene, formulas) / formulas.drive_condition)
 
 
-def _torques(quantity: str, scene: Scene, formulas: Solution) -> Array:
-    return np.asarray(max(scene.linkage.lengths[1:]) * _forces(quantity, scene, formulas))
+def _sum_torques(quantity: str, scene: Scene, formulas: Solution) -> Array:
+    return np.asarray(max(scene.linkage.lengths[1:]) * _sum_forces(quantity, scene, formulas))
 
 
-def _powers(quantity: str, scene: Scene, formulas: Solution) -> Array:
+def _sum_powers(quantity: str, scene: Scene, formulas: Solution) -> Array:
     if scene.drive is not None:
-        return np.asarray(_forces(quantity, scene, formulas) * _velocities(quantity, scene, formulas))
-    return np.asarray(_torques(quantity, scene, formulas) * np.abs(getattr(formulas, f"omega_{scene.drive_bar}")))
+        return np.asarray(_sum_forces(quantity, scene, formulas) * _sum_velocities(quantity, scene, formulas))
+    return np.asarray(_sum_torques(quantity, scene, formulas) * np.abs(getattr(formulas, f"omega_{scene.drive_bar}")))
 
 
 TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
-    "rad": _one,
-    "1": _one,
-    "m": _lengths,
-    "rad/s": _speeds,
-    "m/s": _velocities,
-    "rad/s^2": _angular_accelerations,
-    "m/s^2": _accelerations,
-    "N": _forces,
-    "N m": _torques,
-    "W": _powers,
+    "rad": _return_one,
+    "1": _return_one,
+    "m": _sum_lengths,
+    "rad/s": _sum_speeds,
+    "m/s": _sum_velocities,
+    "rad/s^2": _sum_angular_accelerations,
+    "m/s^2": _sum_accelerations,
+    "N": _sum_forces,
+    "N m": _sum_torques,
+    "W": _sum_powers,
 }
 """By the unit of a quantity, the sum of the terms of its equation."""
 
 
-def _drive_arms(scene: Scene) -> dict[int, float]:
+def _compute_drive_arms(scene: Scene) -> dict[int, float]:
     """Distances of the ends of a linear drive from the first pins of their bars, m."""
     ends = () if scene.drive is None else (scene.drive.start, scene.drive.end)
     return {end.bar: abs(end.distance) for end in ends}
 
 
-def _arm(scene: Scene, number: int) -> float:
+def _compute_arm(scene: Scene, number: int) -> float:
     """Distance of a bar's mass centre from its first pin, m."""
     return abs(scene.linkage.bar(number).mass_centre[0])
 
 
-def _force_terms(scene: Scene, formulas: Solution) -> Array:
+def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
     """Sum of the magnitudes of all inertial and external forces, couples divided by their bar's length, N."""
     total = np.zeros(len(formulas))
     for number in MOVING_BARS:
@@ -160,15 +160,15 @@ SIZED_BY = ("omega_3", "alpha_3", "a_G2", "a_G3", "a_G4")
 """What the size of a force is made of; a reference without them has none."""
 
 
-def angles_of(answer: Answer) -> bool:
+def has_angles(answer: Answer) -> bool:
     """Whether an answer has the angles of all moving bars that are not given."""
     theta_2 = () if answer.at is None or answer.at.commanded == "theta_2" else ("theta_2",)
     return answer.at is not None and {"theta_3", "theta_4", *theta_2} <= answer.quantities.keys()
 
 
-def reference_of(scene: Scene, answer: Answer) -> Solution | None:
+def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
-    if answer.at is None or not angles_of(answer):
+    if answer.at is None or not has_angles(answer):
         return None
     known = answer.quantities
     theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else known["theta_2"]
@@ -192,7 +192,7 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
     one, other = (theta[bar] for bar in theta if bar != answer.at.bar)
     reference.condition = np.abs(np.sin(other - one))
     if answer.at.stroke is not None and scene.drive is not None:
-        lever = line_of(scene.linkage, scene.drive, theta).lever
+        lever = place_line(scene.linkage, scene.drive, theta).lever
         reference.at, reference.condition = answer.at._replace(lever=lever), reference.condition * lever
     if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
         one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
@@ -203,7 +203,7 @@ def reference_of(scene: Scene, answer: Answer) -> Solution | None:
 
 def _add_line(linkage: FourBar, drive: LinearDrive, theta: dict[int, Array], reference: Solution) -> None:
     """Add stroke, direction, speed and leverage of a linear drive, from the answer's own angles and speeds."""
-    line = line_of(linkage, drive, theta)
+    line = place_line(linkage, drive, theta)
     reference.stroke, reference.drive_line = line.stroke, np.stack((line.unit.real, line.unit.imag), axis=1)
     if reference.omega_2 is not None and reference.omega_3 is not None and reference.omega_4 is not None:
         omega = {1: np.zeros(len(reference)), 2: reference.omega_2, 3: reference.omega_3, 4: reference.omega_4}
@@ -225,13 +225,13 @@ def _add_velocities(linkage: FourBar, theta: dict[int, Array], reference: Soluti
         setattr(reference, f"v_G{bar}", centre + reference.v_A if bar == 3 else centre)
 
 
-def strictest_condition(quantity: str, linkage: FourBar, formulas: Solution, reference: Solution | None) -> Array:
+def take_strictest_condition(quantity: str, linkage: FourBar, formulas: Solution, reference: Solution | None) -> Array:
     """Take the better of two conditions of a quantity at each position, (n,)."""
-    ours = condition_of(quantity, linkage, formulas)
-    return ours if reference is None else np.fmin(np.fmax(ours, condition_of(quantity, linkage, reference)), 1.0)
+    ours = find_condition(quantity, linkage, formulas)
+    return ours if reference is None else np.fmin(np.fmax(ours, find_condition(quantity, linkage, reference)), 1.0)
 
 
-def smallest_scale(quantity: str, scene: Scene, formulas: Solution, reference: Solution | None) -> Array:
+def take_smallest_scale(quantity: str, scene: Scene, formulas: Solution, reference: Solution | None) -> Array:
     """Take the smaller of two sizes of a quantity at each position, (n,)."""
     ours = scale_of(quantity, scene, formulas, getattr(formulas, quantity))
     of_motion = reference is not None and (

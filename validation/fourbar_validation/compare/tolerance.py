@@ -101,7 +101,7 @@ TOUCHING_MARGIN = 32.0 * EPS
 rounding of the data, and the engines may differ on whether it closes."""
 
 
-def simulated_within(error: float, why: str) -> ErrorBound:
+def hold_simulated(error: float, why: str) -> ErrorBound:
     """Hold what runs through time to a wanted error."""
     if not 0.0 < error < 1.0:
         raise InputError("--error", error, "must be a relative error, above 0 and below 1")
@@ -113,7 +113,7 @@ OF_DIRECTION = frozenset(("drive_line", "stroke_speed", "drive_condition"))
 are, and their direction by that over the stroke."""
 
 
-def lever(linkage: FourBar, bar: int = 2) -> float:
+def find_lever(linkage: FourBar, bar: int = 2) -> float:
     """Compute min(b, c)/longest bar: a loop closes to eps of its longest bar, which turns a shorter bar 3 or 4 by more.
 
     Of another commanded bar it is the shorter of the two moving bars besides it.
@@ -123,13 +123,13 @@ def lever(linkage: FourBar, bar: int = 2) -> float:
     return min(linkage.bar(each).length for each in MOVING_BARS if each != bar) / max(linkage.lengths)
 
 
-def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
+def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
     """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive."""
     s, unit, bar, commanded = formulas.condition, UNITS[quantity], formulas.at.bar, formulas.at.lever
     if quantity in (OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")):
         # a stroke commands the bar as far as its cylinder has a lever
         return np.ones_like(s) if commanded is None else np.asarray(commanded ** POWER[unit], dtype=float)
-    condition = lever(linkage, bar) * s ** POWER[unit]
+    condition = find_lever(linkage, bar) * s ** POWER[unit]
     if formulas.stroke is not None and (quantity in OF_DIRECTION or unit in ("N", "N m", "W")):
         condition = condition * np.minimum(formulas.stroke / max(linkage.lengths), 1.0)
     if unit in ("N", "N m", "W"):
@@ -138,45 +138,45 @@ def condition_of(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
     return np.asarray(condition, dtype=float)
 
 
-def wrapped(angle: Angle) -> Angle:
+def wrap_angle(angle: Angle) -> Angle:
     """Wrap into [-pi, pi)."""
     return (angle + math.pi) % TURN - math.pi
 
 
-def half_turns(ground_angle: float, theta_2: Array | float = 0.0) -> float:
+def count_half_turns(ground_angle: float, theta_2: Array | float = 0.0) -> float:
     """Give the largest angle in half turns, at least 1: many turns away it has fewer digits of its direction."""
     return max(1.0, abs(ground_angle) / np.pi, float(np.abs(theta_2).max(initial=0.0)) / np.pi)
 
 
-def roundoff(linkage: FourBar) -> float:
+def find_roundoff(linkage: FourBar) -> float:
     """Compute what two derivations of an angle may differ by, rad: it is one against the ground's."""
-    return EQUIVALENCE.factor * half_turns(linkage.ground_angle)
+    return EQUIVALENCE.factor * count_half_turns(linkage.ground_angle)
 
 
-def of_length(linkage: FourBar) -> float:
+def sum_lengths(linkage: FourBar) -> float:
     """Sum of the four lengths, m: the terms of the loop closure."""
     return math.fsum(linkage.lengths)
 
 
-def closing_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Array:
+def find_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Array:
     """Compute by what part of the sum of the lengths the loop closes (> 0) or misses (< 0) at a bar's angle."""
     own = linkage.bar(bar).length * (-1.0 if bar == 4 else 1.0)
     b, c = (linkage.bar(each).length for each in MOVING_BARS if each != bar)
     e = np.abs(linkage.ground * np.exp(1j * linkage.ground_angle) - own * np.exp(1j * theta))
-    return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / of_length(linkage))
+    return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / sum_lengths(linkage))
 
 
-def closing_gap(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> Array:
+def find_gap(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> Array:
     """Compute by what part of the sum of the lengths three angles miss the closure of the loop, (n,)."""
     d, a, b, c = linkage.lengths
     ground = d * np.exp(1j * linkage.ground_angle)
     gap = a * np.exp(1j * theta_2) + b * np.exp(1j * theta_3) - ground - c * np.exp(1j * theta_4)
-    return relative(np.abs(gap), of_length(linkage))
+    return divide(np.abs(gap), sum_lengths(linkage))
 
 
-def touching(linkage: FourBar, theta: Array, bar: int = 2) -> Mask:
+def mark_touching(linkage: FourBar, theta: Array, bar: int = 2) -> Mask:
     """Mark positions at which rounding decides whether the loop closes."""
-    return np.asarray(np.abs(closing_margin(linkage, theta, bar)) < TOUCHING_MARGIN)
+    return np.asarray(np.abs(find_margin(linkage, theta, bar)) < TOUCHING_MARGIN)
 
 
 def magnitude(values: Array) -> Array:
@@ -184,33 +184,33 @@ def magnitude(values: Array) -> Array:
     return np.asarray(np.hypot(values[:, 0], values[:, 1]) if values.ndim == 2 else np.abs(values))
 
 
-def difference(quantity: str, ours: Array, theirs: Array) -> Array:
+def compute_difference(quantity: str, ours: Array, theirs: Array) -> Array:
     """Angles modulo 2 pi, vectors by Euclidean norm, (n,); NaN where the shapes are not the same."""
     if theirs.shape != ours.shape:
         return np.full(len(ours), np.nan)
     apart = ours - theirs
     if quantity.startswith("theta"):
-        apart = wrapped(apart)
+        apart = wrap_angle(apart)
     return magnitude(apart)
 
 
-def relative(apart: Array | float, size: Array | float) -> Array:
+def divide(apart: Array | float, size: Array | float) -> Array:
     """Divide a difference by a size; a size of 0 demands exactly 0: over the least double any other is huge."""
     with np.errstate(over="ignore"):
         return np.asarray(apart / np.where(size == 0.0, np.nextafter(0.0, 1.0), size))
 
 
-def relative_error(quantity: str, ours: Array, theirs: Array, size: Array) -> Array:
+def find_error(quantity: str, ours: Array, theirs: Array, size: Array) -> Array:
     """Compute the error of an answer in parts of the size of the quantity, (n,)."""
-    return relative(difference(quantity, ours, theirs), size)
+    return divide(compute_difference(quantity, ours, theirs), size)
 
 
-def in_own_unit(size: Array) -> Array:
+def replace_zero_size(size: Array) -> Array:
     """Replace a size by 1 of its unit where there is nothing to be relative to."""
     return np.where(size == 0.0, 1.0, size)
 
 
-def used(error: Array | float, allowed: Array | float) -> Array:
+def find_used(error: Array | float, allowed: Array | float) -> Array:
     """error/allowed: how much of its allowance an error uses; infinite where it is no number, 0 where it is 0."""
     error, allowed = np.asarray(error, dtype=float), np.asarray(allowed, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -218,6 +218,6 @@ def used(error: Array | float, allowed: Array | float) -> Array:
     return np.where(np.isfinite(error) & ~np.isnan(share), share, np.inf)
 
 
-def worst(errors: Array) -> int:
+def find_worst(errors: Array) -> int:
     """Index of the largest error; what is no number is beyond all."""
     return int(np.argmax(np.where(np.isnan(errors), np.inf, errors)))

@@ -19,7 +19,7 @@ from typing import Any
 from fourbar.errors import InputError
 from fourbar.quantities import ANGLES, UNKNOWNS
 from fourbar_validation.compare.compare import COMPARED
-from fourbar_validation.compare.rows import FORMULAS, in_words, one_line, plain
+from fourbar_validation.compare.rows import FORMULAS, make_plain, say_error, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines import workers
 from fourbar_validation.engines.checked import Checked
@@ -55,34 +55,34 @@ class _UnusableError(Exception):
     """A class that is no witness; the text says what is allowed."""
 
 
-def named(adapters: Sequence[str], known: Iterable[str]) -> tuple[Witness, ...]:
+def read_witnesses(adapters: Sequence[str], known: Iterable[str]) -> tuple[Witness, ...]:
     """Read the witnesses of the command line; InputError where one is none."""
     if os.getcwd() not in sys.path:  # a console script does not look there
         sys.path.append(os.getcwd())
-    result = list(zip(adapters, _described(adapters, known), strict=True))
+    result = list(zip(adapters, _ask_descriptions(adapters, known), strict=True))
     for adapter, each in result:
         if isinstance(each, _UnusableError):
             raise InputError("--witness", adapter, str(each))
     return tuple(each for _, each in result if isinstance(each, Witness))
 
 
-def installed(known: Iterable[str]) -> tuple[Witness, ...]:
+def find_installed(known: Iterable[str]) -> tuple[Witness, ...]:
     """Those of the entry points; one that cannot be used is missing, with the reason."""
     points = sorted(entry_points(group=GROUP), key=lambda point: point.name)
     return tuple(
-        _added(plain(point.name), point.value, EQUIVALENCE, trouble=f"{point.value} {each}")
+        _make_witness(make_plain(point.name), point.value, EQUIVALENCE, trouble=f"{point.value} {each}")
         if isinstance(each, _UnusableError)
         else each
-        for point, each in zip(points, _described([point.value for point in points], known), strict=True)
+        for point, each in zip(points, _ask_descriptions([point.value for point in points], known), strict=True)
     )
 
 
-def _described(adapters: Sequence[str], known: Iterable[str]) -> list[Witness | _UnusableError]:
+def _ask_descriptions(adapters: Sequence[str], known: Iterable[str]) -> list[Witness | _UnusableError]:
     """Ask each class what it says of itself, in another process: nothing of it runs where the verdict is given."""
     if not adapters:
         return []
     names, result = {FORMULAS, *known}, list[Witness | _UnusableError]()
-    for each in workers.each(_describe, adapters, seconds=LONGEST_IMPORT, instead=_trouble):
+    for each in workers.apply_each(_describe, adapters, seconds=LONGEST_IMPORT, instead=_find_trouble):
         if isinstance(each, Witness) and each.name in names:
             result.append(_UnusableError(f"must have a name of its own; {each.name!r} is another's"))
             continue
@@ -91,12 +91,12 @@ def _described(adapters: Sequence[str], known: Iterable[str]) -> list[Witness | 
     return result
 
 
-def numbers(witnesses: Iterable[Witness]) -> dict[str, int]:
+def list_numbers(witnesses: Iterable[Witness]) -> dict[str, int]:
     """List the numbers of those from outside, by name."""
     return {each.name: each.number for each in witnesses if isinstance(each, AddedWitness)}
 
 
-def _trouble(_: str, error: Exception, __: object) -> _UnusableError:
+def _find_trouble(_: str, error: Exception, __: object) -> _UnusableError:
     """Say why a class cannot be used whose description failed, took too long, or ended its process."""
     if isinstance(error, _UnusableError):
         return error
@@ -115,12 +115,12 @@ def _describe(adapter: str) -> AddedWitness:
     except _UnusableError:
         raise
     except BaseException as error:  # whatever the user's module raises while it is imported
-        raise _UnusableError(f"cannot be imported: {in_words(error)}") from None
+        raise _UnusableError(f"cannot be imported: {say_error(error)}") from None
 
 
 def _read(adapter: str, made: Any) -> AddedWitness:
     name = getattr(made, "name", None)
-    if type(name) is not str or not name or name != one_line(name) or not callable(getattr(made, "answer", None)):
+    if type(name) is not str or not name or name != write_one_line(name) or not callable(getattr(made, "answer", None)):
         raise _UnusableError("must have a `name` of printable characters and a method `answer(scene, at)`")
     stated = tuple(getattr(made, "quantities", UNKNOWNS))
     unknown = [quantity for quantity in stated if quantity not in COMPARED]
@@ -128,16 +128,16 @@ def _read(adapter: str, made: Any) -> AddedWitness:
         raise _UnusableError(f"must have `quantities` among {', '.join(COMPARED)}; it has {unknown or 'none'}")
     quantities = tuple(quantity for quantity in COMPARED if quantity in stated)
     positions = tuple(quantity for quantity in quantities if quantity in ANGLES)
-    tolerance = _tolerance(getattr(made, "tolerance", EQUIVALENCE.name))
-    code = _code(sys.modules[adapter.partition(":")[0]])
-    return _added(name, adapter, tolerance, expected=quantities, positions=positions, stated=False, code=code)
+    tolerance = _make_tolerance(getattr(made, "tolerance", EQUIVALENCE.name))
+    code = _hash_code(sys.modules[adapter.partition(":")[0]])
+    return _make_witness(name, adapter, tolerance, expected=quantities, positions=positions, stated=False, code=code)
 
 
-def _added(name: str, adapter: str, tolerance: ErrorBound, **rest: Any) -> AddedWitness:
+def _make_witness(name: str, adapter: str, tolerance: ErrorBound, **rest: Any) -> AddedWitness:
     return AddedWitness(name, partial(Checked, name, adapter), tolerance, adapter=adapter, **rest)
 
 
-def _code(module: ModuleType) -> str:
+def _hash_code(module: ModuleType) -> str:
     """Hash of the modules imported with a witness, of the others in its folder, and of what is installed."""
     files = {getattr(each, "__file__", None) for name, each in list(sys.modules.items()) if name not in OURS}
     files |= {str(path) for path in Path(module.__file__ or "").parent.glob("*.py")}
@@ -148,7 +148,7 @@ def _code(module: ModuleType) -> str:
     return digest.hexdigest()[:16]
 
 
-def _tolerance(stated: Any) -> ErrorBound:
+def _make_tolerance(stated: Any) -> ErrorBound:
     if isinstance(stated, str) and stated == EQUIVALENCE.name:
         return EQUIVALENCE
     try:
@@ -159,4 +159,6 @@ def _tolerance(stated: Any) -> ErrorBound:
     if not (0.0 < error < 1.0 and isinstance(reason, str) and reason):
         allowed = f'"{EQUIVALENCE.name}", or a relative error above 0 and below 1 and its reason'
         raise _UnusableError(f"must have a `tolerance` that is {allowed}")
-    return ErrorBound("as the witness states", f"{error:g} of the scale: {one_line(reason)}", error, conditioned=False)
+    return ErrorBound(
+        "as the witness states", f"{error:g} of the scale: {write_one_line(reason)}", error, conditioned=False
+    )

@@ -15,7 +15,7 @@ from flint import acb, arb, arb_mat, ctx
 from fourbar.effects import Flywheel, Friction, Gravity, Spring, Springs, Table, Torsion, Viscous
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
-from fourbar_validation.engines.description import PINS, centre, inertia
+from fourbar_validation.engines.description import PINS, find_centre, find_inertia
 
 BITS = 320
 """Working precision; 50 digits are 167 bits, the rest is what the worst sample (a limit position at 1e-20) cancels."""
@@ -29,7 +29,7 @@ Complex: TypeAlias = Any
 Values: TypeAlias = dict[str, Ball]
 
 
-def inputs(scene: Scene, angle: float) -> dict[str, float]:
+def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     """Collect the stored doubles that the outputs at one position, of the commanded angle, depend on."""
     link, motion = scene.linkage, scene.motion
     d, a, b, c = link.lengths
@@ -37,8 +37,8 @@ def inputs(scene: Scene, angle: float) -> dict[str, float]:
     values |= dict(zip(motion.names, (angle, motion.speed or 0.0, motion.acceleration), strict=True))
     for k in MOVING_BARS:
         bar = link.bar(k)
-        values |= {f"m{k}": bar.mass, f"I{k}": inertia(bar)}
-        values[f"r{k}"], values[f"phi{k}"] = centre(bar)
+        values |= {f"m{k}": bar.mass, f"I{k}": find_inertia(bar)}
+        values[f"r{k}"], values[f"phi{k}"] = find_centre(bar)
     for k, load in enumerate(scene.loads):
         f, f_angle = load.force or (0.0, 0.0)
         values |= {f"F_{k}": f, f"F_angle_{k}": f_angle, f"M_{k}": load.moment}
@@ -66,10 +66,10 @@ def inputs(scene: Scene, angle: float) -> dict[str, float]:
     return values
 
 
-def stored(scene: Scene, angle: float, **motion: float) -> Values:
+def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
     """Give the inputs as balls of no radius, with another omega_2 or alpha_2 where given; set the working precision."""
     ctx.prec = BITS
-    return {name: arb(value) for name, value in (inputs(scene, angle) | motion).items()}
+    return {name: arb(value) for name, value in (collect_inputs(scene, angle) | motion).items()}
 
 
 def polar(r: Ball, angle: Ball) -> Complex:
@@ -89,7 +89,7 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     Where bar 3 is commanded D = d e^{i theta_1} - b e^{i theta_3} is what bars 2 and 4 span, where bar 4 is it is
     d e^{i theta_1} + c e^{i theta_4}, spanned by bars 3 and 2 with bar 2 reversed.
     """
-    bar, d = commanded(x), x["d"]
+    bar, d = find_commanded(x), x["d"]
     own, b, c = {2: ("a", "b", "c"), 3: ("b", "a", "c"), 4: ("c", "b", "a")}[bar]
     own, b, c, side = x[own], x[b], x[c], 1 if bar == 4 else -1
     w = polar(arb(1), x[f"theta_{bar}"])
@@ -105,24 +105,24 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     return (w, first, second) if bar == 2 else (first, w, second) if bar == 3 else (-second, first, w)
 
 
-def commanded(x: Values) -> int:
+def find_commanded(x: Values) -> int:
     """Return the bar whose angle is among the inputs."""
     return next(bar for bar in MOVING_BARS if f"theta_{bar}" in x)
 
 
-def linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
+def solve_linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
     """Solution of a linear system, rigorous; ZeroDivisionError where it is singular to working precision."""
     solution = arb_mat(rows).solve(arb_mat([[value] for value in right]))
     return [solution[k, 0] for k in range(len(right))]
 
 
-def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | None:  # noqa: PLR0915 - one system
+def compute_outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | None:  # noqa: PLR0915 - one system
     """Compute every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
     closed = closure(x, branch)
     if closed is None:
         return None
     w = dict(zip(MOVING_BARS, closed, strict=True))
-    a, b, c, bar = x["a"], x["b"], x["c"], commanded(x)
+    a, b, c, bar = x["a"], x["b"], x["c"], find_commanded(x)
     y: Values = {f"theta_{k}": w[k].arg() for k in MOVING_BARS if k != bar}
     sines = {2: wedge(w[3], w[4]), 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
     y |= {"sin_mu": sines[2], "condition": abs(sines[bar])}
@@ -135,7 +135,7 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
         """Solve for the rates of the other bars, where the sum of i side rate is given."""
         one, other = (k for k in MOVING_BARS if k != bar)
         u, v, known = acb(0, 1) * side[one], acb(0, 1) * side[other], known - acb(0, stated) * side[bar]
-        found = linear([[u.real, v.real], [u.imag, v.imag]], [known.real, known.imag])
+        found = solve_linear([[u.real, v.real], [u.imag, v.imag]], [known.real, known.imag])
         return {bar: stated, **dict(zip((one, other), found, strict=True))}
 
     # what a probe opens the loop by: slip, m/s, and jerk, m/s^2
@@ -169,7 +169,7 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
         slip = omega.get(j, 0) - omega.get(i, 0)
         sign = arb(1) if slip > 0 else arb(-1) if slip < 0 else arb(0) if slip == 0 else arb(0, 1)
         couple = -x.get(f"viscous_{pin}", arb(0)) * slip - x.get(f"friction_{pin}", arb(0)) * sign
-        _twist(moment, pin, couple)
+        _add_twist(moment, pin, couple)
     # unknowns F12 F32 F23 F43 F34 F14 (x, y each) and T
     joints = {2: ((0, "first_pin"), (1, "tip")), 3: ((2, "first_pin"), (3, "tip")), 4: ((4, "tip"), (5, "first_pin"))}
     matrix = [[arb(0)] * 13 for _ in range(13)]
@@ -188,7 +188,7 @@ def outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | No
         known.append(arb(0))
     y["drive_condition"] = abs(sines[drive_bar])
     try:
-        solved = linear(matrix, known)
+        solved = solve_linear(matrix, known)
     except ZeroDivisionError:
         return y
     columns = {"F12": 0, "F32": 1, "F43": 3, "F14": 5}
@@ -204,7 +204,7 @@ def _put(y: Values, vectors: dict[str, Complex]) -> None:
         y[f"{name}_x"], y[f"{name}_y"] = vector.real, vector.imag
 
 
-def _twist(moment: dict[int, Ball], pin: str, couple: Ball) -> None:
+def _add_twist(moment: dict[int, Ball], pin: str, couple: Ball) -> None:
     """Add a couple to bar j of a pin (i, j), its opposite to bar i; on the ground it does nothing."""
     i, j = PINS[pin]
     for bar, value in ((j, couple), (i, -couple)):
@@ -224,7 +224,7 @@ def _add_effects(
     """Add loads and springs, from the directions and first pins of all bars, the ground's too."""
     for k, load in enumerate(scene.loads):
         theta_2 = x.get("theta_2", w[2].arg())
-        factor = _factor(load.table, theta_2) if load.table else arb(1)
+        factor = _interpolate_factor(load.table, theta_2) if load.table else arb(1)
         axes = w[load.bar] if load.frame == "bar" else acb(1)
         f, arm = (axes * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"]) for name in ("F", "at"))
         force[load.bar] += factor * f
@@ -234,7 +234,7 @@ def _add_effects(
             for pin, *_ in effect.springs:
                 i, j = PINS[pin]
                 turned = (w[j] * w[i].conjugate() * polar(arb(1), -x[f"rest_{pin}"])).arg()
-                _twist(moment, pin, -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * turned)
+                _add_twist(moment, pin, -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * turned)
         elif isinstance(effect, Springs):
             for k, spring in enumerate(effect.springs):
                 start, end = spring.start.bar, spring.end.bar
@@ -249,7 +249,7 @@ def _add_effects(
                         moment[bar] += wedge(arm - centre[bar], f)
 
 
-def _factor(table: Table, theta_2: Ball) -> Ball:
+def _interpolate_factor(table: Table, theta_2: Ball) -> Ball:
     """Interpolate between the two points of a table that enclose an angle, taken modulo a turn."""
     turns = math.floor((float(theta_2.mid()) - table.theta_2[0]) / math.tau + 1e-12)
     angle = theta_2 - 2 * turns * arb.pi()
@@ -267,7 +267,7 @@ def _pull(spring: Spring, x: Values, k: int, across: Complex) -> Complex:
     return (x[f"pull_{k}"] + x[f"stiffness_{k}"] * (distance - x[f"length_{k}"])) / distance * across
 
 
-def response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]:
+def compute_response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]:
     """Compute how far each output moves, by 2^-STEP_BITS, under the first of several changes that closes the loop."""
     for moved in changed:
         if moved is None:
@@ -285,12 +285,12 @@ def response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]
     return {}
 
 
-def reference(scene: Scene, branch: int, angle: float) -> tuple[Values, dict[str, float]] | None:
+def compute_reference(scene: Scene, branch: int, angle: float) -> tuple[Values, dict[str, float]] | None:
     """Compute values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
-    exact = stored(scene, angle)
+    exact = make_balls(scene, angle)
 
     def evaluate(**changed: Ball) -> Values | None:
-        return outputs(scene, branch, exact | changed, scene.drive_bar)
+        return compute_outputs(scene, branch, exact | changed, scene.drive_bar)
 
     base = evaluate()
     if base is None:
@@ -298,7 +298,9 @@ def reference(scene: Scene, branch: int, angle: float) -> tuple[Values, dict[str
     sensitivity = dict.fromkeys(base, 0.0)
     for name, value in exact.items():
         step = abs(value) * arb(2) ** -STEP_BITS
-        moved = response(base, (evaluate(**{name: value + side * step}) for side in (1, -1))) if value != 0 else {}
+        moved = (
+            compute_response(base, (evaluate(**{name: value + side * step}) for side in (1, -1))) if value != 0 else {}
+        )
         for output, rate in moved.items():
             sensitivity[output] += rate
     return base, sensitivity

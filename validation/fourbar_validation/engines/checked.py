@@ -10,8 +10,8 @@ import numpy as np
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion_law import COMMANDS
-from fourbar_validation.compare.answer import Answer, Array, Engine, WitnessError, not_taken
-from fourbar_validation.compare.rows import in_words, one_line
+from fourbar_validation.compare.answer import Answer, Array, Engine, WitnessError, explain_refusal
+from fourbar_validation.compare.rows import say_error, write_one_line
 
 FURTHEST = 0.1
 """rad, and part of the greatest speed and acceleration: a motion that ends further from the command than this answers
@@ -38,50 +38,50 @@ class Checked:
                 engine: Engine = resolve_name(self._adapter)()
                 if scene.drive is not None and not getattr(engine, "linear_drive", False):
                     return Answer(self.name, "exact", refusal="it does not declare linear_drive")
-                if refusal := not_taken(engine, at):
+                if refusal := explain_refusal(engine, at):
                     return Answer(self.name, "exact", refusal=refusal)
                 return self._read(engine.answer(given_scene, at), command)
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
                 raise  # the user's; a worker ignores it
-            raise WitnessError(in_words(error)) from None
+            raise WitnessError(say_error(error)) from None
 
     def _read(self, answer: Any, command: Command) -> Answer:
         if not isinstance(answer, Answer):
             raise TypeError(f"the answer of {self.name} is a {type(answer).__name__}, not a fourbar_validation.Answer")
-        setting = _text("setting", answer.setting)
+        setting = _check_text("setting", answer.setting)
         if answer.refusal is not None:
-            return Answer(self.name, setting, refusal=self._reason(answer.refusal))
+            return Answer(self.name, setting, refusal=self._find_reason(answer.refusal))
         if not isinstance(answer.quantities, dict):
             raise TypeError("quantities must be a dictionary of arrays")
         n = len(command.angle)
         return Answer(
             self.name,
             setting,
-            at=command if answer.at is None else _motion(answer.at, command),
-            assembled=_numbers("assembled", answer.assembled, (n,), "b").astype(bool),
+            at=command if answer.at is None else _check_motion(answer.at, command),
+            assembled=_check_numbers("assembled", answer.assembled, (n,), "b").astype(bool),
             quantities={
-                name: _numbers(name, value, (n, 2) if name in VECTORS else (n,))
+                name: _check_numbers(name, value, (n, 2) if name in VECTORS else (n,))
                 for name, value in answer.quantities.items()
             },
-            alarms=[_text("an alarm", alarm) for alarm in answer.alarms],
-            shared=_text("shared", answer.shared) or "not stated",
-            own=_text("own", answer.own) or "not stated",
+            alarms=[_check_text("an alarm", alarm) for alarm in answer.alarms],
+            shared=_check_text("shared", answer.shared) or "not stated",
+            own=_check_text("own", answer.own) or "not stated",
         )
 
-    def _reason(self, refusal: Any) -> str:
-        if not (reason := _text("refusal", refusal)):
+    def _find_reason(self, refusal: Any) -> str:
+        if not (reason := _check_text("refusal", refusal)):
             raise ValueError(f"{self.name} refuses without a reason: refusal must say why")
         return reason
 
 
-def _text(name: str, value: Any) -> str:
+def _check_text(name: str, value: Any) -> str:
     if not isinstance(value, str):
         raise TypeError(f"{name} must be a text, not a {type(value).__name__}")
-    return one_line(value)
+    return write_one_line(value)
 
 
-def _numbers(name: str, value: Any, shape: tuple[int, ...], kinds: str = "iuf") -> Array:
+def _check_numbers(name: str, value: Any, shape: tuple[int, ...], kinds: str = "iuf") -> Array:
     array = np.asarray(value)
     if array.dtype.kind not in kinds:
         wanted = "true or false" if kinds == "b" else "real numbers"
@@ -91,7 +91,7 @@ def _numbers(name: str, value: Any, shape: tuple[int, ...], kinds: str = "iuf") 
     return np.array(array, dtype=float)
 
 
-def _motion(at: Any, command: Command) -> Command:
+def _check_motion(at: Any, command: Command) -> Command:
     """Check the motion that a witness says it made: it must be near the one that was commanded."""
     if not isinstance(at, Command):
         raise TypeError(f"at must be the command or one made of it, not a {type(at).__name__}")
@@ -104,7 +104,7 @@ def _motion(at: Any, command: Command) -> Command:
         commanded, value = getattr(command, name), getattr(at, name)
         if commanded is None or command.stroke is not None:  # of a stroke nothing of the bar is given
             continue
-        made[name] = _numbers(f"at.{keys[name]}", value, (n,) if np.ndim(value) else ())
+        made[name] = _check_numbers(f"at.{keys[name]}", value, (n,) if np.ndim(value) else ())
         if not np.abs(made[name] - commanded).max() <= FURTHEST * size:
             raise ValueError(
                 f"at.{keys[name]} is too far from the command: it must be within {FURTHEST * size:g} of it"

@@ -36,27 +36,27 @@ SHARED = "the description, what is commanded and the branch"
 """What an exact engine takes from the formulas' side, in a report."""
 
 
-def inertia(bar: Bar) -> float:
+def find_inertia(bar: Bar) -> float:
     """About the mass centre, kg m^2: as stated, or that of a uniform slender bar, m L^2/12."""
     return bar.inertia if bar.inertia is not None else bar.mass * bar.length**2 / 12.0
 
 
-def centre(bar: Bar) -> tuple[float, float]:
+def find_centre(bar: Bar) -> tuple[float, float]:
     """Return distance (m) and angle (rad) of the mass centre from pin and bar's line: as specified, or mid-bar."""
     return bar.centre if bar.centre is not None else (bar.length / 2.0, 0.0)
 
 
 def about_first_pin(bar: Bar) -> float:
     """Moment of inertia about the first pin, kg m^2."""
-    return inertia(bar) + bar.mass * centre(bar)[0] ** 2
+    return find_inertia(bar) + bar.mass * find_centre(bar)[0] ** 2
 
 
-def components(size: float, angle: float) -> tuple[float, float]:
+def resolve(size: float, angle: float) -> tuple[float, float]:
     """Resolve a vector along and across the line from which its angle (rad) counts."""
     return size * math.cos(angle), size * math.sin(angle)
 
 
-def within_half_a_turn(angle: float) -> float:
+def reduce_angle(angle: float) -> float:
     """Reduce an angle to its direction, rad: sums with others then lose none of its digits."""
     return angle if abs(angle) <= math.pi else math.atan2(math.sin(angle), math.cos(angle))
 
@@ -73,7 +73,7 @@ def rotate_by(rotation: Sequence[Sequence[float]], x: float, y: float) -> tuple[
     return a * x + b * y, c * x + d * y
 
 
-def field(gravity: Gravity) -> tuple[float, float]:
+def find_field(gravity: Gravity) -> tuple[float, float]:
     """(g_x, g_y), m/s^2; the angle counts from +x, counter-clockwise."""
     x, y = math.cos(gravity.angle), math.sin(gravity.angle)
     return gravity.magnitude * (x if abs(x) > TELLS else 0.0), gravity.magnitude * (y if abs(y) > TELLS else 0.0)
@@ -100,26 +100,26 @@ class Part(NamedTuple):
         return self.points[f"G{self.bar}"]
 
 
-def parts(linkage: FourBar) -> list[Part]:
+def list_parts(linkage: FourBar) -> list[Part]:
     """Describe bars 2, 3 on 2, and 4."""
     theta_1, d = linkage.ground_angle, linkage.ground
-    first_pins = {2: (1, (0.0, 0.0)), 3: (2, (linkage.input.length, 0.0)), 4: (1, components(d, theta_1))}
+    first_pins = {2: (1, (0.0, 0.0)), 3: (2, (linkage.input.length, 0.0)), 4: (1, resolve(d, theta_1))}
     result = []
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        ends = {"first_pin": (0.0, 0.0), "G": components(*centre(bar)), "end": (bar.length, 0.0)}
+        ends = {"first_pin": (0.0, 0.0), "G": resolve(*find_centre(bar)), "end": (bar.length, 0.0)}
         points = {f"{name}{number}": at for name, at in ends.items()}
-        result.append(Part(number, *first_pins[number], bar.mass, inertia(bar), bar.length, points))
+        result.append(Part(number, *first_pins[number], bar.mass, find_inertia(bar), bar.length, points))
     return result
 
 
 def place(point: Any, ground_angle: float) -> tuple[float, float]:
     """Locate an end of a spring along and across its bar's line from the first pin, on the ground in world axes, m."""
-    at = components(point.distance, point.angle)
+    at = resolve(point.distance, point.angle)
     return rotate(ground_angle, *at) if point.bar == 1 else at
 
 
-def speeds(at: Command) -> tuple[Array, Array]:
+def list_speeds(at: Command) -> tuple[Array, Array]:
     """omega_2 and alpha_2 of each position, or those of the commanded bar, (n,); a speed that is not stated is 0."""
     omega, alpha = (
         np.broadcast_to(np.asarray(0.0 if x is None else x, float), at.angle.shape) for x in (at.speed, at.acceleration)
@@ -127,17 +127,17 @@ def speeds(at: Command) -> tuple[Array, Array]:
     return omega, alpha
 
 
-def driving(scene: Scene) -> str:
+def name_driving(scene: Scene) -> str:
     """Name what is solved for of a scene's drive: its torque, or the force of a linear one."""
     return (COUPLE if scene.drive is None else LINE).value
 
 
-def unknowns(scene: Scene, names: Iterable[str] = UNKNOWNS) -> list[str]:
+def list_unknowns(scene: Scene, names: Iterable[str] = UNKNOWNS) -> list[str]:
     """List quantities with what is solved for of the scene's drive in the place of a torque."""
-    return [driving(scene) if name == COUPLE.value else name for name in names]
+    return [name_driving(scene) if name == COUPLE.value else name for name in names]
 
 
-def unknown_effect(scene: Scene, table: Container[str], *, linear: bool = False) -> str:
+def find_unknown(scene: Scene, table: Container[str], *, linear: bool = False) -> str:
     """Give the reason to refuse a scene with an effect that a table has no row for; empty where there is none.
 
     Parameters

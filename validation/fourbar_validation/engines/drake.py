@@ -21,8 +21,8 @@ from pydrake.multibody.tree import (
 from fourbar.errors import LimitError
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FIRST_PIN, about_first_pin, parts, unknown_effect
-from fourbar_validation.engines.effects import TERM_OF, acting
+from fourbar_validation.engines.description import FIRST_PIN, about_first_pin, find_unknown, list_parts
+from fourbar_validation.engines.effects import TERM_OF, list_acting
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
 
@@ -30,9 +30,9 @@ BY_SPEEDS = JacobianWrtVariable.kV
 UP = (0.0, 0.0, 1.0)
 
 
-def refusal(scene: Scene) -> str:
+def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := unknown_effect(scene, TERM_OF, linear=True):
+    if reason := find_unknown(scene, TERM_OF, linear=True):
         return reason
     for number in FIRST_PIN:
         bar = scene.linkage.bar(number)
@@ -47,13 +47,13 @@ class DrakeTree(Tree):
     """The open tree, built from the description."""
 
     def __init__(self, scene: Scene) -> None:
-        if reason := refusal(scene):
+        if reason := find_refusal(scene):
             raise LimitError(reason)
         self.plant = plant = MultibodyPlant(time_step=0.0)
         self.body: dict[int, Any] = {1: plant.world_body()}
         self.joint: dict[int, Any] = {}
         self.local: dict[str, tuple[Any, Array]] = {}
-        for part in parts(scene.linkage):
+        for part in list_parts(scene.linkage):
             about_g = RotationalInertia(*[part.inertia] * 3)
             inertia = SpatialInertia.MakeFromCentralInertia(part.mass, np.array([*part.centre, 0.0]), about_g)
             body = self.body[part.bar] = plant.AddRigidBody(f"bar{part.bar}", inertia)
@@ -64,7 +64,7 @@ class DrakeTree(Tree):
             self.local |= {name: (body.body_frame(), np.array([*place, 0.0])) for name, place in part.points.items()}
         plant.Finalize()
         self.context, self.world = plant.CreateDefaultContext(), plant.world_frame()
-        self.ready(scene, acting(scene, self))
+        self.ready(scene, list_acting(scene, self))
         plant.mutable_gravity_field().set_gravity_vector(np.array([*self.field, 0.0]))
 
     def place(self, q: Sequence[float]) -> None:
@@ -106,7 +106,7 @@ class DrakeTree(Tree):
         if any(field):
             self.plant.CalcForceElementsContribution(self.context, forces)
         for bar, wrench in wrenches.items():
-            self.body[bar].AddInForceInWorld(self.context, _spatial(wrench), forces)
+            self.body[bar].AddInForceInWorld(self.context, _make_spatial(wrench), forces)
         return np.array(self.plant.CalcInverseDynamics(self.context, self.a, forces))
 
     def carried(self) -> dict[int, Array]:
@@ -114,7 +114,7 @@ class DrakeTree(Tree):
         applied = []
         for bar, wrench in self.wrenches.items():
             force = ExternallyAppliedSpatialForce()
-            force.body_index, force.F_Bq_W = self.body[bar].index(), _spatial(wrench)
+            force.body_index, force.F_Bq_W = self.body[bar].index(), _make_spatial(wrench)
             applied.append(force)
         port = self.plant.get_applied_spatial_force_input_port()
         port.FixValue(self.context, Value[list[ExternallyAppliedSpatialForce]](applied))
@@ -125,6 +125,6 @@ class DrakeTree(Tree):
 DrakeInverse = partial(Exact, "drake-inverse", DrakeTree)
 
 
-def _spatial(wrench: Sequence[float]) -> Any:
+def _make_spatial(wrench: Sequence[float]) -> Any:
     x, y, couple = wrench
     return SpatialForce(np.array([0.0, 0.0, couple]), np.array([x, y, 0.0]))

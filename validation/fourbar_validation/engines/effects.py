@@ -12,58 +12,58 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.scene import Scene
-from fourbar_validation.engines.description import PINS, components, field
+from fourbar_validation.engines.description import PINS, find_field, resolve
 from fourbar_validation.engines.loaded import Act, Loaded
 
 if TYPE_CHECKING:
     from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Springs, Table, Torsion, Viscous
 
 
-def _gravity(effect: "Gravity", bars: Loaded) -> None:
+def _set_gravity(effect: "Gravity", bars: Loaded) -> None:
     """Set the engine's own gravity."""
-    bars.gravity(field(effect))
+    bars.gravity(find_field(effect))
 
 
-def _slip(bars: Loaded, pin: str) -> float:
+def _compute_slip(bars: Loaded, pin: str) -> float:
     """Return how much faster the first bar of a pin spins than the second, rad/s."""
     one, other = PINS[pin]
     return bars.velocity(one) - bars.velocity(other)
 
 
-def _twist_at(bars: Loaded, pin: str, couple: float) -> None:
+def _apply_twist(bars: Loaded, pin: str, couple: float) -> None:
     """Apply a couple to the second bar of a pin, and its opposite to the first."""
     one, other = PINS[pin]
     bars.twist(other, couple)
     bars.twist(one, -couple)
 
 
-def _viscous(effect: "Viscous", bars: Loaded) -> None:
+def _apply_viscous(effect: "Viscous", bars: Loaded) -> None:
     """Apply couples in proportion to the spin."""
     for pin, k in effect.coefficients:
-        _twist_at(bars, pin, k * _slip(bars, pin))
+        _apply_twist(bars, pin, k * _compute_slip(bars, pin))
 
 
-def _friction(effect: "Friction", bars: Loaded) -> None:
+def _apply_friction(effect: "Friction", bars: Loaded) -> None:
     """Apply couples of constant size; MuJoCo's own frictionloss is a soft constraint."""
     for pin, f in effect.torques:
-        _twist_at(bars, pin, f * float(np.sign(_slip(bars, pin))))
+        _apply_twist(bars, pin, f * float(np.sign(_compute_slip(bars, pin))))
 
 
 def _pin_friction(effect: "PinFriction", bars: Loaded) -> None:
     """Apply couples of mu r times the load that the engine computed at the pin in its last pass."""
     for pin, mu, r in effect.pins:
-        _twist_at(bars, pin, mu * r * bars.pin_loads.get(pin, 0.0) * float(np.sign(_slip(bars, pin))))
+        _apply_twist(bars, pin, mu * r * bars.pin_loads.get(pin, 0.0) * float(np.sign(_compute_slip(bars, pin))))
 
 
-def _torsion(effect: "Torsion", bars: Loaded) -> None:
+def _apply_torsion(effect: "Torsion", bars: Loaded) -> None:
     """Apply couples from the engine's own angles of the two bars."""
     for pin, k, rest, preload in effect.springs:
         one, other = PINS[pin]
         twist = math.remainder(bars.angle(one) - bars.angle(other) + rest, math.tau)
-        _twist_at(bars, pin, k * twist - preload)
+        _apply_twist(bars, pin, k * twist - preload)
 
 
-def _springs(effect: "Springs", bars: Loaded) -> None:
+def _apply_springs(effect: "Springs", bars: Loaded) -> None:
     """Pull at the engine's own places of the two points."""
     for spring in effect.springs:
         one, other = bars.end(spring.start), bars.end(spring.end)
@@ -78,14 +78,14 @@ def _springs(effect: "Springs", bars: Loaded) -> None:
         bars.push(spring.end.bar, -vector, other)
 
 
-def _flywheel(effect: "Flywheel", bars: Loaded) -> None:
+def _apply_flywheel(effect: "Flywheel", bars: Loaded) -> None:
     """Apply the couple that accelerating the wheel takes, from the engine's own angular acceleration."""
     bars.twist(effect.bar, -effect.inertia * bars.alpha(effect.bar))
 
 
 def _load(load: "Load", bars: Loaded) -> None:
     """Apply a force at its point and a couple; in the bar's frame both vectors rotate with the engine's bar."""
-    force, arm = np.array(components(*(load.force or (0.0, 0.0)))), np.array(components(*load.at))
+    force, arm = np.array(resolve(*(load.force or (0.0, 0.0)))), np.array(resolve(*load.at))
     factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
     if load.frame == "bar":
         f, at = bars.rotate(load.bar, *force), bars.rotate(load.bar, *arm)
@@ -104,19 +104,19 @@ def look_up(table: "Table", theta_2: float) -> float:
 
 
 TERM_OF: dict[str, Callable[[Any, Loaded], None]] = {
-    "gravity": _gravity,
-    "viscous": _viscous,
-    "friction": _friction,
+    "gravity": _set_gravity,
+    "viscous": _apply_viscous,
+    "friction": _apply_friction,
     "pin_friction": _pin_friction,
-    "torsion": _torsion,
-    "springs": _springs,
-    "flywheel": _flywheel,
+    "torsion": _apply_torsion,
+    "springs": _apply_springs,
+    "flywheel": _apply_flywheel,
     "load": _load,
 }
 """By the key of an effect: what it does at a state of the bars."""
 
 
-def acting(scene: Scene, bars: Loaded, own: Container[str] = ()) -> list[Act]:
+def list_acting(scene: Scene, bars: Loaded, own: Container[str] = ()) -> list[Act]:
     """List what loads and effects do at each state of the bars; gravity, the engine's own, is set once and for all.
 
     `own`: the keys of effects for which the engine has elements of its own.

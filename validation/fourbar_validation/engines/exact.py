@@ -11,16 +11,16 @@ from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED
-from fourbar_validation.engines.description import SHARED, speeds, unknown_effect
-from fourbar_validation.engines.loop import blank
+from fourbar_validation.engines.description import SHARED, find_unknown, list_speeds
+from fourbar_validation.engines.loop import make_blank
 
 NAME = "ball-arithmetic"
 KNOWN = tuple(kind.key for kind in (Gravity, Viscous, Friction, Springs, Torsion, Flywheel))
 
 
-def unknown(scene: Scene) -> str:
+def find_refusal(scene: Scene) -> str:
     """Give the reason to refuse a scene, if any."""
-    return unknown_effect(scene, KNOWN)
+    return find_unknown(scene, KNOWN)
 
 
 class BallArithmetic:
@@ -32,18 +32,18 @@ class BallArithmetic:
         """Answer, or refuse by naming an effect that it does not know."""
         from flint import arb
 
-        from fourbar_validation.engines.balls import outputs, stored
+        from fourbar_validation.engines.balls import compute_outputs, make_balls
 
-        if reason := unknown(scene):
+        if reason := find_refusal(scene):
             return Answer(NAME, "exact", refusal=reason)
         n = len(command.theta_2)
         names = [q for q in COMPARED if command.omega_2 is not None or q.startswith("theta")]
-        out, assembled, (omega, alpha) = blank(n, names), np.zeros(n, dtype=bool), speeds(command)
+        out, assembled, (omega, alpha) = make_blank(n, names), np.zeros(n, dtype=bool), list_speeds(command)
         for i in range(n):
             motion = {"omega_2": float(omega[i]), "alpha_2": float(alpha[i])}
-            exact = stored(scene, float(command.theta_2[i]), **motion)
+            exact = make_balls(scene, float(command.theta_2[i]), **motion)
             exact["theta_2"] += arb(0 if command.remainder is None else command.remainder)
-            values = outputs(scene, int(command.branch[i]), exact, scene.drive_bar)
+            values = compute_outputs(scene, int(command.branch[i]), exact, scene.drive_bar)
             if values is None:
                 continue
             assembled[i] = True
@@ -59,7 +59,7 @@ class BallArithmetic:
         )
 
 
-def sines(linkage: FourBar, command: Command) -> Array:
+def compute_sines(linkage: FourBar, command: Command) -> Array:
     """Compute sin(theta_4 - theta_3) of each position in many digits, (n,); NaN where the loop does not close."""
     from flint import arb, ctx
 
@@ -72,7 +72,7 @@ def sines(linkage: FourBar, command: Command) -> Array:
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         closed = closure(x | {"theta_2": arb(theta_2)}, branch)
         # with A on O4 bars 3 and 4 have no direction
-        result[i] = math.nan if closed is None else np.nan_to_num(_number(wedge(*closed[1:])))
+        result[i] = math.nan if closed is None else np.nan_to_num(_count_solutions(wedge(*closed[1:])))
     return result
 
 
@@ -80,10 +80,10 @@ def _put(out: dict[str, Array], i: int, values: dict[str, Any]) -> None:
     """Write the numbers of one position into those of all."""
     for name, array in out.items():
         if name in VECTORS:
-            array[i] = _number(values.get(f"{name}_x")), _number(values.get(f"{name}_y"))
+            array[i] = _count_solutions(values.get(f"{name}_x")), _count_solutions(values.get(f"{name}_y"))
         else:
-            array[i] = _number(values.get(name))
+            array[i] = _count_solutions(values.get(name))
 
 
-def _number(ball: Any) -> float:
+def _count_solutions(ball: Any) -> float:
     return math.nan if ball is None else float(ball.mid())

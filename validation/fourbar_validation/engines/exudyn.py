@@ -30,8 +30,8 @@ from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import ON_BARS, POINTS, parts, place, unknown_effect, within_half_a_turn
-from fourbar_validation.engines.effects import TERM_OF, acting
+from fourbar_validation.engines.description import ON_BARS, POINTS, find_unknown, list_parts, place, reduce_angle
+from fourbar_validation.engines.effects import TERM_OF, list_acting
 from fourbar_validation.engines.exudyn_elements import ELEMENT_OF, Bodies
 from fourbar_validation.engines.loaded import Loaded, Values
 from fourbar_validation.engines.loop import Exact
@@ -54,14 +54,14 @@ class ExudynBars(Loaded):
     )
 
     def __init__(self, scene: Scene) -> None:
-        if reason := unknown_effect(scene, TERM_OF, linear=True):
+        if reason := find_unknown(scene, TERM_OF, linear=True):
             raise LimitError(reason)
         exu.config.printToConsole = False
         self.container = exu.SystemContainer()
         self.mbs = mbs = self.container.AddSystem()
         bodies = Bodies(mbs, scene.linkage)
         self.body = bodies.body
-        of_bar = {part.bar: part for part in parts(scene.linkage)}
+        of_bar = {part.bar: part for part in list_parts(scene.linkage)}
         self.local = {name: (part.bar, [*at, 0.0]) for part in of_bar.values() for name, at in part.points.items()}
         end = {bar: part.points[f"end{bar}"] for bar, part in of_bar.items()}
         at = {
@@ -85,7 +85,7 @@ class ExudynBars(Loaded):
         for effect in scene.effects:
             if effect.key in ELEMENT_OF:
                 ELEMENT_OF[effect.key](effect, bodies)
-        self.ready(scene, acting(scene, self, ELEMENT_OF))
+        self.ready(scene, list_acting(scene, self, ELEMENT_OF))
         self.load = {}
         for bar in MOVING_BARS:
             mass = mbs.AddMarker(MarkerBodyMass(bodyNumber=self.body[bar]))
@@ -106,21 +106,21 @@ class ExudynBars(Loaded):
     def place(self, q: Sequence[float]) -> None:
         """Set the bars' angles; the pins O2, A and O4 are closed, in which Exudyn's constraints are linear."""
         of_3_to_2, theta_4 = q[1:]
-        theta_2 = within_half_a_turn(q[0])
+        theta_2 = reduce_angle(q[0])
         coordinates = np.zeros(SIZE)
         for bar, angle in zip(MOVING_BARS, (theta_2, theta_2 + of_3_to_2, theta_4), strict=True):
             coordinates[self.turn[bar]] = angle
         self.state.SetODE2Coordinates(coordinates)
-        jacobian, gap = self._constraint_jacobian(), self._constraint_gap()
+        jacobian, gap = self._read_constraint_jacobian(), self._read_constraint_gap()
         coordinates[self.shifts] = np.linalg.solve(jacobian[OTHER_ROWS][:, self.shifts], -gap[OTHER_ROWS])
         self.state.SetODE2Coordinates(coordinates)
         self.q, self.jacobians = coordinates, jacobian
 
-    def _constraint_gap(self) -> Array:
+    def _read_constraint_gap(self) -> Array:
         self.solver.ComputeAlgebraicEquations(self.mbs, False)
         return np.array(self.solver.GetSystemResidual())[SIZE:]
 
-    def _constraint_jacobian(self) -> Array:
+    def _read_constraint_jacobian(self) -> Array:
         self.solver.SetSystemJacobian(np.zeros((2 * SIZE, 2 * SIZE)))  # what is computed is added
         self.solver.ComputeJacobianAE(
             self.mbs, scalarFactor_ODE2=1.0, scalarFactor_ODE2_t=0.0, scalarFactor_ODE1=0.0, velocityLevel=False
@@ -129,7 +129,7 @@ class ExudynBars(Loaded):
 
     def gap(self) -> tuple[float, float]:
         """B on bar 3 minus B on bar 4, from the constraint of pin B."""
-        x, y = self._constraint_gap()[B_ROWS].tolist()
+        x, y = self._read_constraint_gap()[B_ROWS].tolist()
         return x, y
 
     def jacobian(self) -> Array:
@@ -143,17 +143,17 @@ class ExudynBars(Loaded):
         """Read its coordinate, within half a turn; the ground's line as described."""
         return self.ground_angle if bar == 1 else math.remainder(self.q[self.turn[bar]], math.tau)
 
-    def _output(self, kind: Any, name: str) -> Array:
+    def _read_output(self, kind: Any, name: str) -> Array:
         bar, at = self.local[name]
         return np.array(self.mbs.GetObjectOutputBody(self.body[bar], kind, at)[:2])
 
     def point(self, name: str) -> Array:
         """Return a point of a body."""
-        return self._output(exu.OutputVariableType.Position, name)
+        return self._read_output(exu.OutputVariableType.Position, name)
 
     def acceleration(self, name: str) -> Array:
         """Return that of a point of a body, (2,), m/s^2."""
-        return self._output(exu.OutputVariableType.Acceleration, name)
+        return self._read_output(exu.OutputVariableType.Acceleration, name)
 
     def rotation(self, bar: int) -> Array:
         """Return that of the body."""
@@ -174,7 +174,7 @@ class ExudynBars(Loaded):
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
         """Speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
-        of_drive, commanded = self._constraint_jacobian(), np.eye(SIZE)[-1]  # a cylinder's is that of closed pins
+        of_drive, commanded = self._read_constraint_jacobian(), np.eye(SIZE)[-1]  # a cylinder's is that of closed pins
         jacobian = np.vstack((of_drive[:-1], np.eye(SIZE)[self.turn[bar]]))
         try:
             self.v = v = np.linalg.solve(jacobian, commanded * speed)
@@ -193,7 +193,7 @@ class ExudynBars(Loaded):
         inertial = np.array(self.solver.GetSystemMassMatrix()) @ a
 
         def balanced() -> dict[str, Any]:
-            unknowns = np.linalg.solve(of_drive.T, inertial - self._applied())
+            unknowns = np.linalg.solve(of_drive.T, inertial - self._sum_applied())
             pins = zip(JOINTS, unknowns[:-1].reshape(4, 2), strict=True)
             return {PIN_FORCE[pin]: force for pin, force in pins} | {self.driving: unknowns[-1]}
 
@@ -202,7 +202,7 @@ class ExudynBars(Loaded):
         except np.linalg.LinAlgError:  # no torque or force of the drive balances the linkage here
             return values
 
-    def _applied(self) -> Array:
+    def _sum_applied(self) -> Array:
         """Sum what acts, less what the speeds ask for, (9,)."""
         if self.terms:
             self.act()

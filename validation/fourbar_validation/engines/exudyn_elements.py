@@ -22,7 +22,7 @@ from exudyn.itemInterface import (
 )
 
 from fourbar.linkage import FourBar
-from fourbar_validation.engines.description import PINS, about_first_pin, parts, place
+from fourbar_validation.engines.description import PINS, about_first_pin, list_parts, place
 
 
 class Bodies:
@@ -32,7 +32,7 @@ class Bodies:
         self.mbs, self.ground_angle = mbs, linkage.ground_angle
         self.node: dict[int, Any] = {1: mbs.AddNode(NodePointGround())}
         self.body: dict[int, Any] = {1: mbs.AddObject(ObjectGround())}
-        for part in parts(linkage):
+        for part in list_parts(linkage):
             self.node[part.bar] = node = mbs.AddNode(NodeRigidBody2D())
             inertia = about_first_pin(linkage.bar(part.bar))
             body = ObjectRigidBody2D(mass=part.mass, inertia=inertia, centerOfMass=part.centre, nodeNumber=node)
@@ -53,14 +53,14 @@ class Bodies:
         return self.mbs.AddMarker(MarkerBodyRigid(bodyNumber=self.body[bar], localHT=frame))
 
 
-def _viscous(effect: Any, bodies: Bodies) -> None:
+def _add_viscous(effect: Any, bodies: Bodies) -> None:
     """`CoordinateSpringDamper` between the two directions."""
     for pin, damping in effect.coefficients:
         markers = [bodies.direction(bar) for bar in PINS[pin]]
         bodies.mbs.AddObject(ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, damping=damping))
 
 
-def _torsion(effect: Any, bodies: Bodies) -> None:
+def _add_torsion(effect: Any, bodies: Bodies) -> None:
     """`TorsionalSpringDamper`, which measures within half a turn of rest between axes that coincide there."""
     for pin, stiffness, rest, preload in effect.springs:
         one, other = PINS[pin]
@@ -70,7 +70,7 @@ def _torsion(effect: Any, bodies: Bodies) -> None:
         bodies.mbs.AddObject(spring)
 
 
-def _springs(effect: Any, bodies: Bodies) -> None:
+def _add_springs(effect: Any, bodies: Bodies) -> None:
     """`SpringDamper` between two points."""
     for spring in effect.springs:
         ends = (spring.start, spring.end)
@@ -84,5 +84,9 @@ def _springs(effect: Any, bodies: Bodies) -> None:
         )
 
 
-ELEMENT_OF: dict[str, Callable[[Any, Bodies], None]] = {"viscous": _viscous, "torsion": _torsion, "springs": _springs}
+ELEMENT_OF: dict[str, Callable[[Any, Bodies], None]] = {
+    "viscous": _add_viscous,
+    "torsion": _add_torsion,
+    "springs": _add_springs,
+}
 """By the key of an effect."""

@@ -16,19 +16,26 @@ from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.line import DriveLine, line_of
-from fourbar_validation.engines.description import FORCE_AT, SHARED, about_first_pin, centre, speeds, unknown_effect
+from fourbar_validation.compare.line import DriveLine, place_line
+from fourbar_validation.engines.description import (
+    FORCE_AT,
+    SHARED,
+    about_first_pin,
+    find_centre,
+    find_unknown,
+    list_speeds,
+)
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
 from fourbar_validation.engines.free_body_effects import (
     WRENCH_OF,
     BodyMotion,
     BodyWrenches,
-    acting,
-    polar,
-    sliding_pins,
-    wound,
+    find_wound,
+    list_sliding_pins,
+    make_vector,
+    sum_acting,
 )
-from fourbar_validation.engines.free_body_stroke import cylinder_of, turned_by
+from fourbar_validation.engines.free_body_stroke import find_angle, measure_cylinder
 
 NAME = "free-body"
 COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
@@ -58,7 +65,7 @@ class FreeBody:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming an effect that it does not know."""
-        if reason := unknown_effect(scene, WRENCH_OF, linear=True):
+        if reason := find_unknown(scene, WRENCH_OF, linear=True):
             return Answer(NAME, "exact", refusal=reason)
         if command.bar != 2 and scene.counts_turns:
             return Answer(
@@ -66,7 +73,7 @@ class FreeBody:
             )
         asked = command
         if command.stroke is not None:
-            command = turned_by(command, scene.motion, *cylinder_of(scene))
+            command = find_angle(command, scene.motion, *measure_cylinder(scene))
         bar, closed = command.bar, close(scene.linkage, command.angle, command.branch, command.bar)
         theta = np.insert(closed.theta, bar - 2, command.angle, axis=0)
         answer = Answer(
@@ -74,51 +81,54 @@ class FreeBody:
             "exact",
             at=asked,
             assembled=closed.assembled,
-            quantities=_places(scene.linkage, *theta),
+            quantities=_compute_places(scene.linkage, *theta),
             evidence={"closure_gap": float(np.max(closed.gap, initial=0.0, where=closed.assembled))},
             shared=SHARED,
             own="assembly (Newton on the two closure equations), speeds and accelerations (own 2x2 Jacobian), every "
             "effect from its definition, the thirteen equations of the free bodies as one system",
         )
         if command.speed is not None:
-            commanded = (theta[0], *speeds(command), *theta[1:])
+            commanded = (theta[0], *list_speeds(command), *theta[1:])
             blocks = [slice(start, start + BLOCK) for start in range(0, len(command.angle), BLOCK)]
-            parts = [_answered(scene, bar, *(array[block] for array in commanded)) for block in blocks]
+            parts = [_answer_positions(scene, bar, *(array[block] for array in commanded)) for block in blocks]
             answer.evidence["residual"] = max((residual for _, residual in parts), default=0.0)
             for name in parts[0][0] if parts else ():
                 answer.quantities[name] = np.concatenate([part[name] for part, _ in parts])
         return answer
 
 
-def _places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> dict[str, Array]:
+def _compute_places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: Array) -> dict[str, Array]:
     """Compute the angles of bars 3 and 4, their sine, pins A, B and the mass centres."""
     unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
     O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
     first_pin = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
     result = {"theta_2": theta_2, "theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
-    result |= {"A": _plane(first_pin[3]), "B": _plane(O4 + linkage.output.length * unit[4])}
+    result |= {"A": _split_components(first_pin[3]), "B": _split_components(O4 + linkage.output.length * unit[4])}
     for bar in MOVING_BARS:
-        result[f"G{bar}"] = _plane(first_pin[bar] + polar(centre(linkage.bar(bar))) * unit[bar])
+        result[f"G{bar}"] = _split_components(first_pin[bar] + make_vector(find_centre(linkage.bar(bar))) * unit[bar])
     return result
 
 
-def _answered(
+def _answer_positions(
     scene: Scene, commanded: int, theta_2: Array, speed: Array, acceleration: Array, theta_3: Array, theta_4: Array
 ) -> tuple[dict[str, Array], float]:
     """Motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
     motion = move(scene.linkage, theta_2, speed, acceleration, theta_3, theta_4, commanded)
     unknowns, residual, from_jamming = balance(scene, motion)
     drive = COUPLE if scene.drive is None else LINE
-    if (gone := wound(scene, motion)) is not None:
+    if (gone := find_wound(scene, motion)) is not None:
         unknowns[gone] = np.nan
     result = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
     for bar in MOVING_BARS:
         result |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
     a_A = motion.swing(2, motion.first_pin[3])
-    result["drive_condition"] = _drive_condition(scene, motion) * from_jamming
-    result |= {"a_A": _plane(a_A), "a_B": _plane(motion.swing(4, scene.linkage.output.length * motion.unit[4]))}
+    result["drive_condition"] = _compute_drive_condition(scene, motion) * from_jamming
+    result |= {
+        "a_A": _split_components(a_A),
+        "a_B": _split_components(motion.swing(4, scene.linkage.output.length * motion.unit[4])),
+    }
     for bar in MOVING_BARS:
-        result[f"a_G{bar}"] = _plane(motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0))
+        result[f"a_G{bar}"] = _split_components(motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0))
     if any(effect.dry for effect in scene.effects):
         ends = []
         for side in (1.0, -1.0):
@@ -132,18 +142,18 @@ def _answered(
     return result | {drive.value: unknowns[:, DRIVE]}, residual
 
 
-def _drive_condition(scene: Scene, motion: BodyMotion) -> Array:
+def _compute_drive_condition(scene: Scene, motion: BodyMotion) -> Array:
     """Compute the sine between the bars that are not driven, or the leverage of a line."""
-    if (line := _line(scene, motion)) is not None:
+    if (line := _place_line(scene, motion)) is not None:
         return line.condition
     one, other = (motion.unit[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
     return np.asarray(np.abs(cross(one, other)))
 
 
-def _line(scene: Scene, motion: BodyMotion) -> DriveLine | None:
+def _place_line(scene: Scene, motion: BodyMotion) -> DriveLine | None:
     """Place the line of a linear drive."""
     theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
-    return None if scene.drive is None else line_of(scene.linkage, scene.drive, theta)
+    return None if scene.drive is None else place_line(scene.linkage, scene.drive, theta)
 
 
 def move(
@@ -162,11 +172,11 @@ def move(
     u_3, u_4 = np.exp(1j * theta_3), np.exp(1j * theta_4)
     length, round_ = {2: a, 3: b, 4: c}, {2: u_2, 3: u_3, 4: -u_4}  # bar 4 is gone along from B to O4
     others = [each for each in MOVING_BARS if each != bar]
-    jacobian = np.stack([_plane(round_[each]) for each in others], axis=-1)
+    jacobian = np.stack([_split_components(round_[each]) for each in others], axis=-1)
 
     def rates(stated: Array, centripetal: Complex) -> dict[int, Array]:
-        right = _plane(-length[bar] * stated * round_[bar] - 1j * centripetal)
-        found = solved(jacobian, right[..., None])[0][..., 0].T
+        right = _split_components(-length[bar] * stated * round_[bar] - 1j * centripetal)
+        found = solve_system(jacobian, right[..., None])[0][..., 0].T
         return {bar: stated} | {each: v / length[each] for each, v in zip(others, found, strict=True)}
 
     zero = np.zeros(n, dtype=complex)
@@ -179,29 +189,29 @@ def move(
 
 def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | float]:
     """Solve for the thirteen unknowns (n, 13), N and N m, their residual, and how far friction is from jamming."""
-    unknowns, loads, arms, residual = _with_unit_couples(scene, motion)
+    unknowns, loads, arms, residual = _solve_unit_couples(scene, motion)
     total: Array = unknowns[..., 0]
     from_jamming: Array | float = 1.0
     if len(arms):
-        couples = slide(loads[..., 0], loads[..., 1:], arms)
-        from_jamming = distance_from_jamming(loads[..., 0], loads[..., 1:], arms, couples)
+        couples = grow_couples(loads[..., 0], loads[..., 1:], arms)
+        from_jamming = compute_distance_from_jamming(loads[..., 0], loads[..., 1:], arms, couples)
         total = total + (unknowns[..., 1:] * couples[:, None, :]).sum(axis=-1)
     return total, residual, from_jamming
 
 
-def _with_unit_couples(scene: Scene, motion: BodyMotion) -> tuple[Array, Complex, Array, float]:
+def _solve_unit_couples(scene: Scene, motion: BodyMotion) -> tuple[Array, Complex, Array, float]:
     """Solve without sliding friction and per N m of it at each pin, (n, 13, 1 + p).
 
     Returns also the loads of these pins as complex numbers (n, p, 1 + p), mu r of each (m), and the residual.
     """
-    pins, wrenches = sliding_pins(scene), acting(scene, motion)
+    pins, wrenches = list_sliding_pins(scene), sum_acting(scene, motion)
     _add_inertia(motion, wrenches)
-    columns = [_right(motion.linkage, wrenches)]
+    columns = [_make_right_sides(motion.linkage, wrenches)]
     for pin in pins:
         unit = BodyWrenches(len(motion.theta_2))
         unit.twist_at(pin, -motion.sense(pin))
-        columns.append(_right(motion.linkage, unit))
-    unknowns, residual = solved(_matrix(scene, motion), np.stack(columns, axis=-1))
+        columns.append(_make_right_sides(motion.linkage, unit))
+    unknowns, residual = solve_system(_make_matrix(scene, motion), np.stack(columns, axis=-1))
     if scene.drive is None:
         unknowns[:, DRIVE] *= motion.linkage.bar(scene.drive_bar).length
     first = [COLUMN[FORCE_AT[pin]] for pin in pins]
@@ -209,16 +219,18 @@ def _with_unit_couples(scene: Scene, motion: BodyMotion) -> tuple[Array, Complex
     return unknowns, loads, np.array(list(pins.values())), residual
 
 
-def solutions(scene: Scene, command: Command) -> Array:
+def count_solutions(scene: Scene, command: Command) -> Array:
     """Count the pin forces and friction couples that balance the linkage at each position, where it moves, (n,)."""
     closed = close(scene.linkage, command.angle, command.branch, command.bar)
     theta = np.insert(closed.theta, command.bar - 2, command.angle, axis=0)
-    motion = move(scene.linkage, theta[0], *speeds(command), theta[1], theta[2], command.bar)
-    _, loads, arms, _ = _with_unit_couples(scene, motion)
-    return np.array([_number(F, C, arms) for F, C in zip(loads[..., 0], loads[..., 1:], strict=True)], dtype=float)
+    motion = move(scene.linkage, theta[0], *list_speeds(command), theta[1], theta[2], command.bar)
+    _, loads, arms, _ = _solve_unit_couples(scene, motion)
+    return np.array(
+        [_count_at_position(F, C, arms) for F, C in zip(loads[..., 0], loads[..., 1:], strict=True)], dtype=float
+    )
 
 
-def _number(F: Complex, C: Complex, k: Array) -> int:
+def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
     """Count at one position: one where the couples are a contraction, else those reached from many starts."""
     if not (np.isfinite(F).all() and np.isfinite(C).all()):
         return 0
@@ -228,7 +240,7 @@ def _number(F: Complex, C: Complex, k: Array) -> int:
     size = float((k * np.abs(F)).max()) or 1.0
     x = size * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1)) * rng.uniform(0.0, 1.0, (n, len(k)))
     many = (np.broadcast_to(F, (n, *F.shape)), np.broadcast_to(C, (n, *C.shape)))
-    x, settled, _ = _newton(*many, k, x)
+    x, settled, _ = _improve_couples(*many, k, x)
     result: list[Array] = []
     for each in x[settled & (x >= 0.0).all(axis=1)]:
         if all(np.abs(each - other).max() > APART * max(each.max(), other.max()) for other in result):
@@ -246,7 +258,7 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
     wrenches.push(3, -motion.linkage.coupler.mass * motion.swing(2, motion.first_pin[3]), motion.to_centre(3))
 
 
-def _matrix(scene: Scene, motion: BodyMotion) -> Array:
+def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
     """Rows: forces on bars 2, 3, 4 and moments over the bar's length, reactions at A and B; (n, 13, 13).
 
     The last column is the torque over the driven bar's length, so that every number is 0, 1 or of a unit vector; of a
@@ -258,29 +270,29 @@ def _matrix(scene: Scene, motion: BodyMotion) -> Array:
             matrix[:, row, COLUMN[force]] = matrix[:, row + 1, COLUMN[force] + 1] = 1.0
         u = motion.unit[bar]
         matrix[:, row + 2, COLUMN[second]], matrix[:, row + 2, COLUMN[second] + 1] = -u.imag, u.real
-    if (line := _line(scene, motion)) is None:
+    if (line := _place_line(scene, motion)) is None:
         matrix[:, ROWS[scene.drive_bar][0] + 2, DRIVE] = 1.0
     else:
         unit = BodyWrenches(len(motion.theta_2))
         for sense, point, arm in zip((-1.0, 1.0), (line.drive.start, line.drive.end), line.arms, strict=True):
             unit.push(point.bar, sense * line.unit, arm)
-        matrix[:, :, DRIVE] = -_right(motion.linkage, unit)
+        matrix[:, :, DRIVE] = -_make_right_sides(motion.linkage, unit)
     for row, (force, reaction) in ((9, ("F32", "F23")), (11, ("F43", "F34"))):
         for axis in (0, 1):
             matrix[:, row + axis, COLUMN[force] + axis] = matrix[:, row + axis, COLUMN[reaction] + axis] = 1.0
     return matrix
 
 
-def _right(linkage: FourBar, wrenches: BodyWrenches) -> Array:
+def _make_right_sides(linkage: FourBar, wrenches: BodyWrenches) -> Array:
     """Right-hand sides, (n, 13), N."""
     right = np.zeros((len(wrenches.moment[2]), 13))
     for bar, (row, _, _) in ROWS.items():
-        right[:, row : row + 2] = -_plane(wrenches.force[bar])
+        right[:, row : row + 2] = -_split_components(wrenches.force[bar])
         right[:, row + 2] = -wrenches.moment[bar] / linkage.bar(bar).length
     return right
 
 
-def solved(matrix: Array, right: Array) -> tuple[Array, float]:
+def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
     """Solutions, NaN where the matrix is singular, and the largest residual relative to |matrix| |x| + |right|.
 
     One step of refinement makes each equation hold to the rounding of its own terms.
@@ -296,7 +308,7 @@ def solved(matrix: Array, right: Array) -> tuple[Array, float]:
     return x, float(np.max(remaining, initial=0.0, where=np.isfinite(remaining)))
 
 
-def slide(F: Complex, C: Complex, k: Array) -> Array:
+def grow_couples(F: Complex, C: Complex, k: Array) -> Array:
     """Grow the couples x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p), from none; NaN where that ends in a jam.
 
     Parameters
@@ -309,7 +321,9 @@ def slide(F: Complex, C: Complex, k: Array) -> Array:
     remaining = np.flatnonzero(np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2)))
     x[remaining] = 0.0
     for stage in range(1, FRICTION_STAGES + 1):
-        x[remaining], settled, det = _newton(F[remaining], C[remaining], k * (stage / FRICTION_STAGES), x[remaining])
+        x[remaining], settled, det = _improve_couples(
+            F[remaining], C[remaining], k * (stage / FRICTION_STAGES), x[remaining]
+        )
         # without friction the determinant is 1: where it changes its sign the growth has turned back, into a jam
         grown = settled & (det > 0.0) & (x[remaining] >= 0.0).all(axis=1)
         x[remaining[~grown]] = np.nan
@@ -317,31 +331,31 @@ def slide(F: Complex, C: Complex, k: Array) -> Array:
     return x
 
 
-def distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
-    """Least singular value of the slope of the equations of `slide` at their solution, at most 1, (n,)."""
+def compute_distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
+    """Least singular value of the slope of the equations of `grow_couples` at their solution, at most 1, (n,)."""
     with np.errstate(invalid="ignore"):
-        _, matrix = _slope(F, C, k, x)
+        _, matrix = _compute_slope(F, C, k, x)
     far = np.full(len(x), np.nan)
     known = np.isfinite(matrix).all(axis=(1, 2))
     far[known] = np.minimum(np.linalg.svd(matrix[known], compute_uv=False)[:, -1], 1.0)
     return far
 
 
-def _slope(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, Array]:
-    """Compute the loads of the pins under some couples, (n, p), N, and the slope of `slide`'s equations, (n, p, p)."""
+def _compute_slope(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, Array]:
+    """Compute the loads of the pins under some couples, (n, p), N, and the slope of `grow_couples`, (n, p, p)."""
     force = F + (C * x[:, None, :]).sum(axis=-1)
     size = np.abs(force)
     direction = force / np.where(size == 0.0, 1.0, size)
     return size, np.eye(len(k)) - k[:, None] * (np.conj(direction)[..., None] * C).real
 
 
-def _newton(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_], Array]:
+def _improve_couples(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_], Array]:
     """Improve the couples from those of a smaller friction; return also the determinant of their slope."""
     for _ in range(FRICTION_STEPS):
-        size, matrix = _slope(F, C, k, x)
+        size, matrix = _compute_slope(F, C, k, x)
         gap, terms = k * size - x, k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))
         settled = (np.abs(gap) <= FRICTION_SETTLED * terms).all(axis=1)
-        step = solved(matrix, gap[..., None])[0][..., 0]
+        step = solve_system(matrix, gap[..., None])[0][..., 0]
         moving = ~settled & np.isfinite(step).all(axis=1)
         if not moving.any():
             break
@@ -349,6 +363,6 @@ def _newton(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[
     return x, settled, np.linalg.det(matrix)
 
 
-def _plane(vectors: Complex) -> Array:
+def _split_components(vectors: Complex) -> Array:
     """Components, (n, 2)."""
     return np.stack((vectors.real, vectors.imag), axis=-1)

@@ -58,12 +58,12 @@ def close(linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2
     # the gap is least where bars 3 and 4 lie along the diagonal
     possible = np.maximum(e - (b + c), abs(b - c) - e) <= closed
     found, gap = np.full((2, len(e)), np.nan), np.full(len(e), np.nan)
-    for alpha, beta in [(_between(e, b, c), _between(e, c, b)), *np.radians(STARTS)]:
+    for alpha, beta in [(_compute_angle_between(e, b, c), _compute_angle_between(e, c, b)), *np.radians(STARTS)]:
         remaining = np.flatnonzero(possible & np.isnan(gap))
         if not len(remaining):
             break
         start = np.array([phi + branch * alpha, phi + np.pi - branch * beta])[:, remaining]
-        found[:, remaining], gap[remaining] = _newton(diagonal[remaining], b, c, branch[remaining], start, closed)
+        found[:, remaining], gap[remaining] = _solve_newton(diagonal[remaining], b, c, branch[remaining], start, closed)
     assembled = np.isfinite(gap)
     missed = possible & ~assembled & (np.maximum(e - (b + c), abs(b - c) - e) < -closed)
     if missed.any():
@@ -75,14 +75,14 @@ def close(linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2
     return Closed(assembled, np.angle(np.exp(1j * found)), gap)
 
 
-def _between(e: Array, near: float, far: float) -> Array:
+def _compute_angle_between(e: Array, near: float, far: float) -> Array:
     """Compute the angle between the sides e and near, by half-angle tangents; bars 3 and 4 are never in line."""
     above, below = (e - near + far) * (far + near - e), (e + near - far) * (e + near + far)
     angle = 2.0 * np.arctan2(np.sqrt(np.maximum(above, 0.0)), np.sqrt(np.maximum(below, 0.0)))
     return np.clip(angle, IN_LINE, np.pi - 2.0 * IN_LINE)
 
 
-def _newton(
+def _solve_newton(
     diagonal: Complex, b: float, c: float, branch: NDArray[np.int8], theta: Array, closed: float
 ) -> tuple[Array, Array]:
     """theta_3, theta_4 (2, n) and the gap left (n,), NaN where it does not come down to `closed`.

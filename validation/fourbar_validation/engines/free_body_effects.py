@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene, command
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import PINS, centre
+from fourbar_validation.engines.description import PINS, find_centre
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
@@ -37,7 +37,7 @@ class BodyMotion(NamedTuple):
 
     def to_centre(self, bar: int) -> Complex:
         """Return the vector from the first pin of a moving bar to its mass centre, m."""
-        return self.unit[bar] * polar(centre(self.linkage.bar(bar)))
+        return self.unit[bar] * make_vector(find_centre(self.linkage.bar(bar)))
 
     def swing(self, bar: int, arm: Complex) -> Complex:
         """Acceleration of the end of an arm of a bar about its first pin, m/s^2."""
@@ -97,44 +97,46 @@ FOLLOWED = np.radians(2.0)
 """Step in which angles are followed from where a motion begins, rad."""
 
 
-def polar(pair: Any) -> complex:
+def make_vector(pair: Any) -> complex:
     """(distance, angle) as a vector."""
     length, angle = pair
     return complex(length * np.cos(angle), length * np.sin(angle))
 
 
-def _gravity(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _apply_gravity(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Apply m g at every mass centre."""
     for bar in MOVING_BARS:
         wrenches.push(
-            bar, motion.linkage.bar(bar).mass * polar((effect.magnitude, effect.angle)), motion.to_centre(bar)
+            bar, motion.linkage.bar(bar).mass * make_vector((effect.magnitude, effect.angle)), motion.to_centre(bar)
         )
 
 
-def _viscous(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _apply_viscous(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Couple -k (omega_j - omega_i)."""
     for pin, k in effect.coefficients:
         wrenches.twist_at(pin, -k * motion.slip(pin))
 
 
-def _friction(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _apply_friction(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Couple -f sign(omega_j - omega_i), none at rest."""
     for pin, f in effect.torques:
         wrenches.twist_at(pin, -f * motion.sense(pin))
 
 
-def _torsion(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _apply_torsion(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Couple -(preload + k (theta_j - theta_i - rest)), the angle within half a turn."""
     for pin, k, rest, preload in effect.springs:
         i, j = PINS[pin]
-        angle = np.angle(motion.unit[j] * np.conj(motion.unit[i]) * polar((1.0, -rest)))
+        angle = np.angle(motion.unit[j] * np.conj(motion.unit[i]) * make_vector((1.0, -rest)))
         wrenches.twist_at(pin, -(preload + k * angle))
 
 
-def _springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _apply_springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Pull preload + k (distance - length) along the line of the two points; none is known where they coincide."""
     for spring in effect.springs:
-        arms = [motion.unit[point.bar] * polar((point.distance, point.angle)) for point in (spring.start, spring.end)]
+        arms = [
+            motion.unit[point.bar] * make_vector((point.distance, point.angle)) for point in (spring.start, spring.end)
+        ]
         across = motion.first_pin[spring.end.bar] + arms[1] - motion.first_pin[spring.start.bar] - arms[0]
         if spring.preload == spring.stiffness * spring.length:
             pull = spring.stiffness * across
@@ -146,28 +148,28 @@ def _springs(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
         wrenches.push(spring.end.bar, -pull, arms[1])
 
 
-def _flywheel(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _apply_flywheel(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Couple -J alpha (d'Alembert)."""
     wrenches.twist(effect.bar, -effect.inertia * motion.alpha[effect.bar])
 
 
-def _later(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def _apply_nothing(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Nothing: it depends on the pin forces, and is solved with them."""
 
 
 WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
-    "gravity": _gravity,
-    "viscous": _viscous,
-    "friction": _friction,
-    "pin_friction": _later,
-    "torsion": _torsion,
-    "springs": _springs,
-    "flywheel": _flywheel,
+    "gravity": _apply_gravity,
+    "viscous": _apply_viscous,
+    "friction": _apply_friction,
+    "pin_friction": _apply_nothing,
+    "torsion": _apply_torsion,
+    "springs": _apply_springs,
+    "flywheel": _apply_flywheel,
 }
 """By the name under which a scene file knows an effect."""
 
 
-def acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
+def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
     """Everything that acts on the bars but pins, inertia, drive and what depends on the pin forces."""
     wrenches = BodyWrenches(len(motion.theta_2))
     for load in scene.loads:
@@ -180,20 +182,20 @@ def acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
 def _load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Apply a force at its point, from the mass centre, and a couple; in the bar's frame both rotate with the bar."""
     turned = motion.unit[load.bar] if load.frame == "bar" else 1.0
-    factor = 1.0 if load.table is None else _factor(load.table, motion.theta_2)
-    arm = motion.to_centre(load.bar) + turned * polar(load.at)
-    wrenches.push(load.bar, factor * turned * polar(load.force or (0.0, 0.0)), arm)
+    factor = 1.0 if load.table is None else _interpolate_factor(load.table, motion.theta_2)
+    arm = motion.to_centre(load.bar) + turned * make_vector(load.at)
+    wrenches.push(load.bar, factor * turned * make_vector(load.force or (0.0, 0.0)), arm)
     wrenches.twist(load.bar, factor * load.moment)
 
 
-def _factor(table: Any, theta_2: Array) -> Array:
+def _interpolate_factor(table: Any, theta_2: Array) -> Array:
     """Interpolate between the points; the angle is taken within half a turn of the middle of the table."""
     middle = 0.5 * (table.theta_2[0] + table.theta_2[-1])
     around = np.remainder(theta_2 - middle + np.pi, 2.0 * np.pi) - np.pi
     return np.asarray(np.interp(middle + around, table.theta_2, table.factor))
 
 
-def wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
+def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     """Find where a torsion spring is wound by more than half a turn from its rest, followed from the motion's start.
 
     None where no spring counts turns, or the motion changes its branch.
@@ -223,7 +225,7 @@ def wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     return gone
 
 
-def sliding_pins(scene: Scene) -> dict[str, float]:
+def list_sliding_pins(scene: Scene) -> dict[str, float]:
     """Return mu r of each pin whose friction depends on its load, m."""
     pins = [pin for effect in scene.effects if effect.key == "pin_friction" for pin in effect.pins]  # type: ignore[attr-defined]
     return {name: mu * r for name, mu, r in pins if mu * r != 0.0}

@@ -5,29 +5,29 @@ import numpy as np
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import components, place
+from fourbar_validation.engines.description import place, resolve
 
 HALVINGS = 80
 """Of half a turn: beyond the last digit of an angle."""
 
 
-def cylinder_of(scene: Scene) -> tuple[complex, complex]:
+def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     """Measure from the ground pin of its bar, at angle 0, to a cylinder's end on it, and to that on the ground, m."""
     drive = scene.drive
     assert drive is not None
     own, other = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
     pivot = 0.0j
     if own.bar == 4:
-        pivot = complex(*components(scene.linkage.ground, scene.linkage.ground_angle))
-    return complex(*components(own.distance, own.angle)), complex(*place(other, scene.linkage.ground_angle)) - pivot
+        pivot = complex(*resolve(scene.linkage.ground, scene.linkage.ground_angle))
+    return complex(*resolve(own.distance, own.angle)), complex(*place(other, scene.linkage.ground_angle)) - pivot
 
 
-def turned_by(command: Command, motion: Motion, arm: complex, ground: complex) -> Command:
+def find_angle(command: Command, motion: Motion, arm: complex, ground: complex) -> Command:
     """Find the bar's angle where its cylinder has the stroke, on the side that is stated, and its rates.
 
     Parameters
     ----------
-    arm, ground : as `cylinder_of` has them, or as an engine measures them.
+    arm, ground : as `measure_cylinder` has them, or as an engine measures them.
     """
     assert command.stroke is not None
     sense = 1.0 if motion.side == "left" else -1.0

@@ -6,7 +6,7 @@ from functools import cache
 from fourbar.scene import Scene
 from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY
 from fourbar_validation.engines.exact import BallArithmetic
-from fourbar_validation.engines.prediction import from_data
+from fourbar_validation.engines.prediction import predict_from_data
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.scenes.hard_families import FAMILIES
 
@@ -19,14 +19,14 @@ BALLS = Witness(
 )
 
 
-def predicting(witness: Witness) -> Witness:
+def hold_fully(witness: Witness) -> Witness:
     """Hold the witness to full accuracy, or else to the error predicted for each position."""
     if witness.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return witness
-    return replace(witness, tolerance=FULL_ACCURACY, predictor=witness.predictor or from_data)
+    return replace(witness, tolerance=FULL_ACCURACY, predictor=witness.predictor or predict_from_data)
 
 
-HARD_WITNESSES = tuple(predicting(witness) for witness in (BALLS, *WITNESSES))
+HARD_WITNESSES = tuple(hold_fully(witness) for witness in (BALLS, *WITNESSES))
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +36,15 @@ class Hard:
     families: tuple[str, ...] = tuple(family.name for family in FAMILIES)
 
     def __len__(self) -> int:
-        return len(_scenes(self.families))
+        return len(_make_scenes(self.families))
 
     def name(self, index: int) -> str:
         """Name a scene; ascending."""
-        return _scenes(self.families)[index][0]
+        return _make_scenes(self.families)[index][0]
 
     def scene(self, index: int) -> Scene:
         """Return the scene itself."""
-        return _scenes(self.families)[index][1]
+        return _make_scenes(self.families)[index][1]
 
     def fingerprint(self) -> str:
         """Name the families and count their scenes."""
@@ -52,7 +52,7 @@ class Hard:
 
 
 @cache
-def _scenes(families: tuple[str, ...]) -> list[tuple[str, Scene]]:
+def _make_scenes(families: tuple[str, ...]) -> list[tuple[str, Scene]]:
     """Make the scenes of some families, by name."""
     result = []
     for family in FAMILIES:

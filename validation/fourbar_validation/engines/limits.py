@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.mjcf.document import load_ratio
+from fourbar.mjcf.document import compute_load_ratio
 from fourbar.scene import Scene
 
 
@@ -86,7 +86,7 @@ LIMITS = (
 )
 
 
-def too_fast_or_loaded(scene: Scene, speed: float) -> str | None:
+def find_exceeded(scene: Scene, speed: float) -> str | None:
     """Name the limit of speed, load or place of a centre that a scene passes, if any; speed in rad/s."""
     if speed > FASTEST.boundary:
         return FASTEST.reason
@@ -95,12 +95,12 @@ def too_fast_or_loaded(scene: Scene, speed: float) -> str | None:
     centres = (abs(scene.linkage.bar(number).mass_centre[0]) for number in MOVING_BARS)
     if any(0.0 < r < NEAREST_CENTRE.boundary for r in centres):
         return NEAREST_CENTRE.reason
-    if load_ratio(scene) > HEAVIEST.boundary:
+    if compute_load_ratio(scene) > HEAVIEST.boundary:
         return HEAVIEST.reason
     return None
 
 
-def least_sine(linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArray[np.bool_]) -> float:
+def compute_least_sine(linkage: FourBar, theta_2: NDArray[np.float64], assembled: NDArray[np.bool_]) -> float:
     """Compute the least |sin(theta_4 - theta_3)| between assembled neighbours, by the cosine rule."""
     d, a, b, c = linkage.lengths
     psi = np.sort(theta_2[assembled] - linkage.ground_angle)

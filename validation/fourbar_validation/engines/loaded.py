@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FORCE_AT, components, driving, rotate, rotate_by
+from fourbar_validation.engines.description import FORCE_AT, name_driving, resolve, rotate, rotate_by
 
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive
@@ -95,7 +95,7 @@ class Loaded(EngineBars, Protocol):
     def ready(self, scene: Scene, terms: list[Act]) -> None:
         """To be called by an engine that has its bars, with what acts on them."""
         self.ground_angle, self.drive_bar, self.terms = scene.linkage.ground_angle, scene.drive_bar, terms
-        self.linear, self.driving = scene.drive, driving(scene)
+        self.linear, self.driving = scene.drive, name_driving(scene)
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
 
     # what the engine gives
@@ -130,7 +130,7 @@ class Loaded(EngineBars, Protocol):
 
     def end(self, point: "SpringEnd") -> Array:
         """Locate an end of a spring or of a linear drive, m, (2,)."""
-        return self.first_pin(point.bar) + self.rotate(point.bar, *components(point.distance, point.angle))
+        return self.first_pin(point.bar) + self.rotate(point.bar, *resolve(point.distance, point.angle))
 
     def cylinder(self, bar: int) -> tuple[complex, complex]:
         """Measure it with the bars laid down along +x."""
@@ -173,7 +173,7 @@ class Loaded(EngineBars, Protocol):
 
     def act(self) -> None:
         """Sum anew what acts on the bars at their present motion."""
-        self.wrenches = no_wrenches()
+        self.wrenches = make_no_wrenches()
         for act in self.terms:
             act()
 
@@ -195,9 +195,9 @@ class Loaded(EngineBars, Protocol):
                 break
             before, self.pin_loads = change, loads
             forces = balanced()
-        return self._grown(balanced) if self.loaded else forces
+        return self._grow(balanced) if self.loaded else forces
 
-    def _grown(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    def _grow(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Grow friction from none, where passes run away; nothing where the growth ends in a jam.
 
         By Newton's steps, the slopes from passes with each load changed a little.
@@ -228,6 +228,6 @@ class Loaded(EngineBars, Protocol):
         return forces
 
 
-def no_wrenches() -> dict[int, list[float]]:
+def make_no_wrenches() -> dict[int, list[float]]:
     """Return those of bars on which nothing acts."""
     return {bar: [0.0, 0.0, 0.0] for bar in MOVING_BARS}

@@ -13,9 +13,9 @@ from fourbar.errors import LimitError
 from fourbar.quantities import ANGLES, OF_LINE, PIN_FORCES, STAGE_OF, STAGES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.engines.description import SHARED, driving, speeds, unknowns, within_half_a_turn
+from fourbar_validation.engines.description import SHARED, list_speeds, list_unknowns, name_driving, reduce_angle
 from fourbar_validation.engines.free_body_closure import LONGEST_STEP, NEWTON_STEPS, STARTS
-from fourbar_validation.engines.free_body_stroke import turned_by
+from fourbar_validation.engines.free_body_stroke import find_angle
 from fourbar_validation.engines.loaded import Assembled, EngineBars, Values
 
 START_ANGLES = np.radians(STARTS).tolist()
@@ -51,7 +51,7 @@ class Assembler:
     def find(self, theta: float, branch: int) -> Angles | None:
         """Assemble on the branch and place the tree there; None where the loop does not close."""
         tree, bar = self.tree, self.bar
-        theta = theta if bar == 2 else within_half_a_turn(theta)
+        theta = theta if bar == 2 else reduce_angle(theta)
         tree.place([theta if each == bar else 0.0 for each in (2, 3, 4)])
         at = tree.positions()
         along = {2: at.get("A2", at["A"]), 3: at["B"] - at["A"], 4: at["B4"] - at["O4"]}
@@ -66,13 +66,13 @@ class Assembler:
             return None
         phi = math.atan2(diagonal[1], diagonal[0])
         # the triangle as measured is the nearest start, also where a bar is a millionth of the others
-        triangle = _triangle_angle(e, near, far), _triangle_angle(e, far, near)
+        triangle = _compute_triangle_angle(e, near, far), _compute_triangle_angle(e, far, near)
         for alpha, beta in (triangle, *START_ANGLES):
             one, other = phi + branch * alpha, phi + math.pi - branch * beta
             around = {2: (theta, one, other), 3: (one, theta, other), 4: (other + math.pi, one, theta)}
             theta_2, theta_3, theta_4 = around[bar]
             q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
-            result = newton(tree, q, branch, closed, bar)
+            result = close_gap(tree, q, branch, closed, bar)
             if result is not None:
                 return result
         if max(e - (near + far), abs(near - far) - e) < -closed:
@@ -80,13 +80,13 @@ class Assembler:
         return None
 
 
-def _triangle_angle(e: float, near: float, far: float) -> float:
+def _compute_triangle_angle(e: float, near: float, far: float) -> float:
     """Compute the angle between the sides e and near, by half-angle tangents."""
     above, below = (e - near + far) * (far + near - e), (e + near - far) * (e + near + far)
     return 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
 
 
-def newton(tree: Assembled, q: Angles, branch: int, closed: float, bar: int = 2) -> Angles | None:
+def close_gap(tree: Assembled, q: Angles, branch: int, closed: float, bar: int = 2) -> Angles | None:
     """Close the gap with a bar held, never leaving the branch.
 
     The determinant of the gap's derivative by the angles of the others, for bar 2 -b c sin(theta_4 - theta_3), has the
@@ -154,9 +154,9 @@ class Exact:
         names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
         names += [name for name in found if name not in names]
         if command.stroke is not None:
-            command = turned_by(command, scene.motion, *bars.cylinder(command.bar))
-        names = unknowns(scene, names)
-        names += [f"{driving(scene)}_inertia"] if bars.alone and moves else []
+            command = find_angle(command, scene.motion, *bars.cylinder(command.bar))
+        names = list_unknowns(scene, names)
+        names += [f"{name_driving(scene)}_inertia"] if bars.alone and moves else []
 
         def read(q: Angles, speed: float, acceleration: float) -> Values:
             points, theta_3, theta_4 = bars.positions(), bars.angle(3), bars.angle(4)
@@ -165,7 +165,7 @@ class Exact:
             values |= {"theta_2": bars.angle(2)} if found else {}
             return values | (bars.move(command.bar, speed, acceleration) if moves else {})
 
-        out, assembled, gap = at_each(bars, command, names, read)
+        out, assembled, gap = read_each(bars, command, names, read)
         if reason := bars.refusal():
             return Answer(self.name, "exact", refusal=reason)
         for name in ANGLES:
@@ -179,11 +179,11 @@ Read = Callable[[Angles, float, float], Values]
 """Of the configuration in which the bars stand, speed and acceleration of the commanded bar: values by name."""
 
 
-def at_each(
+def read_each(
     bars: Assembled, command: Command, names: Iterable[str], read: Read
 ) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
     """Read each position that assembles, NaN elsewhere; return that, where it assembles, and the greatest gap, m."""
-    n, (omega, alpha) = len(command.angle), speeds(command)
+    n, (omega, alpha) = len(command.angle), list_speeds(command)
     missing: dict[str, Any] = {name: (math.nan, math.nan) if name in VECTORS else math.nan for name in names}
     rows, assembled, gap, position = [missing] * n, np.zeros(n, dtype=bool), 0.0, Assembler(bars, command.bar)
     for i, (theta, branch) in enumerate(zip(command.angle.tolist(), command.branch.tolist(), strict=True)):
@@ -197,12 +197,12 @@ MADE = ("theta_2", "omega_2", "alpha_2")
 """The motion that an engine really made."""
 
 
-def blank(n: int, names: Iterable[str] = (*MADE, "torque", *PIN_FORCES)) -> dict[str, Array]:
+def make_blank(n: int, names: Iterable[str] = (*MADE, "torque", *PIN_FORCES)) -> dict[str, Array]:
     """Return NaN for each of n positions, (n,) or (n, 2)."""
     return {name: np.full((n, 2) if name in VECTORS else n, np.nan) for name in names}
 
 
-def as_made(out: dict[str, Array], branch: NDArray[np.int8]) -> tuple[Command, dict[str, Array]]:
+def split_answer(out: dict[str, Array], branch: NDArray[np.int8]) -> tuple[Command, dict[str, Array]]:
     """Split what was read into the motion that was made, as a command, and the other quantities."""
     theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
     rest = {name: values for name, values in out.items() if name not in MADE}

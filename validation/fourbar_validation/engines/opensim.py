@@ -21,12 +21,12 @@ from fourbar_validation.engines.description import (
     ON_BARS,
     POINTS,
     about_first_pin,
-    components,
-    parts,
-    unknown_effect,
-    within_half_a_turn,
+    find_unknown,
+    list_parts,
+    reduce_angle,
+    resolve,
 )
-from fourbar_validation.engines.effects import TERM_OF, acting
+from fourbar_validation.engines.effects import TERM_OF, list_acting
 from fourbar_validation.engines.loaded import Loaded, Values
 from fourbar_validation.engines.loop import Exact
 
@@ -44,9 +44,9 @@ TURNING = {2: "O2", 4: "O4"}
 """Joint whose coordinate is the direction of a bar."""
 
 
-def refusal(scene: Scene) -> str:
+def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := unknown_effect(scene, TERM_OF, linear=True):
+    if reason := find_unknown(scene, TERM_OF, linear=True):
         return reason
     for number in MOVING_BARS:
         if scene.linkage.bar(number).mass == 0.0:
@@ -64,37 +64,37 @@ class OpenSimBars(Loaded):
     )
 
     def __init__(self, scene: Scene) -> None:
-        if reason := refusal(scene):
+        if reason := find_refusal(scene):
             raise LimitError(reason)
         osim.Logger.setLevelString("Off")
         osim.Logger.removeFileSink()
         linkage = scene.linkage
         self.model = model = osim.Model()
-        self.ready(scene, acting(scene, self))
-        model.setGravity(vec(*self.field))
+        self.ready(scene, list_acting(scene, self))
+        model.setGravity(make_vec(*self.field))
         self.body = {1: model.getGround()}
-        self.part = {part.bar: part for part in parts(linkage)}
+        self.part = {part.bar: part for part in list_parts(linkage)}
         for bar, part in self.part.items():
             about_z = osim.Inertia(*[part.inertia] * 3, *ZERO)
-            self.body[bar] = osim.Body(f"bar{bar}", part.mass, vec(*part.centre), about_z)
+            self.body[bar] = osim.Body(f"bar{bar}", part.mass, make_vec(*part.centre), about_z)
             model.addBody(self.body[bar])
         self.local = {name: (part.bar, at) for part in self.part.values() for name, at in part.points.items()}
         self.ends = (("start", scene.drive.start), ("end", scene.drive.end)) if scene.drive else ()
-        self.local |= {name: (end.bar, components(end.distance, end.angle)) for name, end in self.ends}
+        self.local |= {name: (end.bar, resolve(end.distance, end.angle)) for name, end in self.ends}
         self.length = {bar: part.length for bar, part in self.part.items()}
         self.joint = {
-            "O2": self._joint("O2", 1, ZERO, 2, ZERO),
-            "O4": self._joint("O4", 1, self.part[4].first_pin, 4, ZERO),
-            "B": self._joint("B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)),
+            "O2": self._make_joint("O2", 1, ZERO, 2, ZERO),
+            "O4": self._make_joint("O4", 1, self.part[4].first_pin, 4, ZERO),
+            "B": self._make_joint("B", 4, (self.length[4], 0.0, 0.0), 3, (self.length[3], 0.0, 0.0)),
         }
-        self.pin_a = osim.PointConstraint(self.body[2], vec(self.length[2]), self.body[3], vec())
+        self.pin_a = osim.PointConstraint(self.body[2], make_vec(self.length[2]), self.body[3], make_vec())
         self.pin_a.set_isEnforced(False)  # until a position is found: OpenSim would assemble it at angles of its own
         model.addConstraint(self.pin_a)
         for pin in TURNING.values():
-            self.joint[pin].updCoordinate().setPrescribedFunction(osim.PolynomialFunction(vector(TIME_IS_ALPHA)))
+            self.joint[pin].updCoordinate().setPrescribedFunction(osim.PolynomialFunction(make_vector(TIME_IS_ALPHA)))
             self.joint[pin].updCoordinate().setDefaultIsPrescribed(pin == "O2")
         self.commanded = 2
-        self.applied = {bar: self._at_first_pin(bar) for bar in MOVING_BARS}
+        self.applied = {bar: self._add_at_first_pin(bar) for bar in MOVING_BARS}
         self.state = model.initSystem()
         self.pin_a.setIsEnforced(self.state, True)
         self.matter = model.getMatterSubsystem()
@@ -110,18 +110,20 @@ class OpenSimBars(Loaded):
             f"below {LEAST_CONDITIONED:g} it takes constraints for dependent, and drops them"
         )
 
-    def _joint(self, name: str, parent: int, at: Any, child: int, on: Any) -> Any:
-        joint = osim.PinJoint(name, self.body[parent], vec(*at), vec(), self.body[child], vec(*on), vec())
+    def _make_joint(self, name: str, parent: int, at: Any, child: int, on: Any) -> Any:
+        joint = osim.PinJoint(
+            name, self.body[parent], make_vec(*at), make_vec(), self.body[child], make_vec(*on), make_vec()
+        )
         self.model.addJoint(joint)
         return joint
 
-    def _at_first_pin(self, bar: int) -> list[Any]:
+    def _add_at_first_pin(self, bar: int) -> list[Any]:
         """Add the components (x, y, moment) of a wrench on a bar at its first pin, to be set at each position."""
         element = osim.PrescribedForce(f"wrench{bar}", self.body[bar])
         element.setForceIsInGlobalFrame(True)
-        element.setPointFunctions(*_constants())
-        element.setForceFunctions(*_constants())
-        element.setTorqueFunctions(*_constants())
+        element.setPointFunctions(*_make_constants())
+        element.setForceFunctions(*_make_constants())
+        element.setTorqueFunctions(*_make_constants())
         self.model.addForce(element)
         force, torque = element.updForceFunctions(), element.updTorqueFunctions()
         return [osim.Constant.safeDownCast(x) for x in (force.get(0), force.get(1), torque.get(2))]
@@ -129,16 +131,16 @@ class OpenSimBars(Loaded):
     def place(self, q: Sequence[float]) -> None:
         """Set the bars' angles, at rest: Simbody forms its matrices by differences from the present motion."""
         of_3_to_2, theta_4 = q[1:]
-        theta_2 = within_half_a_turn(q[0])
+        theta_2 = reduce_angle(q[0])
         self.state.setTime(0.0)
-        self.state.setU(vector((0.0, 0.0, 0.0)))
-        self.state.setQ(vector((theta_2, theta_4, theta_2 + of_3_to_2 - theta_4)))
+        self.state.setU(make_vector((0.0, 0.0, 0.0)))
+        self.state.setQ(make_vector((theta_2, theta_4, theta_2 + of_3_to_2 - theta_4)))
         self.model.realizePosition(self.state)
 
     def point(self, name: str) -> Array:
         """Return a station of a body."""
         bar, at = self.local[name]
-        return np.array(self.body[bar].findStationLocationInGround(self.state, vec(*at)).to_numpy()[:2])
+        return np.array(self.body[bar].findStationLocationInGround(self.state, make_vec(*at)).to_numpy()[:2])
 
     def gap(self) -> tuple[float, float]:
         """Return A on bar 2 minus A on bar 3, which opens as B would."""
@@ -147,12 +149,12 @@ class OpenSimBars(Loaded):
 
     def jacobian(self) -> Array:
         """Return the derivative of the gap by the angles of bar 2, of bar 3 against bar 2, and of bar 4."""
-        by_own = self._station_jacobian("end2") - self._station_jacobian("first_pin3")
+        by_own = self._compute_station_jacobian("end2") - self._compute_station_jacobian("first_pin3")
         return np.column_stack((by_own[:, 0] + by_own[:, 2], by_own[:, 2], by_own[:, 1] - by_own[:, 2]))
 
-    def _station_jacobian(self, name: str) -> Array:
+    def _compute_station_jacobian(self, name: str) -> Array:
         (bar, at), matrix = self.local[name], osim.Matrix()
-        self.matter.calcStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), vec(*at), matrix)
+        self.matter.calcStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*at), matrix)
         return np.array(matrix.to_numpy())[:2]
 
     def rotation(self, bar: int) -> Array:
@@ -170,7 +172,7 @@ class OpenSimBars(Loaded):
             self.commanded, q = bar, self.state.getQ().to_numpy()
             for each, pin in TURNING.items():
                 self.joint[pin].updCoordinate().setIsPrescribed(self.state, each == bar)
-            self.state.setQ(vector(q))
+            self.state.setQ(make_vector(q))
             self.model.realizePosition(self.state)
         try:
             turns, accelerations = self._set_motion(speed, acceleration)
@@ -185,15 +187,17 @@ class OpenSimBars(Loaded):
         """Differentiate the driven bar's direction, or the stroke of a linear drive, by the coordinates, (3,)."""
         if self.linear is None:
             return PER_COORDINATE[self.drive_bar]
-        start, end = (np.zeros((2, 3)) if at.bar == 1 else self._station_jacobian(name) for name, at in self.ends)
+        start, end = (
+            np.zeros((2, 3)) if at.bar == 1 else self._compute_station_jacobian(name) for name, at in self.ends
+        )
         return np.asarray(self.line()[2] @ (end - start))
 
     def _set_motion(self, speed: float, acceleration: float) -> tuple[Array, Array]:
         """Solve the constraint equations for the coordinates' speeds per speed commanded, and their accelerations."""
-        equations = self._equations()
+        equations = self._differentiate_constraints()
         turns = np.linalg.solve(equations, np.eye(3)[0])
         self.state.setTime(acceleration)
-        self.state.setU(vector(turns * speed))
+        self.state.setU(make_vector(turns * speed))
         self.model.realizeVelocity(self.state)
         bias, matrix = osim.Vector(), osim.Matrix()
         self.matter.calcBiasForAccelerationConstraints(self.state, bias)
@@ -208,8 +212,10 @@ class OpenSimBars(Loaded):
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
         for name, point in ON_BARS.items():
             bar, at = self.local[point]
-            drift = self.matter.calcBiasForStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), vec(*at))
-            values[f"a_{name}"] = self._station_jacobian(point) @ self.a + np.array(drift.to_numpy()[:2])
+            drift = self.matter.calcBiasForStationJacobian(
+                self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*at)
+            )
+            values[f"a_{name}"] = self._compute_station_jacobian(point) @ self.a + np.array(drift.to_numpy()[:2])
         return values
 
     def _forces(self, leverage: float) -> dict[str, Any]:
@@ -227,7 +233,7 @@ class OpenSimBars(Loaded):
                     function.setValue(value)
             self.state.setTime(self.state.getTime())  # Simbody computes again what depends on it
             self.model.realizeAcceleration(self.state)
-            couple, force = self._couple_of_command(), self._closing_force()
+            couple, force = self._couple_of_command(), self._compute_closing_force()
             drive, closing = drive + couple / leverage, closing + force
             self.work(couple / leverage)
             self.push(2, force, pin_a)
@@ -238,10 +244,10 @@ class OpenSimBars(Loaded):
                 break
             before = size
             seen.add(size)
-        reactions = {name: self._reaction(pin) for pin, name in {"O2": "F12", "B": "F43", "O4": "F14"}.items()}
+        reactions = {name: self._read_reaction(pin) for pin, name in {"O2": "F12", "B": "F43", "O4": "F14"}.items()}
         return {**reactions, "F32": closing, self.driving: drive}
 
-    def _equations(self) -> Array:
+    def _differentiate_constraints(self) -> Array:
         """Differentiate the constraints by the coordinates: the commanded motion, and pin A along two axes."""
         matrix = osim.Matrix()
         self.matter.calcG(self.state, matrix)
@@ -255,13 +261,13 @@ class OpenSimBars(Loaded):
         """Read it from the accelerations of the coordinates."""
         return float(PER_COORDINATE[bar] @ self.a)
 
-    def _reaction(self, pin: str) -> Array:
+    def _read_reaction(self, pin: str) -> Array:
         return np.array(self.joint[pin].calcReactionOnChildExpressedInGround(self.state).get(1).to_numpy()[:2])
 
     def _couple_of_command(self) -> float:
         return float(self.joint[TURNING[self.commanded]].calcReactionOnChildExpressedInGround(self.state).get(0).get(2))
 
-    def _closing_force(self) -> Array:
+    def _compute_closing_force(self) -> Array:
         """Compute the force of bar 3 on bar 2 from the constraint's multipliers; on bodies it is -G^T lambda."""
         on_bodies, on_mobilities = osim.VectorOfSpatialVec(), osim.Vector()
         multipliers = self.state.getMultipliers()
@@ -273,12 +279,12 @@ class OpenSimBars(Loaded):
 OpenSimConstraints = partial(Exact, "opensim-constraints", OpenSimBars, ("theta_2", "theta_4", "stroke"))
 
 
-def vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
+def make_vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
     """Three components."""
     return osim.Vec3(float(x), float(y), float(z))
 
 
-def vector(values: Iterable[float]) -> Any:
+def make_vector(values: Iterable[float]) -> Any:
     """Make a vector of Simbody."""
     numbers = [float(value) for value in values]
     made = osim.Vector(len(numbers), 0.0)
@@ -287,6 +293,6 @@ def vector(values: Iterable[float]) -> Any:
     return made
 
 
-def _constants() -> list[Any]:
+def _make_constants() -> list[Any]:
     """Three functions of time that are zero, and may be given another value later."""
     return [osim.Constant(value) for value in ZERO]

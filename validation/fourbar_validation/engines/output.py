@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import BinaryIO
 
-from fourbar_validation.compare.rows import plain
+from fourbar_validation.compare.rows import make_plain
 
 KEPT = 20_000
 """Bytes that are kept of one answer's output: half from its beginning, half from its end."""
@@ -21,21 +21,21 @@ def keep_output() -> None:
     if not _file:
         _file.append(tempfile.TemporaryFile(buffering=0))  # noqa: SIM115 - as long as the process
         sys.stdout = sys.stderr = None
-    printed()
+    take_printed()
 
 
 @contextmanager
-def kept(outputs: dict[str, str], engine: str) -> Iterator[None]:
+def keep_printed(outputs: dict[str, str], engine: str) -> Iterator[None]:
     """Add what is printed meanwhile to the outputs, under the name of the engine."""
-    printed()
+    take_printed()
     try:
         yield
     finally:
-        if text := printed():
+        if text := take_printed():
             outputs[engine] = outputs.get(engine, "") + text
 
 
-def printed() -> str:
+def take_printed() -> str:
     """Take what was printed since the last call, as plain text; nothing where this process does not keep it."""
     if not _file:
         return ""
@@ -59,4 +59,4 @@ def printed() -> str:
             # line by line, in the order of what libraries print
             stream = open(descriptor, "w", 1, "utf-8", "backslashreplace", closefd=False)  # noqa: SIM115
             setattr(sys, name, stream)
-    return plain(text.decode(errors="backslashreplace"))
+    return make_plain(text.decode(errors="backslashreplace"))

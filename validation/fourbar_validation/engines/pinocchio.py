@@ -10,8 +10,8 @@ import pinocchio as pin
 from fourbar.errors import LimitError
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FIRST_PIN, parts, rotate_by, unknown_effect
-from fourbar_validation.engines.effects import TERM_OF, acting
+from fourbar_validation.engines.description import FIRST_PIN, find_unknown, list_parts, rotate_by
+from fourbar_validation.engines.effects import TERM_OF, list_acting
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
 
@@ -22,20 +22,22 @@ class PinocchioTree(Tree):
     """The open tree, built from the description."""
 
     def __init__(self, scene: Scene) -> None:
-        if reason := unknown_effect(scene, TERM_OF, linear=True):
+        if reason := find_unknown(scene, TERM_OF, linear=True):
             raise LimitError(reason)
         self.model = model = pin.Model()
         self.joint, self.frame = {1: 0}, dict[str, int]()
-        for part in parts(scene.linkage):
+        for part in list_parts(scene.linkage):
             joint = model.addJoint(
-                self.joint[part.bearer], pin.JointModelRZ(), _at(*part.first_pin), FIRST_PIN[part.bar]
+                self.joint[part.bearer], pin.JointModelRZ(), _place_at(*part.first_pin), FIRST_PIN[part.bar]
             )
             self.joint[part.bar] = joint
             # nothing is appended, no frame either: below 2.2e-16 kg the sum of two inertias has another mass centre
             about_g = np.diag([0.0, 0.0, part.inertia])
             model.inertias[joint] = pin.Inertia(part.mass, np.array([*part.centre, 0.0]), about_g)
             for name, at in part.points.items():
-                self.frame[name] = model.addFrame(pin.Frame(name, joint, 0, _at(*at), pin.FrameType.OP_FRAME), False)
+                self.frame[name] = model.addFrame(
+                    pin.Frame(name, joint, 0, _place_at(*at), pin.FrameType.OP_FRAME), False
+                )
         self.data = data = model.createData()
         self.q = np.zeros(3)
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
@@ -46,7 +48,7 @@ class PinocchioTree(Tree):
         self.external_force = {
             bar: (self.external[joint].linear, self.external[joint].angular) for bar, joint in self.joint.items()
         }
-        self.ready(scene, acting(scene, self))
+        self.ready(scene, list_acting(scene, self))
         self._weigh(self.field)
 
     def _weigh(self, field: tuple[float, float]) -> None:
@@ -101,5 +103,5 @@ class PinocchioTree(Tree):
 PinocchioInverse = partial(Exact, "pinocchio-inverse", PinocchioTree)
 
 
-def _at(x: float, y: float) -> Any:
+def _place_at(x: float, y: float) -> Any:
     return pin.SE3(np.eye(3), np.array([x, y, 0.0]))

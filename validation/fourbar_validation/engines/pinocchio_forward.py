@@ -10,13 +10,13 @@ import pinocchio as pin
 
 from fourbar.effects import Gravity
 from fourbar.errors import LimitError
-from fourbar.mjcf import Settings, flywheel, run_through
+from fourbar.mjcf import Settings, choose_run, size_flywheel
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.answer import Array, Released
-from fourbar_validation.engines.loaded import no_wrenches
-from fourbar_validation.engines.loop import Assembler, LimitDetector, Trial, as_made, blank
+from fourbar_validation.engines.loaded import make_no_wrenches
+from fourbar_validation.engines.loop import Assembler, LimitDetector, Trial, make_blank, split_answer
 from fourbar_validation.engines.pinocchio import PinocchioTree
-from fourbar_validation.engines.tree import closed, multipliers
+from fourbar_validation.engines.tree import solve_closed, solve_multipliers
 
 NAME = "pinocchio-forward"
 TIME_CONSTANT_STEPS = 10.0
@@ -54,7 +54,7 @@ class ClosedTree:
     def start(self, theta_2: float, branch: int, omega_2: float) -> tuple[Array, Array] | None:
         """Assembled, at the speeds that keep the loop closed; None where it does not close."""
         q = Assembler(self.tree).find(theta_2, branch)
-        return None if q is None else (np.array(q), closed(self.tree.jacobian(), omega_2))
+        return None if q is None else (np.array(q), solve_closed(self.tree.jacobian(), omega_2))
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
         """Accelerate the closed loop under loads, effects and the flywheel's motor."""
@@ -66,7 +66,7 @@ class ClosedTree:
         return np.array(self.found[0].contact_force.linear[:2])
 
 
-def step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Array]:
+def make_step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Array]:
     """Make one step of the classical Runge-Kutta method."""
     a1 = f(q, v)
     v2 = v + 0.5 * h * a1
@@ -89,11 +89,11 @@ class PinocchioForward:
     def __init__(self, scene: Scene, command: Command, steps_per_revolution: float, time_constant_steps: float) -> None:
         self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
         self.scene, self.command = scene, command
-        self.run = run_through(command.theta_2, self.omega, self.alpha)
+        self.run = choose_run(command.theta_2, self.omega, self.alpha)
         settings = Settings(steps_per_revolution=steps_per_revolution, steps_per_window=1)
         self.h = self.run.timestep(settings)
         self.tree = PinocchioTree(scene)
-        self.armature = self.tree.model.armature = np.array([flywheel(scene, settings), 0.0, 0.0])
+        self.armature = self.tree.model.armature = np.array([size_flywheel(scene, settings), 0.0, 0.0])
         self.loop = ClosedTree(self.tree, time_constant_steps * self.h)
 
     def acceleration(self, q: Array, v: Array) -> Array:
@@ -104,7 +104,7 @@ class PinocchioForward:
             # what acts, as generalised forces: the difference it makes to inverse dynamics
             tree.moving(v, np.zeros(3))
             acted = tree.torques()
-            tau = tau + tree.needed(tree.field, no_wrenches()) - acted
+            tau = tau + tree.needed(tree.field, make_no_wrenches()) - acted
         return np.array(self.loop.acceleration(q, v, tau))
 
     def forward(self) -> Trial:
@@ -115,19 +115,19 @@ class PinocchioForward:
         if state is None:
             raise LimitError("the loop does not close at the first position")
         (q, v), done, stepping = state, 0, 0.0
-        out = blank(len(order))
+        out = make_blank(len(order))
         for row, index in enumerate(order):
             target = round(self.run.time(float(self.command.theta_2[index])) / self.h)
             began = time.process_time()
             while done < target:
-                q, v = step(self.acceleration, q, v, self.h)
+                q, v = make_step(self.acceleration, q, v, self.h)
                 done += 1
             stepping += time.process_time() - began
             if not np.isfinite(q).all():
                 break
             for name, value in self._read(q, v, self.acceleration(q, v)).items():
                 out[name][row] = value
-        at, quantities = as_made(out, self.command.branch[order])
+        at, quantities = split_answer(out, self.command.branch[order])
         return Trial(at, quantities, done, 2.0 * np.pi / self.run.fastest / self.h, stepping)
 
     def _read(self, q: Array, v: Array, a: Array) -> dict[str, Array | float]:
@@ -140,7 +140,7 @@ class PinocchioForward:
         if self.scene.drive_bar == 2:
             loop_force, torque = self.loop.loop_force(), -self.armature[0] * (a[0] - self.alpha)
         else:
-            unknowns = multipliers(tree.jacobian(), tree.turns[self.scene.drive_bar], needed)
+            unknowns = solve_multipliers(tree.jacobian(), tree.turns[self.scene.drive_bar], needed)
             loop_force, torque = unknowns[:2], float(unknowns[2])
         forces = tree.forces(loop_force, torque)
         tree.model.armature = self.armature
@@ -170,7 +170,7 @@ class PinocchioReleased:
         for t in times:
             steps = math.ceil((t - now) / self.step - 1e-6)
             for taken in range(1, steps + 1):
-                q, v = step(lambda q, v: loop.acceleration(q, v, none), q, v, (t - now) / steps)
+                q, v = make_step(lambda q, v: loop.acceleration(q, v, none), q, v, (t - now) / steps)
                 detector.look(now + taken * (t - now) / steps, q[0] + q[1], q[2])
             now = float(t)
             energy, data = pin.computeMechanicalEnergy(tree.model, tree.data, q, v), tree.data

@@ -23,37 +23,37 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, Array, Mask
-from fourbar_validation.engines.description import centre, speeds
+from fourbar_validation.engines.description import find_centre, list_speeds
 
 FIRST_ORDER = 0.1
 """Where the angles are uncertain by this part of the sine that everything divides by, first order predicts nothing:
 speeds and forces may come out as anything, the torque too, whose own first order can cancel."""
 
 
-def from_data(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
+def predict_from_data(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
     """Predict for a derivation that works in angles and lengths themselves."""
-    return predicted_error(scene, at, quantity, 0.0, where)
+    return predict_error(scene, at, quantity, 0.0, where)
 
 
-def in_world_axes(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
+def predict_in_world_axes(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
     """Predict for an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
-    return predicted_error(scene, at, quantity, _extent(scene), where)
+    return predict_error(scene, at, quantity, _compute_extent(scene), where)
 
 
-def about_mass_centre(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
+def predict_about_mass_centre(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
     """Predict for an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
 
     Every bar is accelerated with the first of its tree and back again by its own joint.
     """
-    furthest = max(abs(centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
-    return predicted_error(scene, at, quantity, _extent(scene) + furthest, where, carried=True)
+    furthest = max(abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
+    return predict_error(scene, at, quantity, _compute_extent(scene) + furthest, where, carried=True)
 
 
-def _extent(scene: Scene) -> float:
+def _compute_extent(scene: Scene) -> float:
     return math.fsum(scene.linkage.lengths)
 
 
-def predicted_error(
+def predict_error(
     scene: Scene,
     at: Command,
     quantity: str,
@@ -67,10 +67,10 @@ def predicted_error(
     With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
     NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
     """
-    n, (omega, alpha) = len(at.theta_2), speeds(at)
+    n, (omega, alpha) = len(at.theta_2), list_speeds(at)
     errors = np.full(n, np.nan)
     for i in range(n) if where is None else np.flatnonzero(where).tolist():
-        moved = _sensitivity(scene, float(at.theta_2[i]), int(at.branch[i]), float(omega[i]), float(alpha[i]))
+        moved = _compute_sensitivity(scene, float(at.theta_2[i]), int(at.branch[i]), float(omega[i]), float(alpha[i]))
         if moved is None:
             continue
         lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(moved.data["condition"])
@@ -81,7 +81,7 @@ def predicted_error(
         if quantity == "torque":
             turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
             pulled = max(moved.first_order(force, reach, carried=carried) for force in PIN_FORCES)
-            errors[i] += pulled * turned * _extent(scene)
+            errors[i] += pulled * turned * _compute_extent(scene)
     return errors
 
 
@@ -107,26 +107,28 @@ class Sensitivities(NamedTuple):
 
 
 @lru_cache(maxsize=8192)
-def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float) -> Sensitivities | None:
+def _compute_sensitivity(
+    scene: Scene, theta_2: float, branch: int, omega_2: float, alpha_2: float
+) -> Sensitivities | None:
     """Compute the sensitivities at one position; None where the loop does not close."""
     from flint import acb, arb
 
-    from fourbar_validation.engines.balls import STEP_BITS, outputs, response, stored
+    from fourbar_validation.engines.balls import STEP_BITS, compute_outputs, compute_response, make_balls
 
-    exact = stored(scene, theta_2, omega_2=omega_2, alpha_2=alpha_2)
-    base = outputs(scene, branch, exact, scene.drive_bar)
+    exact = make_balls(scene, theta_2, omega_2=omega_2, alpha_2=alpha_2)
+    base = compute_outputs(scene, branch, exact, scene.drive_bar)
     if base is None:
         return None
     step = arb(2) ** -STEP_BITS
 
     def add(total: dict[str, float], changes: list[dict[str, Any]]) -> None:
         """Add the change under the first of several changes of the inputs with which the loop still closes."""
-        moved = (outputs(scene, branch, exact | changed, scene.drive_bar) for changed in changes)
-        for output, rate in response(base, moved).items():
+        moved = (compute_outputs(scene, branch, exact | changed, scene.drive_bar) for changed in changes)
+        for output, rate in compute_response(base, moved).items():
             total[output] = total.get(output, 0.0) + rate
 
     data = {name: 1.0 if name.startswith("theta") else abs(float(value.mid())) for name, value in base.items()}
-    for name, weight in _weights({name: float(value) for name, value in exact.items()}).items():
+    for name, weight in _weigh_inputs({name: float(value) for name, value in exact.items()}).items():
         add(data, [{name: exact[name] + side * weight * step} for side in (1, -1)])
     data["condition"] = float(base["condition"].mid())
     loop: dict[str, float] = {}
@@ -142,7 +144,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
                 add(loop, [{name: most * step * direction}])
     if "torque" in base:
         strongest = max(abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y"))
-        strongest += abs(base["torque"]) / _extent(scene)  # the couple on a bar is rounded too
+        strongest += abs(base["torque"]) / _compute_extent(scene)  # the couple on a bar is rounded too
         heaviest = max(scene.linkage.bar(bar).mass for bar in MOVING_BARS)
         for bar in MOVING_BARS:
             add(loop, [{f"couple_{bar}": strongest * step}])
@@ -150,7 +152,7 @@ def _sensitivity(scene: Scene, theta_2: float, branch: int, omega_2: float, alph
     return Sensitivities(data, loop, carried)
 
 
-def _weights(stored: dict[str, float]) -> dict[str, float]:
+def _weigh_inputs(stored: dict[str, float]) -> dict[str, float]:
     """Weigh each input by one rounding: relative, but a chain of bars meets O4 as its longest bar is rounded."""
     longest = max(stored[name] for name in ("d", "a", "b", "c"))
     weights = {name: abs(value) for name, value in stored.items() if value != 0.0}

@@ -18,7 +18,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import ON_BARS, POINTS
-from fourbar_validation.engines.loaded import Act, Loaded, Values, no_wrenches
+from fourbar_validation.engines.loaded import Act, Loaded, Values, make_no_wrenches
 
 if TYPE_CHECKING:
     from fourbar.effects.spring import SpringEnd
@@ -131,15 +131,15 @@ class Tree(Loaded, Protocol):
         """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0."""
         jacobian, commanded = self.jacobian(), self.turns[bar]
         try:
-            v = closed(jacobian, speed, commanded)
-            a = closed(jacobian, acceleration, commanded, *self.drift(v).tolist())
+            v = solve_closed(jacobian, speed, commanded)
+            a = solve_closed(jacobian, acceleration, commanded, *self.drift(v).tolist())
         except np.linalg.LinAlgError:
             return {}
         self.moving(v, a)
         values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
         values |= zip(OMEGAS, (self.rows @ v).tolist(), strict=True)
         values |= zip(ALPHAS, (self.rows @ a).tolist(), strict=True)
-        solve = partial(multipliers, jacobian, self.drive_column())
+        solve = partial(solve_multipliers, jacobian, self.drive_column())
 
         def balanced() -> dict[str, Any]:
             unknowns = solve(self.torques())
@@ -150,7 +150,7 @@ class Tree(Loaded, Protocol):
         except np.linalg.LinAlgError:  # no torque or force of the drive balances the linkage here
             return values
         if self.alone:
-            values[f"{self.driving}_inertia"] = float(solve(self.needed((0.0, 0.0), no_wrenches()))[2])
+            values[f"{self.driving}_inertia"] = float(solve(self.needed((0.0, 0.0), make_no_wrenches()))[2])
         return values
 
 
@@ -158,7 +158,7 @@ BAR_2 = np.array([1.0, 0.0, 0.0])
 """Derivative of its rotation by the coordinates."""
 
 
-def closed(jacobian: Array, rate: float, turn: Array = BAR_2, x: float = 0.0, y: float = 0.0) -> Array:
+def solve_closed(jacobian: Array, rate: float, turn: Array = BAR_2, x: float = 0.0, y: float = 0.0) -> Array:
     """Solve J rates + (x, y) = 0, turn . rates = rate for the rates of the coordinates; LinAlgError at a toggle.
 
     By Cramer's rule: for bar 2 the determinant is that of `newton` to the last digit.
@@ -178,10 +178,10 @@ def closed(jacobian: Array, rate: float, turn: Array = BAR_2, x: float = 0.0, y:
     )
 
 
-def multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
+def solve_multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
     """[lambda; T] where [J^T turn] [lambda; T] = tau, (3,); LinAlgError where no torque on that bar balances tau.
 
-    By Cramer's rule: of bar 2 the determinant is that of `closed` to the last digit, so that there are forces wherever
+    By Cramer's rule: of bar 2 the determinant is that of `solve_closed` to the last digit: there are forces wherever
     there are speeds, as far as rounding leaves them digits; elimination may find the matrix singular there.
     """
     (a, b, c), (d, e, f) = jacobian.tolist()

@@ -7,20 +7,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.errors import installing
+from fourbar.errors import say_install
 from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Engine
 from fourbar_validation.compare.compare import COMPARED, Nearby, Predicted
 from fourbar_validation.compare.nearby import shift_to
-from fourbar_validation.compare.rows import in_words
+from fourbar_validation.compare.rows import say_error
 from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, ErrorBound, Mask
-from fourbar_validation.engines.description import speeds
-from fourbar_validation.engines.exact import unknown
+from fourbar_validation.engines.description import list_speeds
+from fourbar_validation.engines.exact import find_refusal
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.loop import blank
-from fourbar_validation.engines.prediction import about_mass_centre, from_data, in_world_axes
+from fourbar_validation.engines.loop import make_blank
+from fourbar_validation.engines.prediction import predict_about_mass_centre, predict_from_data, predict_in_world_axes
 
 Predictor = Callable[[Scene, Command, str, Mask], Array]
 """Predicts the absolute error of a quantity at the positions of a mask, (n,)."""
@@ -67,28 +67,28 @@ class Witness:
 
     def missing(self) -> str | None:
         """Say why it cannot answer in this environment, if it cannot."""
-        return not_installed(self.library) if self.library else None
+        return find_missing(self.library) if self.library else None
 
 
 EXTRA = {name: name for name in ("mujoco", "pinocchio", "exudyn", "opensim")} | {"pydrake": "drake", "flint": "exact"}
 """Module of an engine: the extra that brings it."""
 
 
-def not_installed(library: str) -> str | None:
+def find_missing(library: str) -> str | None:
     """Give the reason where a module cannot be found, or does not load; None where it does."""
     try:
         import_module(library)
     except ModuleNotFoundError as error:
         if error.name == library:
-            return f"{library} is not installed: {installing(EXTRA[library])}"
-        return _broken(library, error)
+            return f"{library} is not installed: {say_install(EXTRA[library])}"
+        return _find_broken(library, error)
     except (Exception, SystemExit) as error:  # whatever a library raises that was built for another machine
-        return _broken(library, error)
+        return _find_broken(library, error)
     return None
 
 
-def _broken(library: str, error: BaseException) -> str:
-    return f"{library} is installed, but does not load: {in_words(error)}"
+def _find_broken(library: str, error: BaseException) -> str:
+    return f"{library} is installed, but does not load: {say_error(error)}"
 
 
 class Work(NamedTuple):
@@ -133,57 +133,59 @@ WORK = {
 OF_A_POSITION = tuple(name for name in COMPARED if STAGE_OF[name] == "position")
 
 
-def _pinocchio() -> Engine:
+def _make_pinocchio() -> Engine:
     from fourbar_validation.engines.pinocchio import PinocchioInverse
 
     return PinocchioInverse()
 
 
-def _mujoco() -> Engine:
+def _make_mujoco() -> Engine:
     from fourbar_validation.engines.mujoco.inverse import MujocoInverse
 
     return MujocoInverse()
 
 
-def _simulation() -> Engine:
+def _make_simulation() -> Engine:
     from fourbar_validation.engines.mujoco.simulate import MujocoSimulated
 
     return MujocoSimulated()
 
 
-def _order_of_simulation(scene: Scene, at: Command, error: Callable[[Answer], float]) -> tuple[float, float, float]:
-    from fourbar_validation.engines.mujoco.simulate import observed_order
+def _observe_order_of_simulation(
+    scene: Scene, at: Command, error: Callable[[Answer], float]
+) -> tuple[float, float, float]:
+    from fourbar_validation.engines.mujoco.simulate import observe_order
 
-    return observed_order(scene, at, error)
+    return observe_order(scene, at, error)
 
 
-def _exudyn() -> Engine:
+def _make_exudyn() -> Engine:
     from fourbar_validation.engines.exudyn import ExudynConstraints
 
     return ExudynConstraints()
 
 
-def _opensim() -> Engine:
+def _make_opensim() -> Engine:
     from fourbar_validation.engines.opensim import OpenSimConstraints
 
     return OpenSimConstraints()
 
 
-def _drake() -> Engine:
+def _make_drake() -> Engine:
     from fourbar_validation.engines.drake import DrakeInverse
 
     return DrakeInverse()
 
 
 WITNESSES = (
-    Witness("pinocchio-inverse", _pinocchio, EQUIVALENCE, predictor=in_world_axes, library="pinocchio"),
-    Witness("mujoco-inverse", _mujoco, EQUIVALENCE, predictor=about_mass_centre, library="mujoco"),
+    Witness("pinocchio-inverse", _make_pinocchio, EQUIVALENCE, predictor=predict_in_world_axes, library="pinocchio"),
+    Witness("mujoco-inverse", _make_mujoco, EQUIVALENCE, predictor=predict_about_mass_centre, library="mujoco"),
     Witness(
         "mujoco-simulated",
-        _simulation,
+        _make_simulation,
         SIMULATED,
         UNKNOWNS,
-        order=_order_of_simulation,
+        order=_observe_order_of_simulation,
         through_time=True,
         generated=True,
         residuals=True,
@@ -195,18 +197,18 @@ WITNESSES = (
         EQUIVALENCE,
         (*COMPARED, *OF_DRY_FRICTION),
         positions=OF_A_POSITION,
-        predictor=from_data,
+        predictor=predict_from_data,
     ),
 )
 FURTHER = (
-    Witness("exudyn-constraints", _exudyn, EQUIVALENCE, predictor=in_world_axes, library="exudyn"),
-    Witness("opensim-constraints", _opensim, EQUIVALENCE, predictor=in_world_axes, library="opensim"),
-    Witness("drake-inverse", _drake, EQUIVALENCE, predictor=in_world_axes, library="pydrake"),
+    Witness("exudyn-constraints", _make_exudyn, EQUIVALENCE, predictor=predict_in_world_axes, library="exudyn"),
+    Witness("opensim-constraints", _make_opensim, EQUIVALENCE, predictor=predict_in_world_axes, library="opensim"),
+    Witness("drake-inverse", _make_drake, EQUIVALENCE, predictor=predict_in_world_axes, library="pydrake"),
 )
 """Engines with extras of their own: they join a run where they are installed, and where they are named."""
 
 
-def predicting_from(witness: Witness, scene: Scene, at: Command, answer: Answer) -> Predicted | None:
+def make_prediction(witness: Witness, scene: Scene, at: Command, answer: Answer) -> Predicted | None:
     """Give what computes the errors to be expected, should any be called for; an alarm leaves no own excuse."""
     if answer.refusal is not None:
         return None
@@ -217,12 +219,12 @@ def predicting_from(witness: Witness, scene: Scene, at: Command, answer: Answer)
     predict = witness.predictor
     if at.bar != 2 or at.stroke is not None:
         return None  # what predicts knows the command of bar 2 alone
-    if predict is None or (witness.tolerance.conditioned and (not_installed("flint") or unknown(scene))):
+    if predict is None or (witness.tolerance.conditioned and (find_missing("flint") or find_refusal(scene))):
         return None  # the law in the condition stands alone
     return lambda quantity, where: predict(scene, at, quantity, where)
 
 
-def answering_nearby(witness: Witness, scene: Scene, at: Command, formulas: Solution) -> Nearby | None:
+def make_nearby(witness: Witness, scene: Scene, at: Command, formulas: Solution) -> Nearby | None:
     """Give what answers within the rounding of the theta_2 that are stated, where the witness does.
 
     Near a limit position the last digits of theta_2 decide sin(theta_4 - theta_3), and with it every other number:
@@ -232,10 +234,10 @@ def answering_nearby(witness: Witness, scene: Scene, at: Command, formulas: Solu
     """
     if not witness.nearby or scene.drive_bar != 2 or at.remainder is not None or at.speed is None or at.bar != 2:
         return None
-    omega, alpha = speeds(at)
+    omega, alpha = list_speeds(at)
 
     def answer(where: Mask) -> dict[str, Array]:
-        engine, out = witness.engine(), blank(len(where), COMPARED)
+        engine, out = witness.engine(), make_blank(len(where), COMPARED)
         for i in np.flatnonzero(where & np.isfinite(formulas.sin_mu)).tolist():
             shift = shift_to(scene.linkage, float(at.theta_2[i]), float(formulas.sin_mu[i]))
             if shift is not None:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 
 from fourbar.errors import DependencyError
 from fourbar_validation.compare.answer import WitnessError
-from fourbar_validation.compare.rows import in_words
+from fourbar_validation.compare.rows import say_error
 from fourbar_validation.engines.memory import bound_memory
 from fourbar_validation.engines.output import keep_output
 
@@ -84,13 +84,13 @@ def apply_watched(seconds: float | None, function: Callable[[Any], Any], items: 
             except Exception:
                 raise
             except BaseException as error:  # in the parent it would end the run
-                raise WitnessError(in_words(error)) from None
+                raise WitnessError(say_error(error)) from None
             finally:
                 faulthandler.cancel_dump_traceback_later()
     return results
 
 
-def ready(parent: int, _: object = None) -> None:
+def prepare_worker(parent: int, _: object = None) -> None:
     """Bound the memory, keep what is printed, and end with the parent, whose id is given.
 
     The function comes along so that a worker imports what it needs before its first item, whose time is limited.
@@ -174,7 +174,7 @@ def fail(_: object, error: Exception, __: Attempt) -> NoReturn:
     raise error
 
 
-def each(
+def apply_each(
     function: Callable[[Any], Any],
     items: Iterable[Any],
     workers: int = 1,
@@ -186,14 +186,14 @@ def each(
     result: dict[int, list[Any]] = {}
     turn = 0
     chunks = enumerate([item] for item in items)
-    for number, results in over_processes(function, chunks, workers, seconds=seconds, instead=instead):
+    for number, results in apply_over_processes(function, chunks, workers, seconds=seconds, instead=instead):
         result[number] = results
         while turn in result:
             yield from result.pop(turn)
             turn += 1
 
 
-def over_processes(
+def apply_over_processes(
     function: Callable[[Any], Any],
     chunks: Iterable[Chunk],
     workers: int,
@@ -218,11 +218,11 @@ def over_processes(
     waiting = started()
     while True:
         with ProcessPool(
-            max_workers=workers, context=WorkerContext(), initializer=ready, initargs=[os.getpid(), function]
+            max_workers=workers, context=WorkerContext(), initializer=prepare_worker, initargs=[os.getpid(), function]
         ) as pool:
             try:
                 crew = Processes(pool, function, workers, seconds)
-                for number, results in as_done(chain(list(unfinished.items()), waiting), crew, instead):
+                for number, results in yield_done(chain(list(unfinished.items()), waiting), crew, instead):
                     yield number, results
                     del unfinished[number]
                     in_vain = 0
@@ -238,7 +238,7 @@ def over_processes(
                 raise
 
 
-def as_done(chunks: Iterable[Chunk], workers: Workers, instead: Instead) -> Iterator[tuple[int, list[Any]]]:
+def yield_done(chunks: Iterable[Chunk], workers: Workers, instead: Instead) -> Iterator[tuple[int, list[Any]]]:
     """Keep a bounded number of chunks running; yield each as it is done."""
 
     def attempt(item: Any) -> Any:

@@ -7,10 +7,10 @@ import click
 
 from fourbar.writing import write_text
 from fourbar_validation.places import PROGRAM
-from fourbar_validation.published.check import check
+from fourbar_validation.published.comparison import check
 from fourbar_validation.published.figures import ERRATA
-from fourbar_validation.published.program import ladder, printed
-from fourbar_validation.report.templating import rendered
+from fourbar_validation.published.program import climb_ladder, read_printed
+from fourbar_validation.report.templating import render
 
 
 class LadderRow(NamedTuple):
@@ -30,16 +30,16 @@ class LadderRow(NamedTuple):
     """T4, F12x and F12y as printed, where the thesis prints the result of this row."""
 
 
-def ladder_rows() -> list[LadderRow]:
+def list_ladder_rows() -> list[LadderRow]:
     """From our answer to the two published ones, error by error: rows of `LadderRow`.
 
     The first row is right: 309.309 N cm and (7.033, -2.121) N. The last two are what the manual and
     section 5.7 print: 308.804 N cm and (161.418, -156.506) N.
     """
-    source = printed()["published"]
+    source = read_printed()["published"]
     tables = {"manual": source["manual_program_dynamic"], "5b": source["section_5_7_hand_solution"]}
     rows = []
-    for erratum, x in ladder():
+    for erratum, x in climb_ladder():
         did, right = "nothing wrong: SI, uniform bars m (L^2 + w^2)/12", "the answer of this project"
         if erratum in ERRATA:
             did, right = ERRATA[erratum].title, ERRATA[erratum].right
@@ -60,7 +60,7 @@ def show_ladder(console: Any) -> None:
     table.add_column("what is right", ratio=3)
     for name in ("T4, N cm", "F12, N"):
         table.add_column(name, justify="right", no_wrap=True)
-    for row in ladder_rows():
+    for row in list_ladder_rows():
         torque = f"{row.torque:.9f}"
         if row.published:
             torque += f"\nprinted {float(row.published['T4']):.9f}"
@@ -80,5 +80,5 @@ def published(show_all: bool, out: Path | None) -> int:
     show_ladder(console)
     console.print()
     if out is not None:
-        write_text(out, rendered("fourbar_validation.lab", "ladder.md.j2", rows=ladder_rows(), program=PROGRAM))
+        write_text(out, render("fourbar_validation.lab", "ladder.md.j2", rows=list_ladder_rows(), program=PROGRAM))
     return check(show_all)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.files import load
-from fourbar.mjcf import mjcf, with_mimic
+from fourbar.mjcf import replace_loop, write_mjcf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.studies.ratio import MOST, ratio
@@ -18,8 +18,8 @@ from fourbar.writing import write_text
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.places import MODELS, PROGRAM
-from fourbar_validation.report.machine import machine, versions
-from fourbar_validation.report.terminal import lined_up
+from fourbar_validation.report.machine import list_versions, name_machine
+from fourbar_validation.report.terminal import make_table
 
 SCENES = ("crank_rocker", "drag_link", "double_rocker", "gallery/bonnet_hinge", "gallery/landing_gear")
 """Of models/, where none are named: a crank that turns fully, and ranges of 50 to 90 degrees."""
@@ -39,24 +39,24 @@ class Lost(NamedTuple):
     """Between the ends of bars 3 and 4, m."""
 
 
-def lost(scene: Scene) -> list[Lost]:
+def simulate_lost(scene: Scene) -> list[Lost]:
     """Simulate the loop, and what follows by polynomials of degree 4 and 1, over the range of a scene."""
     if not scene.motion.omega_2:
         raise InputError("motion.omega_2", scene.motion.omega_2, "is needed, not zero: the models are driven")
     scene = replace(scene, drive_bar=2, drive=None)
-    gear, written = ratio(scene), mjcf(scene)
+    gear, written = ratio(scene), write_mjcf(scene)
     low, high = float(gear.theta_2[0]), float(gear.theta_2[-1])
     models = {"the loop": written}
     for fit in (gear.fits[MOST - 1], gear.fits[0]):
-        text = with_mimic(written, scene, fit.about, fit.joint_A, fit.theta_4)
+        text = replace_loop(written, scene, fit.about, fit.joint_A, fit.theta_4)
         models[f"mimic joint, degree {fit.degree}"] = text
-    return [_compared(name, text, scene, (low, high)) for name, text in models.items()]
+    return [_compare(name, text, scene, (low, high)) for name, text in models.items()]
 
 
-def _compared(name: str, model: str, scene: Scene, ends: tuple[float, float]) -> Lost:
-    from fourbar_validation.engines.mujoco.mimic import moved
+def _compare(name: str, model: str, scene: Scene, ends: tuple[float, float]) -> Lost:
+    from fourbar_validation.engines.mujoco.mimic import step_through
 
-    at, read = moved(model, scene, *ends)
+    at, read = step_through(model, scene, *ends)
     answer = FreeBody().answer(scene, at).quantities
     parts = {
         each: float(magnitude(read[each] - answer[each]).max() / magnitude(answer[each]).max())
@@ -68,13 +68,13 @@ def _compared(name: str, model: str, scene: Scene, ends: tuple[float, float]) ->
     return Lost(name, angle, parts, float(read["gap"].max()))
 
 
-def row(scene: str, of: Lost) -> list[str]:
+def write_row(scene: str, of: Lost) -> list[str]:
     """Write one row of the table."""
-    shares = [f"{_short(100.0 * of.parts[each])} %" if each in of.parts else "none" for each in PARTS]
-    return [scene, of.model, _short(math.degrees(of.angle)), *shares, _short(1e3 * of.gap)]
+    shares = [f"{_write_short(100.0 * of.parts[each])} %" if each in of.parts else "none" for each in PARTS]
+    return [scene, of.model, _write_short(math.degrees(of.angle)), *shares, _write_short(1e3 * of.gap)]
 
 
-def _short(number: float) -> str:
+def _write_short(number: float) -> str:
     return f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
 
 
@@ -88,20 +88,20 @@ def command(scenes: tuple[Path, ...], out: Path | None) -> int:
     rows = []
     for file in scenes or tuple(MODELS / f"{name}.toml" for name in SCENES):
         try:
-            rows += [row(file.stem, each) for each in lost(load(file))]
+            rows += [write_row(file.stem, each) for each in simulate_lost(load(file))]
         except InputError as error:
             raise error if error.file else error.in_file(str(file)) from None
-    Console().print(lined_up(HEADS, rows))
+    Console().print(make_table(HEADS, rows))
     if out is not None:
-        write_text(out, _page(rows))
+        write_text(out, _write_page(rows))
         click.echo(f"written to {out}")
     return 0
 
 
-def _page(rows: list[list[str]]) -> str:
+def _write_page(rows: list[list[str]]) -> str:
     lines = ["| " + " | ".join(cells) + " |" for cells in (HEADS, ["---"] * 2 + ["---:"] * (len(HEADS) - 2), *rows)]
-    used = ", ".join(f"{name} {version}" for name, version in versions().items())
-    return ABOUT.format(program=PROGRAM) + "\n".join(lines) + f"\n\n{NOTES}\n{used}; {machine()}.\n"
+    used = ", ".join(f"{name} {version}" for name, version in list_versions().items())
+    return ABOUT.format(program=PROGRAM) + "\n".join(lines) + f"\n\n{NOTES}\n{used}; {name_machine()}.\n"
 
 
 ABOUT = """\

@@ -53,17 +53,17 @@ class ProgramErrors:
     alpha_3_for_acceleration_of_G4: bool = False
 
 
-def printed() -> Any:
+def read_printed() -> Any:
     """Read the transcribed tables of the thesis."""
     return json.loads((DATA / "model_mechanism.json").read_text(encoding="utf-8"))
 
 
-def deg(angle: float) -> float:
+def to_degrees(angle: float) -> float:
     """Convert to degrees in [0, 360), as the thesis has them."""
     return math.degrees(angle) % 360.0
 
 
-def polar(r: float, angle: float) -> tuple[float, float]:
+def split_components(r: float, angle: float) -> tuple[float, float]:
     """Components."""
     return r * math.cos(angle), r * math.sin(angle)
 
@@ -73,15 +73,15 @@ def to_ours(theta: float) -> float:
     return math.remainder(theta + math.pi, 2.0 * math.pi)
 
 
-def scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
+def make_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
     """Make the model mechanism for our formulas, SI, uniform bars of `WIDTH`."""
     d, a, b, c = (0.01 * length for length in LENGTHS)
     centre = {bar: (0.01 * distance, 0.0) for bar, distance in CENTRE.items()}
     linkage = fourbar.FourBar(
         d,
         fourbar.Bar(a, MASSES[2], 1e-4 * INERTIA_2, centre[2]),
-        fourbar.Bar(b, MASSES[3], 1e-4 * inertia(3), centre[3]),
-        fourbar.Bar(c, MASSES[4], 1e-4 * inertia(4), centre[4]),
+        fourbar.Bar(b, MASSES[3], 1e-4 * compute_inertia(3), centre[3]),
+        fourbar.Bar(c, MASSES[4], 1e-4 * compute_inertia(4), centre[4]),
         ground_angle=to_ours(THETA_1),
     )
     loads = [fourbar.Load(2, (LOAD, 0.0), (0.01 * LOAD_ARM, LOAD_ANGLE))]
@@ -89,21 +89,21 @@ def scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
     return fourbar.Scene(linkage, fourbar.Motion(theta_2, OMEGA_2, branch=branch), 4, tuple(loads))
 
 
-def motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
+def compute_motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
     """Position to accelerations of the model mechanism by our formulas, SI."""
-    return fourbar.solve(scene(theta_2, branch), "acceleration")
+    return fourbar.solve(make_scene(theta_2, branch), "acceleration")
 
 
-def right_unknowns() -> dict[str, float]:
+def compute_right_unknowns() -> dict[str, float]:
     """Compute the 13 unknowns by our formulas at theta_2 = 135 deg, N and N cm."""
-    s = fourbar.solve(scene(THETA_2))
+    s = fourbar.solve(make_scene(THETA_2))
     assert s.F32 is not None and s.F43 is not None and s.torque is not None
     pins: dict[str, Any] = {"F12": s.F12, "F32": s.F32, "F23": -s.F32, "F43": s.F43, "F14": s.F14, "F34": -s.F43}
     forces = {name + axis: float(pins[name][0, k]) for name in pins for k, axis in enumerate("xy")}
     return {**forces, "T4": 100.0 * float(s.torque[0])}
 
 
-def inertia(bar: int, about_long_axis: bool = False) -> float:
+def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
     """I_G of bar 3 or 4, kg cm^2: m (L^2 + w^2)/12, or m w^2/12 as the thesis has it."""
     across = 0.0 if about_long_axis else LENGTHS[bar - 1] ** 2
     return MASSES[bar] * (across + WIDTH**2) / 12.0
@@ -113,7 +113,7 @@ class Kinematics:
     """Motion at theta_2 = 135 deg by our formulas, in cm and the thesis's angles, and the arms of the pin forces."""
 
     def __init__(self) -> None:
-        s = motion(np.array([THETA_2]))
+        s = compute_motion(np.array([THETA_2]))
         self.theta_3, self.theta_4 = float(s.theta_3[0]), to_ours(float(s.theta_4[0]))
         self.omega, self.alpha = (
             {bar: float(getattr(s, f"{name}_{bar}")[0]) for bar in MOVING_BARS} for name in ("omega", "alpha")
@@ -124,16 +124,16 @@ class Kinematics:
         self.slip = 2.0 * CENTRE[3] * self.alpha[3] * math.sin(self.theta_3)
         """What erratum 4 adds to the x component of A_G3/A: -(L w^2 cos - L alpha sin) for -(... + ...), eq 4.20."""
         self.arms = {  # from G; R14 points along B to O4, the thesis's theta_4
-            "R12": polar(-CENTRE[2], THETA_2),
-            "R32": polar(LENGTHS[1] - CENTRE[2], THETA_2),
-            "R23": polar(-CENTRE[3], self.theta_3),
-            "R43": polar(LENGTHS[2] - CENTRE[3], self.theta_3),
-            "R14": polar(CENTRE[4], self.theta_4),
-            "R34": polar(CENTRE[4] - LENGTHS[3], self.theta_4),
+            "R12": split_components(-CENTRE[2], THETA_2),
+            "R32": split_components(LENGTHS[1] - CENTRE[2], THETA_2),
+            "R23": split_components(-CENTRE[3], self.theta_3),
+            "R43": split_components(LENGTHS[2] - CENTRE[3], self.theta_3),
+            "R14": split_components(CENTRE[4], self.theta_4),
+            "R34": split_components(CENTRE[4] - LENGTHS[3], self.theta_4),
         }
 
 
-def equations(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
+def make_equations(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
     """Matrix and right side of section 5.7 at theta_2 = 135 deg, N and N cm.
 
     sum F = m A and sum M_G = I alpha of bars 2, 3, 4; F32 = -F23 and F34 = -F43.
@@ -149,14 +149,17 @@ def equations(errors: ProgramErrors, inertias: tuple[float, float] | None = None
     if errors.alpha_3_for_acceleration_of_G4:  # index 5 for 6
         k.a_G[4][0] = k.alpha[3]
     if inertias is None:
-        inertias = inertia(3, errors.inertia_about_long_axis), inertia(4, errors.inertia_about_long_axis)
+        inertias = (
+            compute_inertia(3, errors.inertia_about_long_axis),
+            compute_inertia(4, errors.inertia_about_long_axis),
+        )
     about_G = {2: INERTIA_2, 3: inertias[0], 4: inertias[1]}
     per_mass = 1.0 if errors.mass_times_acceleration_unscaled else TO_N
     per_inertia = 1.0 if errors.inertia_times_alpha_unscaled else TO_N
     force = {bar: per_mass * MASSES[bar] * k.a_G[bar] for bar in MOVING_BARS}
     moment = {bar: np.array([per_inertia * about_G[bar] * k.alpha[bar] - COUPLE]) for bar in MOVING_BARS}
     force[2][0] -= LOAD
-    moment[2] += polar(LOAD_ARM, LOAD_ANGLE)[1] * LOAD  # minus the moment of the load, -y F
+    moment[2] += split_components(LOAD_ARM, LOAD_ANGLE)[1] * LOAD  # minus the moment of the load, -y F
     first, second = (
         {bar: np.array([k.arms[name]]) for bar, name in zip(MOVING_BARS, names, strict=True)}
         for names in (("R12", "R23", "R14"), ("R32", "R43", "R34"))
@@ -165,9 +168,9 @@ def equations(errors: ProgramErrors, inertias: tuple[float, float] | None = None
     return matrix[0], right[0]
 
 
-def thesis_program(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
+def compute_thesis_program(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> dict[str, float]:
     """Compute the 13 unknowns of section 5.7 at theta_2 = 135 deg, N and N cm."""
-    unknowns = np.linalg.solve(*equations(errors, inertias))
+    unknowns = np.linalg.solve(*make_equations(errors, inertias))
     return dict(zip(UNKNOWNS, map(float, unknowns), strict=True))
 
 
@@ -177,7 +180,7 @@ def round_off(errors: ProgramErrors, inertias: tuple[float, float] | None = None
     13 eps |A^-1| (|A| |x| + |b|): each number of the system carries up to as many roundings as there are
     unknowns, from its own making and from the elimination (Higham, Accuracy and Stability, 7.2 and 9.3).
     """
-    matrix, right = equations(errors, inertias)
+    matrix, right = make_equations(errors, inertias)
     unknowns = np.linalg.solve(matrix, right)
     moved = np.abs(np.linalg.inv(matrix)) @ (np.abs(matrix) @ np.abs(unknowns) + np.abs(right))
     return dict(zip(UNKNOWNS, map(float, len(UNKNOWNS) * EPS * moved), strict=True))
@@ -199,6 +202,6 @@ STEPS: tuple[tuple[str, ProgramErrors, tuple[float, float] | None], ...] = (
 """The errata in the order in which they are made, from right to published."""
 
 
-def ladder() -> list[tuple[str, dict[str, float]]]:
+def climb_ladder() -> list[tuple[str, dict[str, float]]]:
     """Compute the unknowns after each further erratum, from right to published."""
-    return [(erratum, thesis_program(errors, inertias)) for erratum, errors, inertias in STEPS]
+    return [(erratum, compute_thesis_program(errors, inertias)) for erratum, errors, inertias in STEPS]

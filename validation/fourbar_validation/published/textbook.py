@@ -31,25 +31,25 @@ class TextbookAnswer(NamedTuple):
     note: str = ""
 
 
-def answers() -> list[TextbookAnswer]:
+def list_answers() -> list[TextbookAnswer]:
     """List all of them."""
     return [TextbookAnswer(**entry) for entry in tomllib.loads(ANSWERS.read_text(encoding="utf-8"))["answer"]]
 
 
-def textbook_figures() -> Iterator[PublishedFigure]:
+def compare_textbooks() -> Iterator[PublishedFigure]:
     """Compare each answer with ours."""
-    for answer in answers():
-        ours = value(_solved(answer.scene), answer.quantity, answer.position)
+    for answer in list_answers():
+        ours = compute_value(_solve(answer.scene), answer.quantity, answer.position)
         yield PublishedFigure("public test cases", f"{answer.scene} {answer.quantity}", answer.printed, ours)
 
 
-def value(solution: fourbar.Solution, quantity: str, position: int) -> float:
+def compute_value(solution: fourbar.Solution, quantity: str, position: int) -> float:
     """Compute a result, its negative, or the difference of two, at one position."""
     first, minus, second = quantity.partition(" - ")
     if minus:
-        return value(solution, first, position) - value(solution, second, position)
+        return compute_value(solution, first, position) - compute_value(solution, second, position)
     if quantity.startswith("-"):
-        return -value(solution, quantity[1:], position)
+        return -compute_value(solution, quantity[1:], position)
     name, axis = (quantity[:-2], AXES[quantity[-2:]]) if quantity[-2:] in AXES else (quantity, None)
     result: Any
     if name == "v_A":
@@ -61,11 +61,11 @@ def value(solution: fourbar.Solution, quantity: str, position: int) -> float:
 
 
 @cache
-def _solved(scene: str) -> fourbar.Solution:
+def _solve(scene: str) -> fourbar.Solution:
     return fourbar.solve(fourbar.load(SCENES / f"{scene}.toml"))
 
 
-def maple_figures() -> Iterator[PublishedFigure]:
+def compare_maple() -> Iterator[PublishedFigure]:
     """Compute the worksheet's two solutions of positions, theta_1 = 0, rad; and the constant of its real equation."""
     sheet = json.loads(SHEET.read_text(encoding="utf-8"))
     a, b, c, d = (float(sheet["inputs"][name]) for name in "abcd")

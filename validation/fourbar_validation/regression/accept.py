@@ -14,16 +14,25 @@ from fourbar_validation.compare.columns import CSV_ROWS
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import FAILS, Row
 from fourbar_validation.regression import render
-from fourbar_validation.regression.changes import Differences, compared, merged, under_new_names
+from fourbar_validation.regression.changes import Differences, compare_runs, merge_scenes, rename_scenes
 from fourbar_validation.regression.history import HISTORY, append
-from fourbar_validation.regression.record import ABOUT, ACCEPTED, TABLES, About, Recorded, accept, baseline, recorded
-from fourbar_validation.regression.scenes import renamed
-from fourbar_validation.regression.times import time_changes
+from fourbar_validation.regression.record import (
+    ABOUT,
+    ACCEPTED,
+    TABLES,
+    About,
+    Recorded,
+    accept,
+    find_baseline,
+    open_run,
+)
+from fourbar_validation.regression.scenes import find_renamed
+from fourbar_validation.regression.times import list_time_changes
 
 FORMS: dict[str, Callable[[Differences], str]] = {
-    "markdown": render.markdown,
-    "html": render.html,
-    "junit": render.junit,
+    "markdown": render.write_markdown,
+    "html": render.write_html,
+    "junit": render.write_junit,
 }
 """Forms in which the differences can be written, besides the text that is printed."""
 T = TypeVar("T")
@@ -33,7 +42,7 @@ CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
 """Option, and the column that it chooses by."""
 
 
-def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
+def add_output_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options --markdown, --html and --junit."""
     for form in reversed(FORMS):
         path = click.Path(path_type=Path, dir_okay=False)
@@ -43,7 +52,7 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def choosing_options(command: Callable[..., Any]) -> Callable[..., Any]:
+def add_choosing_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options --only, --engines and --quantity."""
     for option, column in reversed(CHOICES.items()):
         text = f"These alone, comma-separated: names of column {column}."
@@ -55,23 +64,23 @@ def report_differences(
     old: Path, new: Path, forms: dict[str, Path | None], chosen: dict[str, str | None] | None = None
 ) -> int:
     """Print the differences, write the forms wanted; 1 on a regression, or where nothing was compared."""
-    before, after = recorded(old), recorded(new)
-    names = renamed(before.about.scenes, after.about.scenes)
-    keep = _choice(chosen or {}, lambda column: chain(before.words(column), after.words(column)), names)
+    before, after = open_run(old), open_run(new)
+    names = find_renamed(before.about.scenes, after.about.scenes)
+    keep = _is_chosen(chosen or {}, lambda column: chain(before.words(column), after.words(column)), names)
     engines = set(after.words("engine"))
-    times = time_changes(merged(under_new_names(before.times(), names), after.times()))
-    scenes = in_sight(after.scenes(keep))
-    result = compared((before.about, before.scenes(keep)), (after.about, scenes), engines, times)
+    times = list_time_changes(merge_scenes(rename_scenes(before.times(), names), after.times()))
+    scenes = show_progress(after.scenes(keep))
+    result = compare_runs((before.about, before.scenes(keep)), (after.about, scenes), engines, times)
     unproven = [str(run.table) for run in (before, after) if not run.verified]
     result.notes += [f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing" for table in unproven]
     for form, path in forms.items():
         if path is not None:
             write_text(path, FORMS[form](result))
-    click.echo(render.text(result), nl=False)
+    click.echo(render.write_text(result), nl=False)
     return result.status
 
 
-def in_sight(scenes: Iterable[T]) -> Iterator[T]:
+def show_progress(scenes: Iterable[T]) -> Iterator[T]:
     """Pass them on, their number shown meanwhile where somebody looks."""
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -81,14 +90,14 @@ def in_sight(scenes: Iterable[T]) -> Iterator[T]:
         yield from progress.track(scenes)
 
 
-def _choice(
+def _is_chosen(
     chosen: dict[str, str | None],
     words: Callable[[str], Iterable[str]],
     renamed: Mapping[str, str] = MappingProxyType({}),
 ) -> Callable[[Row], bool]:
     """Whether a row is of what the options name; InputError for a name that does not stand in its column.
 
-    `renamed`: of a scene with an old and a new name either means both.
+    `find_renamed`: of a scene with an old and a new name either means both.
     """
     wanted: dict[str, set[str]] = {}
     for option, text in chosen.items():
@@ -110,8 +119,8 @@ def _choice(
 @click.command()
 @click.argument("old")
 @click.argument("new", type=click.Path(path_type=Path))
-@choosing_options
-@output_options
+@add_choosing_options
+@add_output_options
 def compare(
     old: str, new: Path, only: str | None, engines: str | None, quantity: str | None, **forms: Path | None
 ) -> int:
@@ -122,7 +131,7 @@ def compare(
     Exit status 1 on a regression: a verdict that got worse, an error that grew beyond round-off and its allowance,
     a row that was run for and is gone, a new row that fails; and where nothing was compared.
     """
-    return report_differences(baseline(old), new, forms, {"only": only, "engines": engines, "quantity": quantity})
+    return report_differences(find_baseline(old), new, forms, {"only": only, "engines": engines, "quantity": quantity})
 
 
 @click.command(name="accept")
@@ -142,7 +151,7 @@ def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     for name in (*TABLES, ABOUT, HISTORY):
         if (target / name).is_dir():
             raise InputError("--to", str(target / name), "must name a file, not a folder")
-    run = recorded(results)
+    run = open_run(results)
     counts = Counts(run.rows())
     if counts.status != HOLDS and not even_failing:
         why = f"{counts[FAILS]} comparisons fail" if counts[FAILS] else "nothing was compared"
@@ -150,7 +159,7 @@ def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     _require_verified(run)
     too_long = counts.total > CSV_ROWS
     if not too_long:
-        append(target / HISTORY, *_whole(run))  # first: where it is damaged nothing is written
+        append(target / HISTORY, *_read_whole(run))  # first: where it is damaged nothing is written
     accept(run, target)
     history = "too many for a history" if too_long else f"appended to {target / HISTORY}"
     click.echo(f"accepted: {target} ({counts.total} rows; {history})")
@@ -162,7 +171,7 @@ def _require_verified(run: Recorded) -> None:
         raise InputError("RESULTS", str(run.table), f"needs a {ABOUT} with its rows and SHA-256; `run` writes one")
 
 
-def _whole(run: Recorded) -> tuple[tuple[About, list[Row]], dict[tuple[str, str], float]]:
+def _read_whole(run: Recorded) -> tuple[tuple[About, list[Row]], dict[tuple[str, str], float]]:
     """All rows and times of a run, as a history takes them; InputError where there are too many."""
     rows = list(islice(run.rows(), CSV_ROWS + 1))
     if len(rows) > CSV_ROWS:
@@ -175,7 +184,7 @@ def _whole(run: Recorded) -> tuple[tuple[About, list[Row]], dict[tuple[str, str]
 @click.option("--add", type=click.Path(path_type=Path), metavar="RESULTS", help="Append this run first.")
 @click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
               help="Page to write; left out: history.html next to HISTORY.")  # fmt: skip
-@choosing_options
+@add_choosing_options
 def history(
     history: Path, add: Path | None, out: Path | None, only: str | None, engines: str | None, quantity: str | None
 ) -> None:
@@ -184,23 +193,23 @@ def history(
     Error, verdict and time by date, commit and engine version, and the step at which each row changed.
     """
     from fourbar_validation.regression.history import read_history
-    from fourbar_validation.regression.history_page import page
-    from fourbar_validation.regression.steps import steps
+    from fourbar_validation.regression.history_page import write_page
+    from fourbar_validation.regression.steps import find_steps
 
     file = history / HISTORY if history.is_dir() or not history.suffix else history
     if add is not None:
-        run = recorded(add)
+        run = open_run(add)
         _require_verified(run)
-        append(file, *_whole(run))
+        append(file, *_read_whole(run))
     runs = read_history(file)
-    keep = _choice(
+    keep = _is_chosen(
         {"only": only, "engines": engines, "quantity": quantity},
         lambda column: (getattr(row, column) for run in runs for row in run.rows),
     )
     runs = [run.of(keep) for run in runs]
-    result = steps(runs)
+    result = find_steps(runs)
     target = file.with_name("history.html") if out is None else out
-    write_text(target, page(runs, result))
+    write_text(target, write_page(runs, result))
     for step in result:
         click.echo(step.sentence())
     changed = f"{len(result)} step{'s' if len(result) > 1 else ''} changed something" if result else "nothing changed"

@@ -68,7 +68,7 @@ class Change:
         return new.failed, math.inf if math.isnan(grown) else grown
 
 
-def change(key: Key, old: Row | None, new: Row | None) -> Change:
+def compare_row(key: Key, old: Row | None, new: Row | None) -> Change:
     """Compare a row of both runs, or take that of one of them."""
     if old is None or new is None:
         fails = new is not None and new.verdict == FAILS
@@ -78,10 +78,10 @@ def change(key: Key, old: Row | None, new: Row | None) -> Change:
         return Change(kind, key, old, new, math.nan)
     condition = min((c for c in (old.condition, new.condition) if c > 0.0), default=1.0)
     round_off = ROUND_OFF * EPS / condition
-    return Change(_kind(old, new, round_off), key, old, new, round_off)
+    return Change(_choose_kind(old, new, round_off), key, old, new, round_off)
 
 
-def _kind(old: Row, new: Row, round_off: float) -> Kind:
+def _choose_kind(old: Row, new: Row, round_off: float) -> Kind:
     if old.verdict != new.verdict:
         worse = VERDICTS.index(new.verdict) > VERDICTS.index(old.verdict)
         return Kind.VERDICT_WORSE if worse else Kind.VERDICT_BETTER

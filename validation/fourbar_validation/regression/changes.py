@@ -10,12 +10,12 @@ from typing import TypeVar
 
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import FAILS, FORMULAS, VERDICTS, Row, sorted_rows
-from fourbar_validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, change
+from fourbar_validation.compare.rows import FAILS, FORMULAS, VERDICTS, Row, sort_rows
+from fourbar_validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, compare_row
 from fourbar_validation.regression.fault import Fault
 from fourbar_validation.regression.record import About
-from fourbar_validation.regression.scenes import SceneChange, renamed, scene_changes
-from fourbar_validation.regression.times import Time, TimeChange, time_changes
+from fourbar_validation.regression.scenes import SceneChange, find_renamed, list_scene_changes
+from fourbar_validation.regression.times import Time, TimeChange, list_time_changes
 
 KEPT = 10_000
 """Rows of one kind that are listed, the worst of them; all are counted."""
@@ -89,7 +89,7 @@ class Differences:
             elif each.kind is Kind.NOT_RUN:
                 self._scenes_not_run.add(f"scene {each.key[0]}")
             elif each.kind in OTHER_QUESTION and each.old is not None and each.new is not None:
-                self._not_compared.add(_why_not(each, each.old, each.new))
+                self._not_compared.add(_explain_refusal(each, each.old, each.new))
             some = self._changes.setdefault(each.kind, [])
             some.append(each)
             if len(some) > 2 * self.kept:
@@ -151,33 +151,33 @@ class Differences:
         return FAILED if self.regressed or self.nothing else HOLDS
 
 
-def _why_not(of: Change, old: Row, new: Row) -> str:
+def _explain_refusal(of: Change, old: Row, new: Row) -> str:
     if of.kind is Kind.OTHER_SETTING:
         return f"{of.key[0]} / {of.key[1]}: {old.setting} -> {new.setting}"
     return f"scene {of.key[0]} {'changed' if of.kind is Kind.OTHER_SCENE else 'has other positions'}"
 
 
-def differences(
+def compare_rows(
     old: tuple[About, Iterable[Row]],
     new: tuple[About, Iterable[Row]],
     times: tuple[Mapping[tuple[str, str], float], Mapping[tuple[str, str], float]] = ({}, {}),
     kept: int = KEPT,
 ) -> Differences:
     """Compare two runs whose rows are at hand, in any order."""
-    before, after = (sorted_rows(run[1]) for run in (old, new))
+    before, after = (sort_rows(run[1]) for run in (old, new))
     engines = {row.engine for row in after}
-    names = renamed(old[0].scenes, new[0].scenes)
-    timed = under_new_names(_times_by_scene(times[0]), names), _times_by_scene(times[1])
-    changed = time_changes(merged(*timed))
-    return compared((old[0], by_scene(before)), (new[0], by_scene(after)), engines, changed, kept)
+    names = find_renamed(old[0].scenes, new[0].scenes)
+    timed = rename_scenes(_group_times(times[0]), names), _group_times(times[1])
+    changed = list_time_changes(merge_scenes(*timed))
+    return compare_runs((old[0], group_by_scene(before)), (new[0], group_by_scene(after)), engines, changed, kept)
 
 
-def _times_by_scene(times: Mapping[tuple[str, str], float]) -> Iterator[tuple[str, list[Time]]]:
+def _group_times(times: Mapping[tuple[str, str], float]) -> Iterator[tuple[str, list[Time]]]:
     for scene, some in groupby(sorted(times.items()), key=lambda item: item[0][0]):
         yield scene, [(engine, time) for (_, engine), time in some]
 
 
-def compared(
+def compare_runs(
     old: tuple[About, ByScene[Row]],
     new: tuple[About, ByScene[Row]],
     engines: set[str],
@@ -190,16 +190,16 @@ def compared(
     ----------
     engines : those that have rows in the new run.
     """
-    scenes = {each.scene: each for each in scene_changes(old[0].scenes, new[0].scenes)}
-    names = renamed(old[0].scenes, new[0].scenes)
-    surroundings, older = _surroundings(old[0], new[0])
+    scenes = {each.scene: each for each in list_scene_changes(old[0].scenes, new[0].scenes)}
+    names = find_renamed(old[0].scenes, new[0].scenes)
+    surroundings, older = _list_surroundings(old[0], new[0])
     notes = [f"renamed: {before} -> {after}" for before, after in names.items()]
     result = Differences(surroundings, list(scenes.values()), notes, times, kept)
     known = engines | (new[0].engines or set())
-    for scene, before, after in merged(under_new_names(old[1], names), new[1]):
+    for scene, before, after in merge_scenes(rename_scenes(old[1], names), new[1]):
         wanted = scene in new[0].scenes if new[0].scenes else bool(after) or not engines
-        rows = _by_key(scene, before), _by_key(scene, after)
-        result.add(_of_scene(*rows, known if wanted else set(), wanted, scenes.get(scene)))
+        rows = _index_rows(scene, before), _index_rows(scene, after)
+        result.add(_compare_scene(*rows, known if wanted else set(), wanted, scenes.get(scene)))
     if older:
         result.notes += [
             f"{result.compared} of {result.rows} rows are compared: the others are of one run alone",
@@ -208,28 +208,28 @@ def compared(
     return result
 
 
-def under_new_names(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
+def rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
     """Each scene of the old run by the name that the new one gives it; nothing is held where none has another."""
     if not names:
         return scenes
     return sorted(((names.get(name, name), some) for name, some in scenes), key=lambda each: each[0])
 
 
-def by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
+def group_by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
     """Group the rows by scene."""
     for scene, some in groupby(rows, key=lambda row: row.scene):
         yield scene, list(some)
 
 
-def merged(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
+def merge_scenes(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
     """Each scene that either run has, with what both have of it; InputError where the scenes are not in order."""
-    both = merge(_in_order("OLD", old), _in_order("NEW", new), key=lambda each: each[0])
+    both = merge(_require_order("OLD", old), _require_order("NEW", new), key=lambda each: each[0])
     for scene, some in groupby(both, key=lambda each: each[0]):
         rows = {run: each for _, run, each in some}
         yield scene, rows.get("OLD", ()), rows.get("NEW", ())
 
 
-def _in_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, str, Sequence[T]]]:
+def _require_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, str, Sequence[T]]]:
     last = None
     for scene, rows in scenes:
         if last is not None and scene <= last:
@@ -238,22 +238,22 @@ def _in_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, str, Sequence
         yield scene, run, rows
 
 
-def _by_key(scene: str, rows: Iterable[Row]) -> dict[Key, Row]:
+def _index_rows(scene: str, rows: Iterable[Row]) -> dict[Key, Row]:
     worst_last = sorted(rows, key=lambda row: VERDICTS.index(row.verdict))  # of two of one name the worse one counts
     return {(scene, row.engine, row.setting, row.quantity): row for row in worst_last}
 
 
-def _of_scene(
+def _compare_scene(
     before: Mapping[Key, Row], after: Mapping[Key, Row], engines: set[str], wanted: bool, other: SceneChange | None
 ) -> list[Change]:
     """Tell what happened to each row of a scene; `engines`: those it was run for, where it was `wanted` at all."""
-    settings = _other_settings(before, after)
+    settings = _list_other_settings(before, after)
     changes = []
     for key in sorted(before.keys() | after.keys()):
         if key in settings.values():
             continue  # it stands with its counterpart
         old, new = before.get(key), after.get(settings.get(key, key))
-        result = change(key, old, new)
+        result = compare_row(key, old, new)
         if new is None and not (wanted and (key[1] in engines or key[1] == FORMULAS)):
             result = Change(Kind.NOT_RUN, key, old, None, math.nan)
         elif old is not None and new is not None and (other is not None or key in settings):
@@ -265,7 +265,7 @@ def _of_scene(
     return changes
 
 
-def _other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict[Key, Key]:
+def _list_other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict[Key, Key]:
     """Rows that both runs have with one setting each, but not the same: old key to new key."""
 
     def alone(keys: Iterable[Key]) -> dict[tuple[str, str, str], Key]:
@@ -278,12 +278,12 @@ def _other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict
     return {old[name]: new[name] for name in old.keys() & new.keys() if "-" not in (old[name][2], new[name][2])}
 
 
-def _surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], list[str]]:
+def _list_surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], list[str]]:
     """List what the runs were made with where it differs, and what a record cannot say."""
     result = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
-    result += _both(old.versions, new.versions)
+    result += _take_both(old.versions, new.versions)
     result.append(("machine", old.machine, new.machine))
-    result += [each for each in _both(old.settings, new.settings) if each[0] != "suite"]
+    result += [each for each in _take_both(old.settings, new.settings) if each[0] != "suite"]
     suites = [each.settings.get("suite", "not recorded")[:12] for each in (old, new)]
     notes = []
     if suites[0] != suites[1] and not (old.scenes and new.scenes):
@@ -293,6 +293,6 @@ def _surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], l
     return [(what, before, after) for what, before, after in result if before != after], notes
 
 
-def _both(old: Mapping[str, str], new: Mapping[str, str]) -> list[tuple[str, str, str]]:
+def _take_both(old: Mapping[str, str], new: Mapping[str, str]) -> list[tuple[str, str, str]]:
     none = "not recorded"
     return [(what, old.get(what, none), new.get(what, none)) for what in sorted(old.keys() | new.keys())]

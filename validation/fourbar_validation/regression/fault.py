@@ -56,15 +56,17 @@ class Fault:
         self._scenes.update({each.key[1] for each in changes if each.kind is not Kind.NOT_RUN})
         groups: dict[tuple[str, Kind, str], list[Change]] = {}
         for each in changes:
-            groups.setdefault((each.key[1], each.kind, cause(each)), []).append(each)
+            groups.setdefault((each.key[1], each.kind, find_cause(each)), []).append(each)
         for key, some in groups.items():
             if key not in self._groups and len(self._groups) >= MOST_CAUSES:
                 key = (*key[:2], "other causes")  # noqa: PLW2901
             self._groups.setdefault(key, Group(*key)).add(some)
         worse = {each.key[1] for each in changes if each.regression}
         if worse:
-            exact = {each.key[1] for each in changes if _compared_exactly(each.old) or _compared_exactly(each.new)}
-            self._who[sentence(worse, exact), frozenset(worse)] += 1
+            exact = {
+                each.key[1] for each in changes if _is_compared_exactly(each.old) or _is_compared_exactly(each.new)
+            }
+            self._who[write_sentence(worse, exact), frozenset(worse)] += 1
 
     def groups(self, kinds: Iterable[Kind]) -> list[Group]:
         """Those of some kinds, the worst first; each with the number of its engine's scenes."""
@@ -73,7 +75,7 @@ class Fault:
         for group in result:
             group.of_scenes = self._scenes[group.engine]
         order = list(Kind)
-        return sorted(result, key=lambda g: (order.index(g.kind), *(-x for x in _severity(g)), -g.rows, g.engine))
+        return sorted(result, key=lambda g: (order.index(g.kind), *(-x for x in _rank_severity(g)), -g.rows, g.engine))
 
     @property
     def sentences(self) -> list[str]:
@@ -86,15 +88,15 @@ class Fault:
         return [f"{text}, {n} of {of[text]} scenes" for text, n in counts.most_common()]
 
 
-def _severity(group: Group) -> tuple[bool, float]:
+def _rank_severity(group: Group) -> tuple[bool, float]:
     return group.worst.severity if group.worst is not None else (False, 0.0)
 
 
-def _compared_exactly(row: Row | None) -> bool:
+def _is_compared_exactly(row: Row | None) -> bool:
     return row is not None and row.setting == EXACT and row.compared and row.engine != FORMULAS
 
 
-def cause(of: Change) -> str:
+def find_cause(of: Change) -> str:
     """Take the reason without its numbers: one cause has one text in all scenes."""
     if of.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE) and of.new is not None:
         came = f"{of.old.verdict} -> {of.new.verdict}" if of.old is not None else of.new.verdict
@@ -102,7 +104,7 @@ def cause(of: Change) -> str:
     return ""
 
 
-def sentence(worse: set[str], exact: set[str]) -> str:
+def write_sentence(worse: set[str], exact: set[str]) -> str:
     """Who is at fault in a scene where the rows of `worse` regressed; `exact` are the engines held to round-off."""
     engines = worse - {FORMULAS}
     if len(exact) > 1 and engines >= exact:

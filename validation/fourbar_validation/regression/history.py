@@ -16,8 +16,8 @@ from typing import Any
 
 from fourbar.errors import InputError
 from fourbar.writing import write_bytes
-from fourbar_validation.compare.columns import or_null
-from fourbar_validation.compare.rows import MADE_OF, Row, plain, sorted_rows
+from fourbar_validation.compare.columns import null_nan
+from fourbar_validation.compare.rows import MADE_OF, Row, make_plain, sort_rows
 from fourbar_validation.regression.record import About
 
 HISTORY = "history.parquet"
@@ -56,12 +56,12 @@ def append(file: Path, run: tuple[About, list[Row]], times: Mapping[tuple[str, s
     import pyarrow as pa
 
     about, rows = run
-    new = _table(about, rows, times)
+    new = _write_table(about, rows, times)
     if file.exists():
         old = _read(file)
         if new["run"][0].as_py() in set(old["run"].to_pylist()):
             return
-        scenes = {**_scenes(old), **_scenes(new)}
+        scenes = {**_list_scenes(old), **_list_scenes(new)}
         new = pa.concat_tables([old, new], promote_options="default")
         new = new.replace_schema_metadata({SCENES: json.dumps(scenes, sort_keys=True).encode()})
     _write(file, new)
@@ -72,13 +72,13 @@ def read_history(file: Path) -> list[HistoryRun]:
     if not file.is_file():
         raise InputError("HISTORY", str(file), "there is no such file; `accept` and `history --add` make it")
     table = _read(file)
-    scenes = _scenes(table)
+    scenes = _list_scenes(table)
     runs: dict[str, HistoryRun] = {}
     hashes: dict[str, dict[str, str]] = {}
     for cells in table.to_pylist():
         name = cells["run"]
         if name not in runs:
-            runs[name] = HistoryRun(_about(cells), [], {})
+            runs[name] = HistoryRun(_describe_run(cells), [], {})
         _put(runs[name], hashes.setdefault(name, {}), cells)
     for name, run in runs.items():
         stated = {scene: scenes[each] for scene, each in hashes[name].items() if each in scenes}
@@ -87,7 +87,7 @@ def read_history(file: Path) -> list[HistoryRun]:
 
 
 def _put(run: HistoryRun, hashes: dict[str, str], cells: Mapping[str, Any]) -> None:
-    scene, engine = plain(cells["scene"]), plain(cells["engine"])
+    scene, engine = make_plain(cells["scene"]), make_plain(cells["engine"])
     if cells["scene_hash"]:
         hashes[scene] = cells["scene_hash"]
     if cells["quantity"] == TIME:
@@ -96,24 +96,26 @@ def _put(run: HistoryRun, hashes: dict[str, str], cells: Mapping[str, Any]) -> N
     values: dict[str, Any] = {}
     for name in OF_A_ROW:
         cell = cells[name]
-        values[name] = plain(cell) if isinstance(cell, str) else math.nan if cell is None else cell
+        values[name] = make_plain(cell) if isinstance(cell, str) else math.nan if cell is None else cell
     run.rows.append(Row(**values))
 
 
-def _about(cells: Mapping[str, Any]) -> About:
-    versions = {name.removeprefix("version_"): plain(value) for name, value in cells.items()
+def _describe_run(cells: Mapping[str, Any]) -> About:
+    versions = {name.removeprefix("version_"): make_plain(value) for name, value in cells.items()
                 if name.startswith("version_") and value}  # fmt: skip
-    settings = {plain(key): plain(value) for key, value in json.loads(cells["settings"]).items()}
-    return About(versions, plain(cells["machine"]), settings, {}, plain(cells["date"]), plain(cells["commit"]))
+    settings = {make_plain(key): make_plain(value) for key, value in json.loads(cells["settings"]).items()}
+    return About(
+        versions, make_plain(cells["machine"]), settings, {}, make_plain(cells["date"]), make_plain(cells["commit"])
+    )
 
 
-def _table(about: About, rows: list[Row], times: Mapping[tuple[str, str], float]) -> Any:
+def _write_table(about: About, rows: list[Row], times: Mapping[tuple[str, str], float]) -> Any:
     """Write a run as columns; words that recur are kept once."""
     import pyarrow as pa
 
     hashes = {name: _hash(entries) for name, entries in about.scenes.items()}
     nothing: dict[str, Any] = dict.fromkeys((*OF_A_ROW, "times_formulas"))
-    lines = [nothing | {name: or_null(getattr(row, name)) for name in OF_A_ROW} for row in sorted_rows(rows)]
+    lines = [nothing | {name: null_nan(getattr(row, name)) for name in OF_A_ROW} for row in sort_rows(rows)]
     for (scene, engine), ratio in sorted(times.items()):
         lines.append(nothing | {"scene": scene, "engine": engine, "quantity": TIME, "times_formulas": ratio})
     name = hashlib.sha256(repr((about.date, [tuple(line.values()) for line in lines])).encode()).hexdigest()[:16]
@@ -133,9 +135,11 @@ def _hash(entries: Mapping[str, str]) -> str:
     return hashlib.sha256(json.dumps(dict(entries), sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _scenes(table: Any) -> dict[str, dict[str, str]]:
+def _list_scenes(table: Any) -> dict[str, dict[str, str]]:
     kept = json.loads((table.schema.metadata or {}).get(SCENES, b"{}"))
-    return {plain(key): {plain(k): plain(v) for k, v in entries.items()} for key, entries in kept.items()}
+    return {
+        make_plain(key): {make_plain(k): make_plain(v) for k, v in entries.items()} for key, entries in kept.items()
+    }
 
 
 def _read(file: Path) -> Any:
@@ -143,12 +147,12 @@ def _read(file: Path) -> Any:
     import pyarrow.parquet as pq
 
     data = file.read_bytes()
-    if _sealed(data) != data:
+    if _seal(data) != data:
         raise InputError("HISTORY", str(file), "is damaged, or no history written by `accept`: its SHA-256 is another")
     return pq.read_table(pa.BufferReader(data))
 
 
-def _sealed(data: bytes) -> bytes:
+def _seal(data: bytes) -> bytes:
     """Put the SHA-256 of a file into its notes; nothing where there is no place for one."""
     places = [each.span(1) for each in re.finditer(re.escape(SEAL) + rb"..([0-9a-f]{64})", data, re.DOTALL)]
     if not places:
@@ -167,4 +171,4 @@ def _write(file: Path, table: Any) -> None:
     notes = {**(table.schema.metadata or {}), SEAL: UNSEALED}
     pq.write_table(table.replace_schema_metadata(notes), sink, compression="zstd")
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(file, _sealed(sink.getvalue().to_pybytes()))
+    write_bytes(file, _seal(sink.getvalue().to_pybytes()))

@@ -8,14 +8,14 @@ from statistics import fmean, stdev
 from typing import TYPE_CHECKING
 
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, FORMULAS, REFUSES, VERDICTS
-from fourbar_validation.compare.tolerance import used
+from fourbar_validation.compare.tolerance import find_used
 from fourbar_validation.regression.change import Key
 from fourbar_validation.regression.history import HistoryRun
-from fourbar_validation.regression.render import line
+from fourbar_validation.regression.render import write_line
 from fourbar_validation.regression.steps import Step
-from fourbar_validation.report.colours import ALLOWED, GRID, INK, SOFT, style_of
-from fourbar_validation.report.svg import FLOOR, frame, svg_text
-from fourbar_validation.report.templating import rendered
+from fourbar_validation.report.colours import ALLOWED, GRID, INK, SOFT, choose_style
+from fourbar_validation.report.svg import FLOOR, set_frame, write_svg
+from fourbar_validation.report.templating import render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,19 +33,22 @@ LABELS = 6
 """Runs named on an axis."""
 
 
-def page(runs: Sequence[HistoryRun], found: Sequence[Step]) -> str:
+def write_page(runs: Sequence[HistoryRun], found: Sequence[Step]) -> str:
     """Make the page, complete in one file."""
     changed = list(dict.fromkeys(change.key for step in reversed(found) for change in step.changes if change.new))
-    pictures = [("Verdicts of each run", _verdicts(runs)), ("Worst error over what is allowed", _errors(runs))]
+    pictures = [
+        ("Verdicts of each run", _draw_verdicts(runs)),
+        ("Worst error over what is allowed", _draw_errors(runs)),
+    ]
     if any(run.times for run in runs):
-        pictures.append((TIMED, _times(runs)))
-    rows = [(" / ".join(part for part in key if part), _row(runs, key)) for key in changed[:ROWS_DRAWN]]
-    listed = [(step, [(c.kind.value, line(c)) for c in step.changes[:ROWS_LISTED]]) for step in reversed(found)]
-    verdicts = [verdict for verdict in VERDICTS if any(_counts(run)[verdict] for run in runs)]
-    return rendered(
+        pictures.append((TIMED, _draw_times(runs)))
+    rows = [(" / ".join(part for part in key if part), _draw_row(runs, key)) for key in changed[:ROWS_DRAWN]]
+    listed = [(step, [(c.kind.value, write_line(c)) for c in step.changes[:ROWS_LISTED]]) for step in reversed(found)]
+    verdicts = [verdict for verdict in VERDICTS if any(_list_counts(run)[verdict] for run in runs)]
+    return render(
         "fourbar_validation.regression",
         "history.html.j2",
-        runs=[_cells(run, verdicts) for run in reversed(runs)],
+        runs=[_list_cells(run, verdicts) for run in reversed(runs)],
         headings=("date, commit", *verdicts, "versions", "machine"),
         steps=listed,
         pictures=pictures,
@@ -55,16 +58,16 @@ def page(runs: Sequence[HistoryRun], found: Sequence[Step]) -> str:
     )
 
 
-def _cells(run: HistoryRun, verdicts: Sequence[str]) -> tuple[object, ...]:
+def _list_cells(run: HistoryRun, verdicts: Sequence[str]) -> tuple[object, ...]:
     versions = ", ".join(f"{name} {version}" for name, version in run.about.versions.items())
-    return run.name, *(_counts(run)[verdict] for verdict in verdicts), versions, run.about.machine
+    return run.name, *(_list_counts(run)[verdict] for verdict in verdicts), versions, run.about.machine
 
 
-def _counts(run: HistoryRun) -> Counter[str]:
+def _list_counts(run: HistoryRun) -> Counter[str]:
     return Counter(row.verdict for row in run.rows)
 
 
-def _figure(draw: "Callable[[Axes], None]", runs: Sequence[HistoryRun], salt: str) -> str:
+def _draw_figure(draw: "Callable[[Axes], None]", runs: Sequence[HistoryRun], salt: str) -> str:
     """Draw over the runs, with their names and a legend."""
     from matplotlib.figure import Figure
 
@@ -72,16 +75,16 @@ def _figure(draw: "Callable[[Axes], None]", runs: Sequence[HistoryRun], salt: st
     axes = figure.add_subplot()
     draw(axes)
     figure.legend(loc="outside lower center", ncols=3, fontsize=6.5, frameon=False)
-    frame(axes)
+    set_frame(axes)
     _name_runs(axes, runs)
-    return svg_text(figure, salt)
+    return write_svg(figure, salt)
 
 
 def _name_runs(axes: "Axes", runs: Sequence[HistoryRun]) -> None:
     """Dates and commits under some of the runs, and a line where the version of a library changed."""
     every = max(1, math.ceil(len(runs) / LABELS))
     shown = range(len(runs) - 1, -1, -every)
-    labels = [f"{_day(runs[i].about.date)}\n{runs[i].about.commit[:7]}" for i in shown]
+    labels = [f"{_write_day(runs[i].about.date)}\n{runs[i].about.commit[:7]}" for i in shown]
     axes.set_xticks(list(shown), labels, fontsize=6.5)
     axes.set_xlim(-0.6, len(runs) - 0.4)
     for i in range(1, len(runs)):
@@ -94,18 +97,18 @@ def _name_runs(axes: "Axes", runs: Sequence[HistoryRun]) -> None:
                           textcoords="offset points", fontsize=6.5, color=INK)  # fmt: skip
 
 
-def _day(date: str) -> str:
+def _write_day(date: str) -> str:
     try:
         return datetime.fromisoformat(date).strftime("%y-%m-%d")
     except ValueError:
         return "no date"
 
 
-def _verdicts(runs: Sequence[HistoryRun]) -> str:
+def _draw_verdicts(runs: Sequence[HistoryRun]) -> str:
     def draw(axes: "Axes") -> None:
         below = [0] * len(runs)
         for verdict in VERDICTS:
-            counts = [_counts(run)[verdict] for run in runs]
+            counts = [_list_counts(run)[verdict] for run in runs]
             if not any(counts):
                 continue
             axes.bar(range(len(runs)), counts, bottom=below, color=COLOURS.get(verdict, SOFT), label=verdict,
@@ -113,29 +116,29 @@ def _verdicts(runs: Sequence[HistoryRun]) -> str:
             below = [base + count for base, count in zip(below, counts, strict=True)]
         axes.set_ylabel("rows")
 
-    return _figure(draw, runs, "verdicts")
+    return _draw_figure(draw, runs, "verdicts")
 
 
-def _engines(runs: Sequence[HistoryRun]) -> list[str]:
+def _list_engines(runs: Sequence[HistoryRun]) -> list[str]:
     return list(dict.fromkeys(row.engine for run in runs for row in run.rows if row.compared))
 
 
-def _errors(runs: Sequence[HistoryRun]) -> str:
+def _draw_errors(runs: Sequence[HistoryRun]) -> str:
     def draw(axes: "Axes") -> None:
-        for engine in _engines(runs):
+        for engine in _list_engines(runs):
             judged = [[row for row in run.rows if row.engine == engine and row.compared and math.isfinite(row.error)]
                       for run in runs]  # fmt: skip
-            shares = [[max(float(used(row.error, row.allowed)), FLOOR) for row in rows] for rows in judged]
+            shares = [[max(float(find_used(row.error, row.allowed)), FLOOR) for row in rows] for rows in judged]
             worst = [max(each, default=math.nan) for each in shares]
-            axes.plot(range(len(runs)), worst, label=engine, **style_of(engine).line)
+            axes.plot(range(len(runs)), worst, label=engine, **choose_style(engine).line)
         axes.set_yscale("log")
         axes.axhline(1.0, color=ALLOWED, linewidth=1.0, linestyle="--")
         axes.set_ylabel("error / allowed")
 
-    return _figure(draw, runs, "errors")
+    return _draw_figure(draw, runs, "errors")
 
 
-def _times(runs: Sequence[HistoryRun]) -> str:
+def _draw_times(runs: Sequence[HistoryRun]) -> str:
     """Each engine's times over those of the first run that has the scene: their mean and its standard error."""
     first: dict[tuple[str, str], float] = {}
     for run in runs:
@@ -151,21 +154,21 @@ def _times(runs: Sequence[HistoryRun]) -> str:
             spread = [math.exp(stdev(logs[i]) / math.sqrt(len(logs[i]))) if len(logs[i]) > 1 else 1.0 for i in where]
             bars = [[m - m / s for m, s in zip(means, spread, strict=True)],
                     [m * s - m for m, s in zip(means, spread, strict=True)]]  # fmt: skip
-            axes.errorbar(where, means, yerr=bars, capsize=2.0, label=engine, **style_of(engine).line)
+            axes.errorbar(where, means, yerr=bars, capsize=2.0, label=engine, **choose_style(engine).line)
         axes.set_ylim(bottom=0.0)
         axes.set_ylabel("time / first time")
 
-    return _figure(draw, runs, "times")
+    return _draw_figure(draw, runs, "times")
 
 
-def _row(runs: Sequence[HistoryRun], key: Key) -> str:
+def _draw_row(runs: Sequence[HistoryRun], key: Key) -> str:
     """Draw the error of one row over the runs, what it is allowed, and a ring where it fails."""
 
     def draw(axes: "Axes") -> None:
         rows = {i: row for i, run in enumerate(runs) for row in run.rows
                 if (row.scene, row.engine, row.setting, row.quantity) == key}  # fmt: skip
         there = [i for i, row in rows.items() if math.isfinite(row.error)]
-        axes.plot(there, [max(rows[i].error, FLOOR) for i in there], label="error", **style_of(key[1]).line)
+        axes.plot(there, [max(rows[i].error, FLOOR) for i in there], label="error", **choose_style(key[1]).line)
         axes.plot(there, [max(rows[i].allowed, FLOOR) for i in there], color=ALLOWED, linestyle="--",
                   linewidth=1.0, label="allowed")  # fmt: skip
         failed = [i for i in there if rows[i].failed]
@@ -174,4 +177,4 @@ def _row(runs: Sequence[HistoryRun], key: Key) -> str:
         axes.set_yscale("log")
         axes.set_ylabel("error")
 
-    return _figure(draw, runs, "row" + "/".join(key))
+    return _draw_figure(draw, runs, "row" + "/".join(key))

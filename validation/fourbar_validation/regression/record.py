@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from fourbar.errors import InputError
-from fourbar.writing import naming, write_text
-from fourbar_validation.compare.columns import column_of, read_columns, rows_in
-from fourbar_validation.compare.rows import Row, from_text, plain
+from fourbar.writing import name_file, write_text
+from fourbar_validation.compare.columns import count_rows, read_column, read_columns
+from fourbar_validation.compare.rows import Row, make_plain, read_cell_text
 from fourbar_validation.compare.tolerance import SIMULATED, K
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.places import CHECKOUT
-from fourbar_validation.report.machine import kernels, machine, versions
+from fourbar_validation.report.machine import find_kernels, list_versions, name_machine
 
 SHIPPED = Path(__file__).parent
 """Where the accepted state of the models of this project is."""
@@ -55,7 +55,9 @@ class About:
         return None if names is None else set(filter(None, names.split(", ")))
 
 
-def about(witnesses: Sequence[Witness], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None) -> About:
+def describe_run(
+    witnesses: Sequence[Witness], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None
+) -> About:
     """Describe a run made here and now."""
     simulated = next((each.tolerance.factor for each in witnesses if each.tolerance.in_time), SIMULATED.factor)
     settings = {
@@ -66,10 +68,10 @@ def about(witnesses: Sequence[Witness], suite: str, scenes: Mapping[str, Mapping
     }
     described = {name: dict(entries) for name, entries in (scenes or {}).items()}
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    return About(versions() | kernels(), machine(), settings, described, now, _commit())
+    return About(list_versions() | find_kernels(), name_machine(), settings, described, now, _find_commit())
 
 
-def _commit() -> str:
+def _find_commit() -> str:
     """Of the folder of this harness, marked where it holds what is not committed; what CI says of itself first."""
     if stated := os.environ.get("GITHUB_SHA") or os.environ.get("CI_COMMIT_SHA"):
         return stated[:12]
@@ -86,17 +88,17 @@ def _commit() -> str:
 def write_about(record: About, folder: Path) -> None:
     """Write record.json next to the results, with rows and SHA-256 of each table, and of itself."""
     there = [path for name in TABLES if (path := folder / name).is_file()]
-    tables = {path.name: {"rows": rows_in(path), "sha256": _sha256(path)} for path in there}
+    tables = {path.name: {"rows": count_rows(path), "sha256": _hash_file(path)} for path in there}
     kept = asdict(record) | {"tables": tables}
-    write_text(folder / ABOUT, json.dumps(kept | {"sha256": _own_sha256(kept)}, indent=1, sort_keys=True) + "\n")
+    write_text(folder / ABOUT, json.dumps(kept | {"sha256": _hash_own(kept)}, indent=1, sort_keys=True) + "\n")
 
 
-def _sha256(path: Path) -> str:
+def _hash_file(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _own_sha256(kept: Mapping[str, Any]) -> str:
+def _hash_own(kept: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
 
 
@@ -109,11 +111,11 @@ def _require_whole(tables: Mapping[str, Mapping[str, Any]], folder: Path, read: 
             why = f"is not of this run: its {ABOUT} does not name it"
         elif name not in there:
             why = f"is missing: {ABOUT} says that it has {tables[name]['rows']} rows"
-        elif _sha256(path) == tables[name]["sha256"]:
+        elif _hash_file(path) == tables[name]["sha256"]:
             continue
         else:
             try:
-                rows = f"{rows_in(path)} rows"
+                rows = f"{count_rows(path)} rows"
             except (KeyError, OSError, ValueError):
                 rows = "no rows that can be read"
             why = f"is damaged: {rows} of {tables[name]['rows']}, and not the SHA-256 that {ABOUT} states"
@@ -143,7 +145,7 @@ class Recorded:
 
     def words(self, column: str) -> Iterator[str]:
         """Read what stands in a column of text, some of it more than once."""
-        yield from self._read(column_of(self.table, column))
+        yield from self._read(read_column(self.table, column))
 
     def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
         """Scene by scene, each engine's time over the formulas' there; none where they were not kept."""
@@ -154,8 +156,8 @@ class Recorded:
             with table.open(newline="", encoding="utf-8") as file:
                 for scene, some in groupby(csv.DictReader(file), key=lambda row: row["scene"]):
                     yield (
-                        plain(from_text(scene)),
-                        [(plain(from_text(row["engine"])), float(row["times_formulas"])) for row in some],
+                        make_plain(read_cell_text(scene)),
+                        [(make_plain(read_cell_text(row["engine"])), float(row["times_formulas"])) for row in some],
                     )
         except (KeyError, TypeError, ValueError, csv.Error):
             raise InputError("RESULTS", str(table), "is not a table of times written by `run`") from None
@@ -167,7 +169,7 @@ class Recorded:
             raise InputError("RESULTS", str(self.table), "is not a table written by `run`") from None
 
 
-def recorded(path: Path) -> Recorded:
+def open_run(path: Path) -> Recorded:
     """Open a run by its folder, or by a results.csv only (then how it was made is unknown).
 
     Raises InputError where there is no readable table, an empty or a damaged one, or that of an unfinished run.
@@ -181,23 +183,23 @@ def recorded(path: Path) -> Recorded:
     if (table.parent / UNFINISHED).is_file():
         raise InputError("RESULTS", str(table), "must be of a run that was finished: run it again, and it is resumed")
     record = table.parent / ABOUT
-    result = _described(record, table) if record.is_file() else Recorded(NOTHING_KNOWN, table)
+    result = _open_described(record, table) if record.is_file() else Recorded(NOTHING_KNOWN, table)
     if next(result.rows(), None) is None:
         raise InputError("RESULTS", str(table), "must hold at least one comparison: it has none")
     return result
 
 
-def _described(record: Path, table: Path) -> Recorded:
+def _open_described(record: Path, table: Path) -> Recorded:
     """Open a table with what its record says of it; InputError where either is damaged."""
     try:
         kept = json.loads(record.read_text(encoding="utf-8"))
         stated = kept.pop("sha256", None)
-        about, tables = about_of(kept), kept.get("tables")
+        about, tables = make_record(kept), kept.get("tables")
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError("RESULTS", str(record), "is not a record written by `run`") from None
     if stated is None and tables is None:
         return Recorded(about, table)
-    if stated != _own_sha256(kept):
+    if stated != _hash_own(kept):
         raise InputError("RESULTS", str(record), "is damaged: it is not what `run` wrote")
     _require_whole(tables, table.parent, table.name)
     return Recorded(about, table, verified=True)
@@ -205,23 +207,23 @@ def _described(record: Path, table: Path) -> Recorded:
 
 def read_run(path: Path) -> tuple[About, list[Row]]:
     """Read what a run was made with, and all its rows."""
-    run = recorded(path)
+    run = open_run(path)
     return run.about, list(run.rows())
 
 
-def about_of(kept: dict[str, Any]) -> About:
+def make_record(kept: dict[str, Any]) -> About:
     """Make the record of what a file says of a run; its words are somebody's text."""
-    versions, settings = (_plain(kept[name]) for name in ("versions", "settings"))
-    scenes = {plain(name): _plain(entries) for name, entries in kept.get("scenes", {}).items()}
-    date, commit = (plain(kept.get(name, "")) for name in ("date", "commit"))
-    return About(versions, plain(kept["machine"]), settings, scenes, date, commit)
+    versions, settings = (_make_plain(kept[name]) for name in ("versions", "settings"))
+    scenes = {make_plain(name): _make_plain(entries) for name, entries in kept.get("scenes", {}).items()}
+    date, commit = (make_plain(kept.get(name, "")) for name in ("date", "commit"))
+    return About(versions, make_plain(kept["machine"]), settings, scenes, date, commit)
 
 
-def _plain(entries: dict[str, str]) -> dict[str, str]:
-    return {plain(key): plain(value) for key, value in entries.items()}
+def _make_plain(entries: dict[str, str]) -> dict[str, str]:
+    return {make_plain(key): make_plain(value) for key, value in entries.items()}
 
 
-def baseline(name_or_path: str) -> Path:
+def find_baseline(name_or_path: str) -> Path:
     """Find a run by its path, or the accepted state of this project's models by its name."""
     if not Path(name_or_path).exists() and (SHIPPED / name_or_path / TABLE).is_file():
         return SHIPPED / name_or_path
@@ -243,7 +245,7 @@ def accept(run: Recorded, target: Path) -> None:
 def _copy(source: Path, target: Path) -> None:
     """Copy a file however long, all of it or nothing."""
     draft = target.with_name(f".{target.name}.part")
-    with naming(target):
+    with name_file(target):
         try:
             shutil.copyfile(source, draft)
             os.replace(draft, target)

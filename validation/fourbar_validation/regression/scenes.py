@@ -20,29 +20,29 @@ WHERE = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
 """Entries that say at which positions the same question is put."""
 
 
-def descriptions(suite: Suite) -> dict[str, dict[str, str]]:
+def describe_scenes(suite: Suite) -> dict[str, dict[str, str]]:
     """Describe each scene of a suite by its name; none of a suite of more than MOST_DESCRIBED."""
     if len(suite) > MOST_DESCRIBED:
         return {}
-    return {suite.name(index): description(suite.scene(index)) for index in range(len(suite))}
+    return {suite.name(index): describe_changes(suite.scene(index)) for index in range(len(suite))}
 
 
-def description(scene: Scene) -> dict[str, str]:
+def describe_changes(scene: Scene) -> dict[str, str]:
     """List the entries of the scene's file that change a number: "bars.output.inertia": "0.05 kg m^2"."""
     try:
         entries = tomllib.loads(dump(scene))
     except FourBarError:  # a scene that no file can state
         return {"scene": repr(scene)}
-    return dict(_flat("", {key: value for key, value in entries.items() if key not in NO_QUESTION}))
+    return dict(_flatten("", {key: value for key, value in entries.items() if key not in NO_QUESTION}))
 
 
-def _flat(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
+def _flatten(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
     if isinstance(value, dict):
         for key, each in value.items():
-            yield from _flat(f"{prefix}.{key}" if prefix else key, each)
+            yield from _flatten(f"{prefix}.{key}" if prefix else key, each)
     elif isinstance(value, list) and any(isinstance(each, dict) for each in value):
         for number, each in enumerate(value, 1):
-            yield from _flat(f"{prefix}.{number}", each)
+            yield from _flatten(f"{prefix}.{number}", each)
     else:
         yield prefix, ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
@@ -61,17 +61,17 @@ class SceneChange:
         return all(key.startswith(WHERE) for key, _, _ in self.entries)
 
     def __str__(self) -> str:
-        parts = "; ".join(f"{key} {_shorter(old, new)}" for key, old, new in self.entries)
+        parts = "; ".join(f"{key} {_shorten(old, new)}" for key, old, new in self.entries)
         return f"scene {self.scene}: {parts}"
 
 
-def _shorter(old: str, new: str) -> str:
+def _shorten(old: str, new: str) -> str:
     """Write a unit that both have once: "0.048 -> 0.05 kg m^2"."""
     (number, _, unit), (_, _, other) = old.partition(" "), new.partition(" ")
     return f"{number} -> {new}" if unit and unit == other and "," not in old else f"{old} -> {new}"
 
 
-def renamed(old: Mapping[str, Description], new: Mapping[str, Description]) -> dict[str, str]:
+def find_renamed(old: Mapping[str, Description], new: Mapping[str, Description]) -> dict[str, str]:
     """Old name to new name of the scenes that state the same under a name that the other run does not have."""
     names: dict[str, list[str]] = {}
     for name in sorted(new.keys() - old.keys(), reverse=True):
@@ -80,7 +80,7 @@ def renamed(old: Mapping[str, Description], new: Mapping[str, Description]) -> d
     return {name: same.pop() for name, same in result if same}
 
 
-def scene_changes(old: Mapping[str, Description], new: Mapping[str, Description]) -> list[SceneChange]:
+def list_scene_changes(old: Mapping[str, Description], new: Mapping[str, Description]) -> list[SceneChange]:
     """List the scenes of both runs that ask something else now."""
     result = []
     for name in sorted(old.keys() & new.keys()):

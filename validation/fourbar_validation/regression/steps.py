@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.regression.change import Change, Key, Kind
-from fourbar_validation.regression.changes import Differences, differences
+from fourbar_validation.regression.changes import Differences, compare_rows
 from fourbar_validation.regression.history import HistoryRun
 from fourbar_validation.regression.record import About
 
@@ -41,7 +41,7 @@ class Step:
         return f"{self.run.name}: {'; '.join(filter(None, parts))} [{self.made_with}]"
 
 
-def steps(runs: Sequence[HistoryRun]) -> list[Step]:
+def find_steps(runs: Sequence[HistoryRun]) -> list[Step]:
     """Compare each run with the last state of every row before it; a run of a part leaves the rest as it was."""
     result: list[Step] = []
     known: dict[Key, Row] = {}
@@ -49,7 +49,7 @@ def steps(runs: Sequence[HistoryRun]) -> list[Step]:
     times: dict[tuple[str, str], float] = {}
     for number, run in enumerate(runs):
         if about is not None:
-            here = differences((about, known.values()), (run.about, run.rows), (times, run.times), kept=sys.maxsize)
+            here = compare_rows((about, known.values()), (run.about, run.rows), (times, run.times), kept=sys.maxsize)
             step = Step(number, run, here)
             if step.changes or here.scenes or here.other_times:
                 result.append(step)

@@ -45,7 +45,7 @@ class TimeChange:
         return f"{self.engine} is {times:.2f} times {word} (factor of scatter {self.scatter:.2f}, {self.scenes} scenes)"
 
 
-def time_changes(scenes: Iterable[tuple[str, Sequence[Time], Sequence[Time]]]) -> list[TimeChange]:
+def list_time_changes(scenes: Iterable[tuple[str, Sequence[Time], Sequence[Time]]]) -> list[TimeChange]:
     """Every engine with times of at least ENOUGH scenes in both runs, over the formulas' own.
 
     Where all of several engines became slower, or all faster, it is the formulas whose time changed the other way.

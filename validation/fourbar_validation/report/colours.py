@@ -1,6 +1,6 @@
 """One colour and one mark per engine; each colour has a value for light and one for dark pages.
 
-Matplotlib draws with the light values; `by_variable` then turns them into custom properties of the
+Matplotlib draws with the light values; `replace_colours` then turns them into custom properties of the
 page (Okabe-Ito hues, darkened or lightened until every one has a contrast of 3:1 or more).
 """
 
@@ -54,19 +54,19 @@ VARIABLES = {
 """Light colour: (custom property, colour on dark pages)."""
 
 
-def style_of(engine: str) -> Style:
+def choose_style(engine: str) -> Style:
     """Choose the style of an engine: one that is not named in `STYLES` has the next of `OTHERS`."""
     return STYLES.get(engine) or OTHERS[NUMBERS.setdefault(engine, len(NUMBERS)) % len(OTHERS)]
 
 
-def by_variable(svg: str) -> str:
+def replace_colours(svg: str) -> str:
     """Replace every colour of the table by the page's custom property."""
     for light, (name, _) in VARIABLES.items():
         svg = svg.replace(light, f"var({name})")
     return svg
 
 
-def declarations(*, dark: bool) -> str:
+def write_declarations(*, dark: bool) -> str:
     """Write the custom properties as CSS."""
     pairs = ((name, night if dark else day) for day, (name, night) in VARIABLES.items() if day != "#000000")
     return " ".join(f"{name}: {colour};" for name, colour in pairs)

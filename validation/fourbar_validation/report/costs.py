@@ -6,14 +6,14 @@ from statistics import median
 
 from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.engines.witnesses import WORK
-from fourbar_validation.report.colours import INK, PAPER, SOFT, style_of
+from fourbar_validation.report.colours import INK, PAPER, SOFT, choose_style
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.svg import FLOOR, frame, svg_text
+from fourbar_validation.report.svg import FLOOR, set_frame, write_svg
 
 Point = tuple[float, float]
 
 
-def cost_points(scenes: Iterable[Record]) -> tuple[dict[str, list[Point]], list[float]]:
+def collect_cost_points(scenes: Iterable[Record]) -> tuple[dict[str, list[Point]], list[float]]:
     """(microseconds per position, error of the torque) of every scene by engine; the same cost of the formulas."""
     points: dict[str, list[Point]] = {}
     formulas: list[float] = []
@@ -28,9 +28,9 @@ def cost_points(scenes: Iterable[Record]) -> tuple[dict[str, list[Point]], list[
     return points, formulas
 
 
-def cost_figure(scenes: Iterable[Record]) -> str | None:
+def draw_costs(scenes: Iterable[Record]) -> str | None:
     """Draw these points as SVG, with each engine's median; None where no torque was compared."""
-    points, formulas = cost_points(scenes)
+    points, formulas = collect_cost_points(scenes)
     if not points or not formulas:
         return None
     from matplotlib.figure import Figure
@@ -40,14 +40,14 @@ def cost_figure(scenes: Iterable[Record]) -> str | None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     for engine, found in sorted(points.items()):
-        look = style_of(engine)
+        look = choose_style(engine)
         x, y = [cost for cost, _ in found], [max(error, FLOOR) for _, error in found]
         axes.plot(x, y, look.marker, ms=4.0, mfc=PAPER, mec=look.colour, mew=0.9, alpha=0.75)
         centre = (median(x), median(y))
-        axes.plot(*centre, look.marker, ms=9.0, color=look.colour, label=_labelled(engine))
+        axes.plot(*centre, look.marker, ms=9.0, color=look.colour, label=_write_label(engine))
     axes.axvline(median(formulas), color=INK, lw=1.1, ls=(0, (5, 2)))
     axes.annotate(
-        _labelled("formulas"), (median(formulas), 1.0), xycoords=("data", "axes fraction"), xytext=(4, -9),
+        _write_label("formulas"), (median(formulas), 1.0), xycoords=("data", "axes fraction"), xytext=(4, -9),
         textcoords="offset points", fontsize=8, color=INK,
     )  # fmt: skip
     axes.axhline(EPS, color=SOFT, lw=0.8, ls=(0, (1, 2)))
@@ -57,11 +57,11 @@ def cost_figure(scenes: Iterable[Record]) -> str | None:
     )  # fmt: skip
     axes.set_xlabel("µs per position, for the work that the legend names")
     axes.set_ylabel("error of the torque / scale")
-    frame(axes)
+    set_frame(axes)
     figure.legend(loc="outside upper left", frameon=False, fontsize=8)
-    return svg_text(figure, "costs")
+    return write_svg(figure, "costs")
 
 
-def _labelled(engine: str) -> str:
+def _write_label(engine: str) -> str:
     """Name an engine and what it did for a position."""
     return f"{engine}: {WORK[engine].short}" if engine in WORK else engine

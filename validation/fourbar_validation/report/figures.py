@@ -7,16 +7,16 @@ import numpy as np
 
 from fourbar.quantities import ANGLES, COUPLE, FORCES, LINE, OK
 from fourbar.scene import Command
-from fourbar.show.drawing import drawing
+from fourbar.show.drawing import draw_scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.reversals import Reversal, broken
+from fourbar_validation.compare.reversals import Reversal, break_curve
 from fourbar_validation.compare.scales import scale_of
-from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, condition_of, magnitude, relative_error
-from fourbar_validation.report.colours import ALLOWED, BAND, INK, PAPER, by_variable, style_of
+from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, find_condition, find_error, magnitude
+from fourbar_validation.report.colours import ALLOWED, BAND, INK, PAPER, choose_style, replace_colours
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.svg import FLOOR, frame, svg_text
+from fourbar_validation.report.svg import FLOOR, set_frame, write_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,32 +30,36 @@ MOTION_AND_FORCE = ("theta_4", "F32")
 SUBSCRIPT = str.maketrans("234", "₂₃₄")
 
 
-def scene_figure(record: Record) -> str | None:
+def draw_scene_figure(record: Record) -> str | None:
     """SVGs of the linkage and, for a sweep, of the answers; None where nothing assembles."""
     solution = record.solution
     if record.scene is None or solution is None or not np.any(solution.status_code == OK):
         return None
-    linkage = by_variable(drawing(record.scene, solution))
+    linkage = replace_colours(draw_scene(record.scene, solution))
     if np.count_nonzero(solution.status_code == OK) < 2:
         return linkage
-    return linkage + _answers(record, solution)
+    return linkage + _draw_answers(record, solution)
 
 
-def _answers(record: Record, solution: Solution) -> str:
+def _draw_answers(record: Record, solution: Solution) -> str:
     """One SVG per quantity: values above, errors of the simulation and of the exact engines on axes of their own."""
     answers = [answer for answer in record.answers if answer.refusal is None and answer.quantities]
     drive = COUPLE.value if solution.drive is None else LINE.value
     shown = (drive, "F32") if solution.F32 is not None else ANGLES
     if record.scene is not None and record.scene.motion.free is not None:
         shown = MOTION_AND_FORCE
-    return "".join(_picture(quantity, record, solution, answers) for quantity in shown)
+    return "".join(_draw_picture(quantity, record, solution, answers) for quantity in shown)
 
 
-def _picture(quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> str:
+def _draw_picture(quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> str:
     from matplotlib.figure import Figure
 
-    simulated = [answer for answer in answers if style_of(answer.engine).simulated and quantity in answer.quantities]
-    exact = [answer for answer in answers if not style_of(answer.engine).simulated and quantity in answer.quantities]
+    simulated = [
+        answer for answer in answers if choose_style(answer.engine).simulated and quantity in answer.quantities
+    ]
+    exact = [
+        answer for answer in answers if not choose_style(answer.engine).simulated and quantity in answer.quantities
+    ]
     groups = [group for group in (simulated, exact) if group]
     figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
     panels = figure.subplots(1 + len(groups), 1, sharex=True, height_ratios=[1.9, *[1.0] * len(groups)], squeeze=False)
@@ -67,24 +71,26 @@ def _picture(quantity: str, record: Record, solution: Solution, answers: list[An
     axes[-1].set_xlabel("time (s)" if solution.time is not None else "θ₂ (°)")
     figure.align_ylabels(axes)
     for panel in axes:
-        frame(panel)
-    return svg_text(figure, f"{record.name} {quantity}")
+        set_frame(panel)
+    return write_svg(figure, f"{record.name} {quantity}")
 
 
 def _draw_values(axes: "Axes", quantity: str, solution: Solution, answers: list[Answer], jumps: list[Reversal]) -> None:
     """Draw the formulas as a band, broken at jumps, and each engine's marks on it at positions of its own."""
     good = solution.status_code == OK
-    ours = np.where(good, _plain(quantity, getattr(solution, quantity)), np.nan)
-    base, line = _base(solution, None), ours
+    ours = np.where(good, _take_plain(quantity, getattr(solution, quantity)), np.nan)
+    base, line = _choose_base(solution, None), ours
     if jumps:
-        theta_2, line = broken(solution.theta_2, ours, jumps, lambda side: _plain(quantity, getattr(side, quantity)))
+        theta_2, line = break_curve(
+            solution.theta_2, ours, jumps, lambda side: _take_plain(quantity, getattr(side, quantity))
+        )
         base = np.degrees(theta_2)
     axes.plot(base, line, color=BAND, lw=5, solid_capstyle="butt")
     for turn, answer in enumerate(answers):
-        theirs = _plain(quantity, answer.quantities[quantity])
+        theirs = _take_plain(quantity, answer.quantities[quantity])
         phase = (turn + 0.5) / (len(answers) * MARKS)
         places = np.unique(((np.arange(MARKS) / MARKS + phase) * len(theirs)).astype(int))
-        axes.plot(_base(solution, answer.at)[places], theirs[places], **_mark(answer, 5.5))
+        axes.plot(_choose_base(solution, answer.at)[places], theirs[places], **_mark(answer, 5.5))
     _limit_to_bulk(axes, ours[good])
     axes.set_ylabel(_label(quantity, solution))
 
@@ -95,25 +101,25 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
 
     good, scene = solution.status_code == OK, record.scene
     assert scene is not None
-    if style_of(answers[0].engine).simulated:
+    if choose_style(answers[0].engine).simulated:
         held_to = (r.allowed for r in record.rows if (r.engine, r.quantity) == (answers[0].engine, quantity))
         allowed = np.full(len(solution), next(held_to, SIMULATED.factor))
     else:
-        allowed = EQUIVALENCE.allowed(condition_of(quantity, scene.linkage, solution))
-    axes.plot(_base(solution, None), np.where(good, allowed, np.nan), color=ALLOWED, lw=1.1, ls=(0, (5, 2)))
+        allowed = EQUIVALENCE.allowed(find_condition(quantity, scene.linkage, solution))
+    axes.plot(_choose_base(solution, None), np.where(good, allowed, np.nan), color=ALLOWED, lw=1.1, ls=(0, (5, 2)))
     low, high = float(np.nanmin(allowed[good])), float(np.nanmax(allowed[good]))
     for turn, answer in enumerate(answers):
         formulas = solution if answer.at is None else solve(scene, at=answer.at)
         mine = getattr(formulas, quantity)
         size = scale_of(quantity, scene, formulas, mine)
-        error = relative_error(quantity, mine, answer.quantities[quantity], size)
-        places = worst_of_stretches(error, turn / len(answers))
+        error = find_error(quantity, mine, answer.quantities[quantity], size)
+        places = find_worst_of_segments(error, turn / len(answers))
         if not len(places):
             continue
-        x, heights = _base(solution, answer.at)[places], np.maximum(error[places], FLOOR)
+        x, heights = _choose_base(solution, answer.at)[places], np.maximum(error[places], FLOOR)
         axes.plot(x, heights, **_mark(answer, 3.2) | {"mew": 0.8})
         worst = int(np.argmax(heights))
-        axes.plot(x[worst], heights[worst], "o", ms=9, mfc="none", mec=style_of(answer.engine).colour, mew=0.9)
+        axes.plot(x[worst], heights[worst], "o", ms=9, mfc="none", mec=choose_style(answer.engine).colour, mew=0.9)
         low, high = min(low, float(heights.min())), max(high, float(heights.max()))
     axes.set_yscale("log")
     axes.set_ylim(low / 4.0, 5.0 * high)
@@ -122,7 +128,7 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
     middle = int(np.flatnonzero(good)[np.count_nonzero(good) // 2])
     axes.annotate(
         "allowed",
-        (float(_base(solution, None)[middle]), float(allowed[middle])),
+        (float(_choose_base(solution, None)[middle]), float(allowed[middle])),
         xytext=(0, -9),
         textcoords="offset points",
         fontsize=7.5,
@@ -131,7 +137,7 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
     )
 
 
-def worst_of_stretches(error: Array, phase: float) -> np.ndarray[Any, np.dtype[np.intp]]:
+def find_worst_of_segments(error: Array, phase: float) -> np.ndarray[Any, np.dtype[np.intp]]:
     """Index of the largest error in each of STRETCHES stretches; `phase` in [0, 1) shifts where they begin.
 
     What is not finite is left out: the table says that it fails.
@@ -147,11 +153,11 @@ def worst_of_stretches(error: Array, phase: float) -> np.ndarray[Any, np.dtype[n
 
 
 def _mark(answer: Answer, size: float) -> dict[str, Any]:
-    look = style_of(answer.engine)
+    look = choose_style(answer.engine)
     return {"color": look.colour, "ls": "none", "marker": look.marker, "ms": size, "mfc": PAPER, "mew": 1.2}
 
 
-def _plain(quantity: str, values: Array) -> Array:
+def _take_plain(quantity: str, values: Array) -> Array:
     """Take a scalar as it is (angles in degrees), the magnitude of a vector."""
     if quantity in ANGLES:
         return np.degrees(values)
@@ -167,7 +173,7 @@ def _label(quantity: str, solution: Solution) -> str:
     return f"{name} (°)" if quantity in ANGLES else f"|{quantity}| (N)"
 
 
-def _base(solution: Solution, at: Command | None) -> Array:
+def _choose_base(solution: Solution, at: Command | None) -> Array:
     """Choose what a curve is drawn over: the time of a free motion, else theta_2 in degrees."""
     angle = (solution.at if at is None else at).angle
     if solution.time is not None and len(solution.time) == len(angle):

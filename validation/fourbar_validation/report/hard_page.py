@@ -11,16 +11,22 @@ from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, condition_of, magnitude, relative, relative_error
+from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, divide, find_condition, find_error, magnitude
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES
 from fourbar_validation.engines.limits import LIMITS, Boundary
-from fourbar_validation.engines.prediction import in_world_axes
+from fourbar_validation.engines.prediction import predict_in_world_axes
 from fourbar_validation.engines.witnesses import Witness
-from fourbar_validation.report.colours import style_of
-from fourbar_validation.report.svg import drawn, inline
-from fourbar_validation.report.templating import rendered
+from fourbar_validation.report.colours import choose_style
+from fourbar_validation.report.svg import draw_svg, shrink_svg
+from fourbar_validation.report.templating import render
 from fourbar_validation.scenes.hard_families import CHANGE_POINTS, CRANK, FAMILIES, ROCKER
-from fourbar_validation.scenes.hard_linkages import at, collinear_2_3, collinear_3_4, dressed, linkage_of
+from fourbar_validation.scenes.hard_linkages import (
+    draw_linkage,
+    dress,
+    find_collinear_2_3,
+    find_collinear_3_4,
+    set_angles,
+)
 
 DISTANCES = np.logspace(-1, -12, 23)
 """rad from the singular position."""
@@ -42,23 +48,23 @@ class Approach:
     distances: Array
 
 
-def approaches() -> list[Approach]:
+def list_approaches() -> list[Approach]:
     """List a toggle, a pole of T4 and a change point."""
-    rocker, crank = linkage_of(ROCKER, 1), linkage_of(CRANK, 0)
-    (limit, stretched), *_ = collinear_3_4(rocker)
-    (pole, branch), *_ = collinear_2_3(crank)
+    rocker, crank = draw_linkage(ROCKER, 1), draw_linkage(CRANK, 0)
+    (limit, stretched), *_ = find_collinear_3_4(rocker)
+    (pole, branch), *_ = find_collinear_2_3(crank)
     lengths, _, (_, half_turn) = CHANGE_POINTS["parallelogram"]
     near = DISTANCES[DISTANCES >= 0.99e-8]
     inward = -1.0 if stretched else 1.0
     return [
-        Approach("toggle: bars 3, 4 collinear", at(dressed(rocker, 1), limit + inward * DISTANCES), DISTANCES),
-        Approach("pole of T4: omega_4 = 0", at(dressed(crank), pole + DISTANCES, branch, drive_bar=4), DISTANCES),
+        Approach("toggle: bars 3, 4 collinear", set_angles(dress(rocker, 1), limit + inward * DISTANCES), DISTANCES),
+        Approach("pole of T4: omega_4 = 0", set_angles(dress(crank), pole + DISTANCES, branch, drive_bar=4), DISTANCES),
         # on the branch that crosses: the one that stays parallel is regular
-        Approach("change point of a parallelogram", at(dressed(lengths), half_turn + near, 1), near),
+        Approach("change point of a parallelogram", set_angles(dress(lengths), half_turn + near, 1), near),
     ]
 
 
-def errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array] | None:
+def list_errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array] | None:
     """(theta_2, error relative to the value itself) of one engine, or None where it refuses."""
     where = command(scene)
     if witness.through_time:
@@ -69,16 +75,16 @@ def errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array]
         return None
     ours = solve(scene, "force", at=answer.at)
     values = getattr(ours, quantity)
-    error = relative_error(quantity, values, answer.quantities[quantity], magnitude(values))
+    error = find_error(quantity, values, answer.quantities[quantity], magnitude(values))
     keep = (ours.status_code == OK) & np.isfinite(error)
     return answer.at.theta_2[keep], np.maximum(error[keep], FLOOR)
 
 
-def picture() -> str:
+def draw_picture() -> str:
     """SVG that stands by itself: a column per singular position, a row per quantity; law and prediction drawn in."""
     from matplotlib.figure import Figure
 
-    columns = approaches()
+    columns = list_approaches()
     figure = Figure(figsize=(10.5, 6.4), layout="constrained", facecolor="none")
     axes = figure.subplots(len(SHOWN), len(columns), squeeze=False, sharex="col")
     for column, approach in enumerate(columns):
@@ -90,15 +96,15 @@ def picture() -> str:
         axes[row][0].set_ylabel(f"error of {quantity}, of its own size")
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False, fontsize=8)
-    return drawn(figure, "where it gets hard")
+    return draw_svg(figure, "where it gets hard")
 
 
 def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     solution = solve(approach.scene, "force")
     size = magnitude(getattr(solution, quantity))
-    singular = _singular(approach)
-    predicted = relative(in_world_axes(approach.scene, command(approach.scene), quantity), size)
-    law = K * EPS / condition_of(quantity, approach.scene.linkage, solution)
+    singular = _find_singular(approach)
+    predicted = divide(predict_in_world_axes(approach.scene, command(approach.scene), quantity), size)
+    law = K * EPS / find_condition(quantity, approach.scene.linkage, solution)
     shown = np.isfinite(predicted)
     axes.loglog(approach.distances, law, color=INK, linestyle=(0, (1, 1)), linewidth=1, label="law K eps/condition")
     axes.fill_between(
@@ -111,37 +117,37 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
         label="computed: predicted to ten times that",
     )
     for witness in HARD_WITNESSES:
-        found = errors(approach.scene, quantity, witness)
+        found = list_errors(approach.scene, quantity, witness)
         if found is not None and len(found[0]):
             axes.loglog(
                 np.abs(found[0] - singular),
                 found[1],
                 label=witness.name,
-                **style_of(witness.name).line,
+                **choose_style(witness.name).line,
             )
     axes.set_xlim(approach.distances[0] * 2, approach.distances[-1] / 2)
     axes.set_ylim(FLOOR, 1e3)
     axes.grid(visible=True, color=INK, alpha=0.2)
 
 
-def _singular(approach: Approach) -> float:
+def _find_singular(approach: Approach) -> float:
     """theta_2 of the singular position: the positions lie at the distances from it."""
     theta_2 = command(approach.scene).theta_2
     side = math.copysign(1.0, float(theta_2[0] - theta_2[-1]))
     return float(theta_2[0]) - side * float(approach.distances[0])
 
 
-def page(svg: str) -> str:
+def write_page(svg: str) -> str:
     """Make the page, self-contained: the picture, what each family must show, the limits."""
-    return rendered(
+    return render(
         "fourbar_validation.report",
         "hard.html.j2",
-        svg=inline(svg),
+        svg=shrink_svg(svg),
         source=base64.b64encode(svg.encode()).decode("ascii"),
         families=[(family.name, family.statement) for family in FAMILIES],
-        limits=[(each.engine, each.of.name, _boundary(each.of), each.of.reason) for each in LIMITS],
+        limits=[(each.engine, each.of.name, _write_boundary(each.of), each.of.reason) for each in LIMITS],
     )
 
 
-def _boundary(of: Boundary) -> str:
+def _write_boundary(of: Boundary) -> str:
     return f"{of.boundary:g}" + (f" {of.unit}" if of.unit != "1" else "")

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 from fourbar.quantities import LINE, UNKNOWNS
 from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sorted_rows, to_csv
-from fourbar_validation.report.costs import cost_figure
+from fourbar_validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sort_rows, write_rows
+from fourbar_validation.report.costs import draw_costs
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import STATEMENT, Summary, shares
-from fourbar_validation.report.templating import count_or_size, number, rendered, share
+from fourbar_validation.report.summary import STATEMENT, Summary, compute_shares
+from fourbar_validation.report.templating import count_or_size, render, write_number, write_share
 
 ALL_OPEN = 8
 """Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
@@ -35,7 +35,7 @@ class Cell(NamedTuple):
     @property
     def shown(self) -> str:
         """What stands in its cell."""
-        return {"refuses": "refuses", "undecided": "undecided"}.get(self.kind, share(self.used))
+        return {"refuses": "refuses", "undecided": "undecided"}.get(self.kind, write_share(self.used))
 
 
 class SectionFigure(NamedTuple):
@@ -87,7 +87,7 @@ class SceneView:
         return Counts(cell.row for cell in self.cells)
 
 
-def html(
+def write_html(
     summary: Summary,
     first_lines: dict[str, int],
     *,
@@ -106,16 +106,16 @@ def html(
     """
     from markupsafe import Markup
 
-    views = [_view(scene, first_lines.get(scene.name, 2), pictures or {}) for scene in summary.shown]
-    csv = base64.b64encode(to_csv(cell.row for view in views for cell in view.cells).encode("utf-8"))
+    views = [_make_view(scene, first_lines.get(scene.name, 2), pictures or {}) for scene in summary.shown]
+    csv = base64.b64encode(write_rows(cell.row for view in views for cell in view.cells).encode("utf-8"))
     failing = sorted((cell for view in views for cell in view.cells if cell.row.failed), key=lambda c: c.line)
-    costs = cost_figure(summary.shown)
-    return rendered(
+    costs = draw_costs(summary.shown)
+    return render(
         "fourbar_validation.report",
         "report.html.j2",
         s=summary,
         views=views,
-        engines=_engines(cell.row for view in views for cell in view.cells),
+        engines=_list_engines(cell.row for view in views for cell in view.cells),
         failing=failing,
         lazy=len(views) > ALL_OPEN,
         figures={scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure},  # drawn by our own code
@@ -125,7 +125,7 @@ def html(
         independence=[(engine, *texts) for engine, texts in sorted(summary.independence.items())],
         tolerances=[(each.name, count_or_size(each.factor), each.reason) for each in summary.tolerances],
         orders=[
-            (scene, *map(number, (e["error_at_4h"], e["error_at_2h"])), f"{e['observed_order']:.1f}")
+            (scene, *map(write_number, (e["error_at_4h"], e["error_at_2h"])), f"{e['observed_order']:.1f}")
             for scene, e in summary.orders
         ],
         statement=STATEMENT,
@@ -133,28 +133,28 @@ def html(
     )
 
 
-def markdown(summary: Summary) -> str:
+def write_markdown(summary: Summary) -> str:
     """Write the report as Markdown, short enough for a comment on a pull request."""
-    return rendered("fourbar_validation.report", "report.md.j2", s=summary, statement=STATEMENT)
+    return render("fourbar_validation.report", "report.md.j2", s=summary, statement=STATEMENT)
 
 
-def _view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
-    rows = sorted_rows(scene.rows)
-    cells = [Cell(line, *each) for line, each in enumerate(zip(rows, shares(rows), strict=True), first_line)]
-    ranked = sorted(reversed(cells), key=_rank)  # the last of a place stays, of equals the first
+def _make_view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
+    rows = sort_rows(scene.rows)
+    cells = [Cell(line, *each) for line, each in enumerate(zip(rows, compute_shares(rows), strict=True), first_line)]
+    ranked = sorted(reversed(cells), key=_rank_engine)  # the last of a place stays, of equals the first
     by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
     worst = {cell.row.engine: cell for cell in ranked}
     found = {cell.row.quantity for cell in cells}
     quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
-    engines = _engines(cell.row for cell in cells)
+    engines = _list_engines(cell.row for cell in cells)
     return SceneView(scene, cells, engines, quantities, by_place, worst, pictures.get(scene.name))
 
 
-def _rank(cell: Cell) -> tuple[bool, float]:
+def _rank_engine(cell: Cell) -> tuple[bool, float]:
     """Put what was compared before what was not, then what used more of its allowance."""
     return cell.row.compared, cell.used
 
 
-def _engines(rows: Any) -> list[str]:
+def _list_engines(rows: Any) -> list[str]:
     """Engines by name, the formulas (their identities) last."""
     return sorted({row.engine for row in rows}, key=lambda name: (name == "formulas", name))

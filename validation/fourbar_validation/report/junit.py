@@ -21,7 +21,7 @@ class JunitCase(NamedTuple):
     message: str = ""
 
 
-def cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
+def list_cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
     """List the rows of a run: what fails is a failure, and what was not compared is skipped."""
     listed = failures = others = 0
     for row in rows:
@@ -36,16 +36,16 @@ def cases(rows: Iterable[Row]) -> Iterator[JunitCase]:
             yield JunitCase(*name, "passed") if row.compared else JunitCase(*name, "skipped", row.verdict, row.reason)
         else:
             others += 1
-    yield from beyond(others)
+    yield from count_beyond(others)
 
 
-def beyond(rows: int) -> Iterator[JunitCase]:
+def count_beyond(rows: int) -> Iterator[JunitCase]:
     """Count what is not listed, as one case."""
     if rows > 0:
         yield JunitCase("all scenes", "all scenes", f"{rows} rows more: see results.parquet", "skipped", "not listed")
 
 
-def document(title: str, cases: Iterable[JunitCase]) -> str:
+def write_document(title: str, cases: Iterable[JunitCase]) -> str:
     """Write the cases as JUnit XML, suite by suite."""
     from junitparser import Failure, JUnitXml, Skipped, TestCase, TestSuite
 

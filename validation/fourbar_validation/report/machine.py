@@ -20,7 +20,7 @@ BUILT = (".so", ".pyd", ".dylib", ".py")
 """Endings of the files of an engine that decide its numbers; others hold where and when it was installed."""
 
 
-def versions() -> dict[str, str]:
+def list_versions() -> dict[str, str]:
     """Version of Python and of every library that decides a number; "not installed" where missing."""
     found = {"python": platform.python_version()}
     for name, package in DISTRIBUTIONS.items():
@@ -32,12 +32,12 @@ def versions() -> dict[str, str]:
     return found
 
 
-def machine() -> str:
+def name_machine() -> str:
     """Processor, number of cores and system, in one line."""
-    return f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}"
+    return f"{_find_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}"
 
 
-def _processor() -> str:
+def _find_processor() -> str:
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
@@ -47,7 +47,7 @@ def _processor() -> str:
     return platform.processor() or "unknown processor"
 
 
-def kernels() -> dict[str, str]:
+def find_kernels() -> dict[str, str]:
     """Kernel of the BLAS and vector instructions that NumPy took: with others the last digits are others."""
     import numpy as np
 
@@ -64,14 +64,14 @@ def kernels() -> dict[str, str]:
 
 
 @cache
-def code() -> dict[str, str]:
+def name_code() -> dict[str, str]:
     """Name and version or hash of everything that decides a number; one run, and all its machines, have one."""
     builds = {name: build(package) for name, package in DISTRIBUTIONS.items()}
     known = {f"build of {name}": found for name, found in builds.items() if found and name != "fourbar"}
-    return {"code": modules(FORMULAS, PACKAGE), **versions(), **known}
+    return {"code": hash_modules(FORMULAS, PACKAGE), **list_versions(), **known}
 
 
-def modules(*packages: Path) -> str:
+def hash_modules(*packages: Path) -> str:
     """Hash of the modules of packages, wherever they lie; the scenes that come with a wheel are none of them."""
     digest = hashlib.sha256()
     for package in packages:
@@ -92,7 +92,7 @@ def build(package: str) -> str:
     return hashlib.sha256("\n".join(files).encode()).hexdigest()[:16] if files else ""
 
 
-def differing(here: dict[str, str], there: dict[str, str]) -> str:
+def find_differing(here: dict[str, str], there: dict[str, str]) -> str:
     """Name the first entry in which two differ; nothing where they are the same."""
     for name in [*here, *there]:
         one, other = here.get(name, "none"), there.get(name, "none")

@@ -7,7 +7,7 @@ from fourbar.scene import Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.reversals import Reversal
-from fourbar_validation.compare.rows import FORMULAS, MADE_OF, Row, sorted_rows
+from fourbar_validation.compare.rows import FORMULAS, MADE_OF, Row, sort_rows
 
 
 @dataclass(slots=True)
@@ -64,7 +64,7 @@ class Record:
         kept = asdict(replace(self, rows=[]))
         for name in ("scene", "solution", "answers", "jumps"):
             del kept[name]
-        return kept | {"rows": [[getattr(row, name) for name in MADE_OF] for row in sorted_rows(self.rows)]}
+        return kept | {"rows": [[getattr(row, name) for name in MADE_OF] for row in sort_rows(self.rows)]}
 
     @classmethod
     def restore(cls, kept: dict[str, Any]) -> "Record":

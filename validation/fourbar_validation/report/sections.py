@@ -31,7 +31,7 @@ MOST = 3
 """Scenes whose study is shown."""
 
 
-def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
+def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     """Collect the hard cases of this run or one in OUT/hard, and the study in OUT/cost, where there are any.
 
     Of rows of the hard suite the page hard.html is written too.
@@ -39,31 +39,33 @@ def sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     results = out / HARD / "results.csv"
     found = []
     if hard is not None:
-        from fourbar_validation.report.hard_page import page, picture
-        from fourbar_validation.report.svg import inline
+        from fourbar_validation.report.hard_page import draw_picture, write_page
+        from fourbar_validation.report.svg import shrink_svg
 
-        svg = picture()
-        write_text(out / PAGE, page(svg))
-        found.append(hard_cases(hard, inline(svg)))
+        svg = draw_picture()
+        write_text(out / PAGE, write_page(svg))
+        found.append(collect_hard_cases(hard, shrink_svg(svg)))
     elif results.is_file() and (out / HARD / PAGE).is_file():
         links = [(f"{HARD}/{name}", f"{HARD}/{name}") for name in (PAGE, "report.html")]
-        found.append(_hard_cases(read_columns(results), f"From the run in {HARD}/: {MUST}", [], links))
+        found.append(_read_hard_cases(read_columns(results), f"From the run in {HARD}/: {MUST}", [], links))
     folders = sorted(path.parent for path in (out / COST).glob("*/cost.csv"))
-    return [*found, *(_study(folder) for folder in folders[:MOST])]
+    return [*found, *(_read_study(folder) for folder in folders[:MOST])]
 
 
-def hard_cases(rows: Iterable[Row], picture: str | None = None) -> Section:
+def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Section:
     """Of a run of the hard suite; `picture`: the inline SVG of `fourbar_validation.report.hard_page`."""
     figures = [SectionFigure(ALT, CAPTION, svg=picture)] if picture else []
     links = [("Limits of the engines, and the picture to download: " + PAGE, PAGE)]
-    return _hard_cases(rows, MUST.capitalize(), figures, links)
+    return _read_hard_cases(rows, MUST.capitalize(), figures, links)
 
 
-def _hard_cases(rows: Iterable[Row], text: str, figures: list[SectionFigure], links: list[tuple[str, str]]) -> Section:
+def _read_hard_cases(
+    rows: Iterable[Row], text: str, figures: list[SectionFigure], links: list[tuple[str, str]]
+) -> Section:
     found = {family.name: Counts() for family in FAMILIES}
     scenes: dict[str, set[str]] = {family.name: set() for family in FAMILIES}
     for row in rows:
-        family = family_of(row.scene)
+        family = find_family(row.scene)
         if family is not None:
             found[family].add([row])
             scenes[family].add(row.scene)
@@ -82,13 +84,13 @@ def _hard_cases(rows: Iterable[Row], text: str, figures: list[SectionFigure], li
     return Section(HARD, "Hard cases", text, headings, table, figures, links, (1, 2 + len(VERDICTS)))
 
 
-def family_of(scene: str) -> str | None:
+def find_family(scene: str) -> str | None:
     """Find the family whose name a scene's begins with; of several the longest."""
     names = [family.name for family in FAMILIES if scene.startswith(family.name.replace(" ", "-") + "-")]
     return max(names, key=len, default=None)
 
 
-def _study(folder: Path) -> Section:
+def _read_study(folder: Path) -> Section:
     figures = []
     for name, alt in PICTURES.items():
         picture = folder / name

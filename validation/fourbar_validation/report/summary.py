@@ -22,10 +22,10 @@ from fourbar_validation.compare.tolerance import (
     SIMULATED,
     ErrorBound,
     K,
-    used,
+    find_used,
 )
 from fourbar_validation.engines.witnesses import WORK
-from fourbar_validation.report.machine import machine, versions
+from fourbar_validation.report.machine import list_versions, name_machine
 from fourbar_validation.report.record import Record
 
 T = TypeVar("T")
@@ -77,7 +77,7 @@ class Summary:
 
     def __init__(self) -> None:
         self.counts = Counts()
-        self.versions, self.machine = versions(), machine()
+        self.versions, self.machine = list_versions(), name_machine()
         self.failures: list[Row] = []
         """At most FAILURES_KEPT of them."""
         self.pairs = self.loose = 0
@@ -106,16 +106,16 @@ class Summary:
         self.counts.add_scene(scene.rows)
         bad = [row for row in scene.rows if row.failed]
         self.failures += bad[: FAILURES_KEPT - len(self.failures)]
-        compared, loose = _compared(scene.rows)
+        compared, loose = _count_compared(scene.rows)
         self.pairs, self.loose = self.pairs + compared, self.loose + len(loose)
-        self._loosest = _top(LOOSEST_SHOWN, [*self._loosest, *loose], _allowance)
-        for engine, reason in sorted(_left_out(scene)):
+        self._loosest = _keep_largest(LOOSEST_SHOWN, [*self._loosest, *loose], _write_allowance)
+        for engine, reason in sorted(_list_left_out(scene)):
             kind = (engine, NUMBER.sub("#", reason))
             self._refusals[kind] += 1
             self._first_reason.setdefault(kind, reason)
-        found = _worst(scene.rows)
+        found = _find_worst(scene.rows)
         self.judged += len(found)
-        self._worst = _top(WORST_SHOWN, [*self._worst, *found], lambda w: w.used)
+        self._worst = _keep_largest(WORST_SHOWN, [*self._worst, *found], lambda w: w.used)
         for row in scene.rows:
             if row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error):
                 k = row.error * row.condition / EPS
@@ -127,7 +127,7 @@ class Summary:
             self._failing += [scene][: SCENES_SHOWN - len(self._failing)]
         else:
             most = max((w.used for w in found), default=0.0)
-            self._holding = _top(SCENES_SHOWN, [*self._holding, (most, scene)], lambda each: each[0])
+            self._holding = _keep_largest(SCENES_SHOWN, [*self._holding, (most, scene)], lambda each: each[0])
 
     def picture(self, drawn: Record) -> None:
         """Add what was drawn and measured of a scene that is shown."""
@@ -138,7 +138,7 @@ class Summary:
 
     def _add_orders(self, scene: Record) -> None:
         known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
-        self._orders = _top(ORDERS_SHOWN, [*self._orders, *known], _lowest)
+        self._orders = _keep_largest(ORDERS_SHOWN, [*self._orders, *known], _find_lowest)
 
     @property
     def verdict(self) -> str:
@@ -151,7 +151,7 @@ class Summary:
         """How many quantities nobody judges tighter than degraded as predicted, and the worst, in one sentence."""
         if not self.loose:
             return ""
-        worst = nlargest(LOOSEST_SHOWN, self._loosest, key=_allowance)
+        worst = nlargest(LOOSEST_SHOWN, self._loosest, key=_write_allowance)
         named = ", ".join(f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})" for row in worst)
         return f'{self.loose} of {self.pairs} quantities of a scene are at best "{DEGRADED}"; the widest: {named}'
 
@@ -181,7 +181,7 @@ class Summary:
         return [
             EngineCost(
                 engine,
-                _settings(values),
+                _write_settings(values),
                 median(t.times for t in values),
                 median(t.microseconds for t in values),
                 WORK[engine].full if engine in WORK else "",
@@ -193,24 +193,24 @@ class Summary:
     def orders(self) -> list[tuple[str, dict[str, float]]]:
         """(scene, errors at 4h and 2h and observed order) of what is simulated: at most ORDERS_SHOWN, lowest first."""
         few = len(self._orders) <= ORDERS_SHOWN
-        return self._orders if few else nlargest(ORDERS_SHOWN, self._orders, key=_lowest)
+        return self._orders if few else nlargest(ORDERS_SHOWN, self._orders, key=_find_lowest)
 
     @property
     def shown(self) -> list[Record]:
         """The scenes shown one by one, by name, at most SCENES_SHOWN: those that fail, then those that used most."""
-        return sorted(self._most_used(SCENES_SHOWN), key=lambda scene: scene.name)
+        return sorted(self._find_most_used(SCENES_SHOWN), key=lambda scene: scene.name)
 
     @property
     def pictured(self) -> list[Record]:
         """Those of them that have pictures: all that fail, and of the others those that used most."""
-        return self._most_used(PICTURED)
+        return self._find_most_used(PICTURED)
 
-    def _most_used(self, most: int) -> list[Record]:
+    def _find_most_used(self, most: int) -> list[Record]:
         holding = nlargest(most - len(self._failing), self._holding, key=lambda each: each[0])
         return [*self._failing, *(scene for _, scene in holding)]
 
 
-def _left_out(scene: Record) -> set[tuple[str, str]]:
+def _list_left_out(scene: Record) -> set[tuple[str, str]]:
     """List what was not run, or refused to answer: (engine, reason)."""
     found = {(row.engine, row.reason) for row in scene.rows if row.verdict == REFUSES}
     for line in scene.left_out:
@@ -219,29 +219,29 @@ def _left_out(scene: Record) -> set[tuple[str, str]]:
     return found
 
 
-def shares(rows: Sequence[Row]) -> list[float]:
+def compute_shares(rows: Sequence[Row]) -> list[float]:
     """error/allowed; infinite without an answer, 0 where nothing is allowed and errs, or nothing was compared."""
-    of_all = used(np.array([row.error for row in rows]), np.array([row.allowed for row in rows]))
+    of_all = find_used(np.array([row.error for row in rows]), np.array([row.allowed for row in rows]))
     return [share if row.compared else 0.0 for row, share in zip(rows, of_all.tolist(), strict=True)]
 
 
-def _compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
+def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
     """How many quantities were compared, and of each that every row calls degraded the row that allows least."""
     by_quantity: dict[str, list[Row]] = {}
     for row in rows:
         if row.compared:
             by_quantity.setdefault(row.quantity, []).append(row)
     loose = [of for of in by_quantity.values() if all(row.verdict == DEGRADED for row in of)]
-    return len(by_quantity), [min(of, key=_allowance) for of in loose]
+    return len(by_quantity), [min(of, key=_write_allowance) for of in loose]
 
 
-def _allowance(row: Row) -> float:
+def _write_allowance(row: Row) -> float:
     return row.allowed
 
 
-def _worst(rows: Sequence[Row]) -> list[Worst]:
+def _find_worst(rows: Sequence[Row]) -> list[Worst]:
     groups: dict[tuple[str, str], list[tuple[float, Row]]] = {}
-    for share, row in zip(shares(rows), rows, strict=True):
+    for share, row in zip(compute_shares(rows), rows, strict=True):
         if row.compared:
             groups.setdefault((row.engine, row.setting), []).append((share, row))
     found = []
@@ -251,12 +251,12 @@ def _worst(rows: Sequence[Row]) -> list[Worst]:
     return found
 
 
-def _top(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:
+def _keep_largest(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:
     """Cut the list to its largest once it is twice too long."""
     return of if len(of) <= 2 * most else nlargest(most, of, key=key)
 
 
-def _lowest(order: tuple[str, dict[str, float]]) -> float:
+def _find_lowest(order: tuple[str, dict[str, float]]) -> float:
     return -order[1]["observed_order"]
 
 
@@ -279,7 +279,7 @@ def _add_costs(scene: Record, costs: dict[tuple[str, str], list[Timed]]) -> None
         del costs[key]
 
 
-def _settings(of: Sequence[Timed]) -> str:
+def _write_settings(of: Sequence[Timed]) -> str:
     """Name the setting, or the first and last of those that differ by their number: "RK4 628/rev to 1490/rev"."""
     known = sorted({t.setting for t in of}, key=lambda name: (len(name), name))
     return known[0] if len(known) == 1 else f"{known[0]} to {known[-1].partition(' ')[2]}"

@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from fourbar_validation.compare.tolerance import EPS
-from fourbar_validation.report.colours import GRID, by_variable
+from fourbar_validation.report.colours import GRID, replace_colours
 
 FLOOR = EPS / 16.0
 """Errors below this, zero among them, are drawn here."""
@@ -18,7 +18,7 @@ METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
 GROUP_NAME = re.compile(r'<g id="[^"]*"')
 
 
-def frame(axes: Any) -> None:
+def set_frame(axes: Any) -> None:
     """Give axes the frame and grid of all pictures in pages."""
     axes.grid(color=GRID, lw=0.5)
     axes.set_axisbelow(True)
@@ -27,12 +27,12 @@ def frame(axes: Any) -> None:
     axes.spines[["left", "bottom"]].set_color(GRID)
 
 
-def svg_text(figure: Any, salt: str) -> str:
+def write_svg(figure: Any, salt: str) -> str:
     """Draw the figure, to stand in a page; `salt` keeps the ids of two figures in one page apart."""
-    return inline(drawn(figure, salt))
+    return shrink_svg(draw_svg(figure, salt))
 
 
-def drawn(figure: Any, salt: str) -> str:
+def draw_svg(figure: Any, salt: str) -> str:
     """Draw the figure as matplotlib does, transparent: an SVG that stands by itself."""
     import matplotlib
 
@@ -44,15 +44,15 @@ def drawn(figure: Any, salt: str) -> str:
     return svg[svg.index("<svg") :]
 
 
-def inline(svg: str) -> str:
+def shrink_svg(svg: str) -> str:
     """Make the SVG smaller, and take the colours of the page around it."""
     svg = METADATA.sub("", svg)
     svg = COORDINATES.sub(lambda found: LONG_NUMBER.sub(r"\1", found.group()), svg)
     svg = GROUP_NAME.sub("<g", BETWEEN_TAGS.sub("><", svg))
-    return _classed(by_variable(svg))
+    return _name_styles(replace_colours(svg))
 
 
-def _classed(svg: str) -> str:
+def _name_styles(svg: str) -> str:
     """Each style once, as a class: matplotlib repeats it on every mark and text.
 
     A class is named by its content, so that equal names in one page mean equal styles.

@@ -4,21 +4,21 @@ import base64
 import gzip
 import math
 
-from fourbar_validation.compare.rows import plain
-from fourbar_validation.report.colours import by_variable, declarations, style_of
+from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.report.colours import choose_style, replace_colours, write_declarations
 
 PLAIN = (1e-2, 1e6)
 """Numbers between these are written without a power of ten, the larger ones where they are whole."""
 
 
-def rendered(package: str, name: str, /, **what: object) -> str:
+def render(package: str, name: str, /, **what: object) -> str:
     """Fill in a template of a package, an unknown name in it an error; in a page every text is escaped for HTML.
 
     It may build on those of the report: one page, one stylesheet, one form of a table.
     """
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
-    page = name.endswith(".html.j2")  # in Markdown `cell` escapes what would break out
+    page = name.endswith(".html.j2")  # in Markdown `write_cell` escapes what would break out
     made = Environment(
         loader=ChoiceLoader([PackageLoader(package), PackageLoader("fourbar_validation.report")]),
         undefined=StrictUndefined,
@@ -28,35 +28,35 @@ def rendered(package: str, name: str, /, **what: object) -> str:
         keep_trailing_newline=not page,
     )
     made.filters |= {
-        "number": number,
+        "number": write_number,
         "plain": count_or_size,
         "degrees": lambda radians: "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}",
-        "share": share,
-        "cell": cell,
+        "share": write_share,
+        "cell": write_cell,
         "packed": lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode(),
-        "colour": lambda engine: by_variable(style_of(engine).colour),
-        "symbol": lambda engine: style_of(engine).symbol,
+        "colour": lambda engine: replace_colours(choose_style(engine).colour),
+        "symbol": lambda engine: choose_style(engine).symbol,
     }
-    made.globals |= {"light": declarations(dark=False), "dark": declarations(dark=True)}
+    made.globals |= {"light": write_declarations(dark=False), "dark": write_declarations(dark=True)}
     return made.get_template(name).render(**what)
 
 
-def cell(text: object) -> str:
+def write_cell(text: object) -> str:
     """Text that can neither end a table cell of Markdown nor start markup."""
-    shown = " ".join(plain(str(text)).split())
+    shown = " ".join(make_plain(str(text)).split())
     for mark in "\\|`*_[]<>#":
         shown = shown.replace(mark, f"\\{mark}")
     return shown.replace("\\<", "&lt;").replace("\\>", "&gt;")
 
 
-def share(value: float) -> str:
+def write_share(value: float) -> str:
     """error/allowed in two digits."""
     if math.isinf(value):
         return "∞"
     return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"
 
 
-def number(value: float) -> str:
+def write_number(value: float) -> str:
     """Write an error: three significant digits and a power of ten; a dash where there is no number."""
     return "-" if math.isnan(value) else f"{value:.2e}"
 

@@ -6,15 +6,15 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fourbar.errors import printable
+from fourbar.errors import clean_line
 from fourbar_validation.report.summary import Summary
-from fourbar_validation.report.templating import number
+from fourbar_validation.report.templating import write_number
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 
-def table(summary: Summary, out: Path) -> None:
+def print_table(summary: Summary, out: Path) -> None:
     """Print the worst row of every scene and engine, the verdict last."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
@@ -31,25 +31,30 @@ def table(summary: Summary, out: Path) -> None:
     for heading in ("error", "allowed", "used", "at deg"):
         shown.add_column(heading, justify="right", no_wrap=True)
     for scene, group in groupby(summary.worst, key=lambda w: w.row.scene):
-        shown.add_row(f"[bold]{escape(printable(scene))}[/]")
+        shown.add_row(f"[bold]{escape(clean_line(scene))}[/]")
         for w in group:
-            numbers = (short(w.row.error), short(w.row.allowed), f"{w.used:.2f}", f"{math.degrees(w.row.theta_2):.1f}")
+            numbers = (
+                write_short(w.row.error),
+                write_short(w.row.allowed),
+                f"{w.used:.2f}",
+                f"{math.degrees(w.row.theta_2):.1f}",
+            )
             words = (f"  {escape(w.row.engine)}", escape(w.row.quantity))
             shown.add_row(*words, *numbers, style="" if w.failed == 0 else "bold red")
     console.print(shown)
     for row in summary.failures[:20]:
         console.print(
-            f"[bold red]fails[/] {escape(printable(row.scene))} {escape(row.engine)} {escape(row.quantity)}: "
-            f"error {number(row.error)}, allowed {number(row.allowed)}: {escape(printable(row.reason))}"
+            f"[bold red]fails[/] {escape(clean_line(row.scene))} {escape(row.engine)} {escape(row.quantity)}: "
+            f"error {write_number(row.error)}, allowed {write_number(row.allowed)}: {escape(clean_line(row.reason))}"
         )
     for engine, reason, count in summary.refusals:
-        console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(printable(reason))}")
+        console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(clean_line(reason))}")
     for engine, reason in summary.missing:
         console.print(f"[bold red]not run[/] {escape(engine)}: {escape(reason)}")
-    console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(printable(str(out)))}")
+    console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(clean_line(str(out)))}")
 
 
-def lined_up(headings: Sequence[str], rows: Iterable[Sequence[str]], **options: Any) -> "Table":
+def make_table(headings: Sequence[str], rows: Iterable[Sequence[str]], **options: Any) -> "Table":
     """Make a table whose first column is words and whose others are numbers."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
@@ -60,10 +65,10 @@ def lined_up(headings: Sequence[str], rows: Iterable[Sequence[str]], **options: 
     for index, heading in enumerate(headings):
         shown.add_column(heading, justify="right" if index else "left", overflow="fold")
     for row in rows:
-        shown.add_row(*(escape(printable(cell)) for cell in row))
+        shown.add_row(*(escape(clean_line(cell)) for cell in row))
     return shown
 
 
-def short(value: float) -> str:
+def write_short(value: float) -> str:
     """Two digits: the table fits 80 columns, results.csv has them all."""
     return "-" if math.isnan(value) else f"{value:.1e}"

@@ -13,12 +13,12 @@ from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Answer, Engine
 from fourbar_validation.compare.compare import Comparison, Predicted
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
-from fourbar_validation.compare.scales import angles_of
-from fourbar_validation.compare.statements import limits, transmission
-from fourbar_validation.compare.statements.finding import look, worst
-from fourbar_validation.engines.description import driving
-from fourbar_validation.engines.witnesses import Witness, answering_nearby, predicting_from
-from fourbar_validation.run.question import Question, without_angles
+from fourbar_validation.compare.scales import has_angles
+from fourbar_validation.compare.statements import limit_positions, transmission
+from fourbar_validation.compare.statements.finding import look, make_worst_row
+from fourbar_validation.engines.description import name_driving
+from fourbar_validation.engines.witnesses import Witness, make_nearby, make_prediction
+from fourbar_validation.run.question import Question, remove_angles
 
 
 def compare_answers(question: Question) -> Iterator[Row]:
@@ -33,7 +33,7 @@ def _answer(question: Question, witness: Witness) -> Iterator[Row]:
         question.left_out.append(f"{answer.engine}: {answer.refusal}")
     yield from compare_answer(question, witness, answer)
     if question.order and witness.order and answer.refusal is None:
-        answer.evidence |= _observed_order(question, witness)
+        answer.evidence |= _observe_order(question, witness)
 
 
 def compare_answer(question: Question, witness: Witness, answer: Answer) -> list[Row]:
@@ -41,8 +41,8 @@ def compare_answer(question: Question, witness: Witness, answer: Answer) -> list
     if answer.at is not None and answer.at is not question.at:
         question = Question(question.name, question.scene, answer.at)
     name, scene, formulas = question.name, question.scene, question.solution
-    predicted = predicting_from(witness, scene, question.at, answer)
-    nearby = answering_nearby(witness, scene, question.at, formulas)
+    predicted = make_prediction(witness, scene, question.at, answer)
+    nearby = make_nearby(witness, scene, question.at, formulas)
     of_witness, of_scene = (witness.tolerance, witness.expected, predicted), (question.reference, question.scales)
     comparison = Comparison(name, scene, answer, formulas, *of_witness, *of_scene, nearby)
     rows = comparison.rows()
@@ -50,12 +50,12 @@ def compare_answer(question: Question, witness: Witness, answer: Answer) -> list
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
         rows = [replace(row, reason=row.reason + why) if row.failed else row for row in rows]
     answers = answer.assembled is not None and len(answer.assembled) == len(formulas)  # otherwise a row has failed
-    if answers and angles_of(answer):
+    if answers and has_angles(answer):
         rows.append(comparison.closure())
     return rows
 
 
-def _observed_order(question: Question, witness: Witness) -> dict[str, float]:
+def _observe_order(question: Question, witness: Witness) -> dict[str, float]:
     """Measure the worst error of the torque and the pin forces at 4h and 2h, and the order in h that they show."""
 
     def error(answer: Answer) -> float:
@@ -63,19 +63,19 @@ def _observed_order(question: Question, witness: Witness) -> dict[str, float]:
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
     assert witness.order is not None
-    coarse, fine, order = witness.order(question.scene, without_angles(question.at), error)
+    coarse, fine, order = witness.order(question.scene, remove_angles(question.at), error)
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 
 
 def compare_statements(question: Question) -> Iterator[Row]:
     """Compare what the formulas state of the linkage, whatever its motion, with every exact engine."""
-    stated, part = limits.Stated.of(question.scene.linkage), "statements of the linkage"
+    stated, part = limit_positions.Stated.of(question.scene.linkage), "statements of the linkage"
 
     def rows(witness: Witness, answer: Answer) -> list[Row]:
-        predicted = predicting_from(witness, question.scene, question.at, answer)
+        predicted = make_prediction(witness, question.scene, question.at, answer)
         try:
-            return statements(question.name, question.scene, question.engine(witness), answer, stated, predicted)
+            return check_statements(question.name, question.scene, question.engine(witness), answer, stated, predicted)
         except LimitError as limit:
             return [Row.unmeasured(question.name, witness.name, part, "all", REFUSES, str(limit))]
 
@@ -86,12 +86,12 @@ def compare_statements(question: Question) -> Iterator[Row]:
             yield from question.attempt(partial(rows, witness, answer), witness.name, part)
 
 
-def statements(
+def check_statements(
     name: str,
     scene: Scene,
     engine: Engine,
     answer: Answer,
-    stated: limits.Stated | None = None,
+    stated: limit_positions.Stated | None = None,
     predicted: Predicted | None = None,
 ) -> list[Row]:
     """Make a row for each of `range`, `limit_positions`, `transmission`, and where there are change points `through`.
@@ -103,16 +103,16 @@ def statements(
     predicted : the errors to be expected of the answer.
     """
     linkage = scene.linkage
-    stated = limits.Stated.of(linkage) if stated is None else stated
-    seen = look(engine, linkage, [*limits.places(stated), *transmission.places(linkage)])
+    stated = limit_positions.Stated.of(linkage) if stated is None else stated
+    seen = look(engine, linkage, [*limit_positions.choose_places(stated), *transmission.choose_places(linkage)])
     findings = {
-        "range": limits.ranges(stated, engine),
-        "limit_positions": limits.limit_positions(stated, seen),
-        "transmission": transmission.transmitted(scene, seen, answer, predicted),
+        "range": limit_positions.compare_ranges(stated, engine),
+        "limit_positions": limit_positions.compare_limit_positions(stated, seen),
+        "transmission": transmission.compare_transmission(scene, seen, answer, predicted),
     }
     if mobility.change_points(linkage):
-        findings["through"] = limits.through(linkage, engine)
-    return [worst(name, answer, quantity, list(each)) for quantity, each in findings.items()]
+        findings["through"] = limit_positions.check_through(linkage, engine)
+    return [make_worst_row(name, answer, quantity, list(each)) for quantity, each in findings.items()]
 
 
 def compare_inertia(question: Question) -> Iterator[Row]:
@@ -125,18 +125,18 @@ def compare_inertia(question: Question) -> Iterator[Row]:
         return
     bare = Question(question.name, replace(scene, loads=(), effects=()), question.at, output=question.output)
     for name, (answer, seconds) in question.answered.items():
-        if f"{driving(scene)}_inertia" in answer.quantities:
-            bare.answered[name] = _of_inertia(answer, driving(scene)), seconds
+        if f"{name_driving(scene)}_inertia" in answer.quantities:
+            bare.answered[name] = _take_inertia(answer, name_driving(scene)), seconds
     for witness in question.witnesses:
         if COUPLE.value in witness.expected and witness.name in question.answered:  # one that broke down has its row
-            yield from question.attempt(partial(_inertia, question, bare, witness), witness.name, "inertia alone")
+            yield from question.attempt(partial(_check_inertia, question, bare, witness), witness.name, "inertia alone")
 
 
-def _inertia(question: Question, bare: Question, witness: Witness) -> Iterator[Row]:
+def _check_inertia(question: Question, bare: Question, witness: Witness) -> Iterator[Row]:
     answer, (loaded, _) = bare.answer(witness), question.answered.get(witness.name, (None, 0.0))
     if answer.refusal is not None and loaded is not None and loaded.refusal is not None:
         return  # which has its row
-    drive = driving(question.scene)
+    drive = name_driving(question.scene)
     rows = compare_answer(bare, replace(witness, expected=(drive,)), answer)
     rows = [row for row in rows if row.quantity == drive or row.verdict in (REFUSES, FAILS)]
     rows = [row for row in rows if row.quantity != "undecided"]
@@ -146,7 +146,7 @@ def _inertia(question: Question, bare: Question, witness: Witness) -> Iterator[R
         yield replace(worst, quantity=f"{drive}_inertia", reason=reason)
 
 
-def _of_inertia(answer: Answer, drive: str) -> Answer:
+def _take_inertia(answer: Answer, drive: str) -> Answer:
     """Take the part of an answer that is of the bars' inertia."""
     alone = {**answer.quantities, drive: answer.quantities[f"{drive}_inertia"]}
     alone.pop("drive_condition", None)  # which holds how near loads and friction are to jamming
@@ -157,10 +157,10 @@ def check_mjcf(question: Question) -> Iterator[Row]:
     """Check the generated MJCF as it is shipped, if one is, by the engine that runs it."""
     for witness in question.witnesses:
         if witness.generated:
-            from fourbar_validation.engines.mujoco.shipped import shipped
+            from fourbar_validation.engines.mujoco.shipped import compare_shipped
 
             def rows() -> list[Row]:
-                row = shipped(question.name, question.scene, question.at)
+                row = compare_shipped(question.name, question.scene, question.at)
                 return [] if row is None else [row]
 
             yield from question.attempt(rows, witness.name, "MJCF as shipped")

@@ -12,13 +12,13 @@ from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.places import PROGRAM
-from fourbar_validation.regression.accept import output_options, report_differences
-from fourbar_validation.regression.record import baseline, recorded
-from fourbar_validation.report.junit import cases, document
+from fourbar_validation.regression.accept import add_output_options, report_differences
+from fourbar_validation.regression.record import find_baseline, open_run
+from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run.elsewhere import run_elsewhere
 from fourbar_validation.run.run import WORKERS, Collected, Pictured, RunOptions, run
-from fourbar_validation.run.selection import askable, chosen, selected
+from fourbar_validation.run.selection import choose_witnesses, find_askable, select_scenes
 from fourbar_validation.scenes.random import DrawnType
 
 ALL_TYPES = ",".join(kind.value for kind in DrawnType)
@@ -91,7 +91,7 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
     help="Draw nothing, measure no observed order, and judge studies, derivatives, bounds, SDF and USD of few scenes.",
 )
 @click.option("--mjcf", "--name", multiple=True, hidden=True, expose_value=False, is_eager=True, callback=refuse_moved)
-@output_options
+@add_output_options
 def command(
     scenes: tuple[Path, ...],
     out: Path,
@@ -111,7 +111,7 @@ def command(
     **forms: Path | None,
 ) -> int:
     """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
-    from fourbar_validation.report.terminal import table
+    from fourbar_validation.report.terminal import print_table
 
     of_random = {"--random": count, "--seed": seed, "--type": types}
     refuse_combinations(
@@ -125,12 +125,12 @@ def command(
                 )
             require_file(path, *scenes)
     if against is not None:
-        recorded(baseline(against))  # before anything runs
-    suite, witnesses = selected(scenes, named, count, seed or 0, types or ALL_TYPES, adapters)
+        open_run(find_baseline(against))  # before anything runs
+    suite, witnesses = select_scenes(scenes, named, count, seed or 0, types or ALL_TYPES, adapters)
     if wanted is not None:
-        from fourbar_validation.run.dial import dialled
+        from fourbar_validation.run.required_error import adjust_witnesses
 
-        witnesses = dialled(witnesses, wanted)
+        witnesses = adjust_witnesses(witnesses, wanted)
     if python is not None:
         the_same = of_random | {
             "--workers": workers,
@@ -143,10 +143,10 @@ def command(
         passed_on = [*map(os.path.abspath, scenes), "--no-pictures", *(f"--witness={adapter}" for adapter in adapters)]
         passed_on += [f"{option}={value}" for option, value in the_same.items() if value is not None]
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
-    present, missing = askable(chosen(engines, witnesses, adapters), by_name=engines is not None)
+    present, missing = find_askable(choose_witnesses(engines, witnesses, adapters), by_name=engines is not None)
     options = RunOptions(workers, scheduler, time_limit, drawn=not no_pictures)
     result = show_progress(len(suite), run(suite, out, present, options, missing))
-    table(result, out)
+    print_table(result, out)
     worse = _report_differences(against, out, forms, result.verdict)
     if result.counts[FAILS] or worse:
         return FAILED
@@ -169,9 +169,9 @@ def refuse_combinations(given: dict[str, Any]) -> None:
 def _report_differences(against: str | None, out: Path, forms: dict[str, Path | None], verdict: str) -> int:
     """Report what differs from an earlier run; where there is none the run's own comparisons as JUnit, if wanted."""
     if against is not None:
-        return report_differences(baseline(against), out, forms)
+        return report_differences(find_baseline(against), out, forms)
     if (xml := forms["junit"]) is not None:
-        write_text(xml, document(verdict, cases(read_columns(out / "results.parquet"))))
+        write_text(xml, write_document(verdict, list_cases(read_columns(out / "results.parquet"))))
     return HOLDS
 
 

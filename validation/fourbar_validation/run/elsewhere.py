@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fourbar.errors import FAILED, HOLDS, DependencyError, InputError
-from fourbar_validation.compare.rows import one_line
+from fourbar_validation.compare.rows import write_one_line
 from fourbar_validation.places import import_path
 
 NEEDS = "numpy, pint, click, rich, jinja2, pebble, filelock, pyarrow and the engines"
@@ -32,7 +32,7 @@ class Ended(NamedTuple):
         return self.last if self.failed else ""
 
 
-def ended(
+def run_to_end(
     command: Sequence[object],
     *,
     fine: Container[int] = (0,),
@@ -56,13 +56,13 @@ def ended(
     except subprocess.TimeoutExpired:
         return Ended("", "", True, f"no answer within {seconds:g} s")
     last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
-    return Ended(done.stdout, done.stderr, done.returncode not in fine, one_line(last))
+    return Ended(done.stdout, done.stderr, done.returncode not in fine, write_one_line(last))
 
 
-def of_the_harness(line: Sequence[object], *, variables: Mapping[str, str] | None = None, **how: Any) -> Ended:
-    """Run an interpreter that is to find this code, wherever it lies; for `how` see `ended`."""
+def start_harness(line: Sequence[object], *, variables: Mapping[str, str] | None = None, **how: Any) -> Ended:
+    """Run an interpreter that is to find this code, wherever it lies; for `how` see `run_to_end`."""
     with import_path() as path:
-        return ended(line, variables={**(variables or {}), "PYTHONPATH": path}, **how)
+        return run_to_end(line, variables={**(variables or {}), "PYTHONPATH": path}, **how)
 
 
 def run_elsewhere(python: Path, arguments: Sequence[str], out: Path) -> Path:
@@ -77,7 +77,7 @@ def run_elsewhere(python: Path, arguments: Sequence[str], out: Path) -> Path:
     results.unlink(missing_ok=True)  # of an earlier run; what is there afterwards is of this one
     command = [python.absolute(), "-m", "fourbar_validation", "run", *arguments, "--out", out.absolute()]
     try:
-        done = of_the_harness(command, fine=(HOLDS, FAILED))
+        done = start_harness(command, fine=(HOLDS, FAILED))
     except OSError as error:
         raise InputError("--python", str(python), f"cannot be run: {error.strerror}") from None
     if done.failed or not results.is_file():

@@ -11,20 +11,20 @@ import numpy as np
 
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.rows import FORMULAS, Row
-from fourbar_validation.engines.added import numbers
+from fourbar_validation.engines.added import list_numbers
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.report.colours import NUMBERS
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.answers import check_mjcf, compare_answers, compare_inertia, compare_statements
-from fourbar_validation.run.formulas import check_identities, check_status
+from fourbar_validation.run.identities import check_identities, check_status
 from fourbar_validation.run.printed import check_blocks, check_error_bars, check_law, check_points, check_residual
 from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.released import check_released
 from fourbar_validation.run.shipped.bounds import extremes
 from fourbar_validation.run.shipped.calls import compiled, study
-from fourbar_validation.run.shipped.changes import sensitivity, tolerances
 from fourbar_validation.run.shipped.equilibria import equilibria
 from fourbar_validation.run.shipped.files import sdf, usd
+from fourbar_validation.run.shipped.sensitivities import sensitivity, tolerances
 
 
 class Check(NamedTuple):
@@ -63,7 +63,7 @@ OUTPUT = "output.txt"
 """In the folder of a run: what the engines printed."""
 
 
-def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
+def judge_for_report(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
     """Judge a scene and keep what the report needs of it.
 
     `draw`: with its pictures and observed orders, and with what else is shipped; otherwise, in a long suite, that is
@@ -74,10 +74,10 @@ def judged(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *,
     record.rows = [name_output(row) if row.engine in record.output else row for row in record.rows]
     figure = None
     if draw:
-        from fourbar_validation.report.figures import scene_figure
+        from fourbar_validation.report.figures import draw_scene_figure
 
-        NUMBERS.update(numbers(witnesses))
-        figure = scene_figure(record)
+        NUMBERS.update(list_numbers(witnesses))
+        figure = draw_scene_figure(record)
     return record.kept(figure)
 
 
@@ -130,12 +130,12 @@ def ask(name: str, scene: Scene, witnesses: Sequence[Witness]) -> Question:
     if len(at.angle) > 1 and all(np.ptp(values) == 0 for values in numbers):  # constant conditions are not swept
         question.left_out.append("positions: all are the same, one is evaluated")
         question.at = select_positions(at, np.array([0]))._replace(time=None)
-    question.witnesses = list(_called_for(witnesses, question.at, question.left_out))
+    question.witnesses = list(_choose_called_for(witnesses, question.at, question.left_out))
     question.solve()  # untimed: the first call of a process pays for what every later one finds loaded
     return question
 
 
-def _called_for(witnesses: Iterable[Witness], at: Command, left_out: list[str]) -> Iterator[Witness]:
+def _choose_called_for(witnesses: Iterable[Witness], at: Command, left_out: list[str]) -> Iterator[Witness]:
     """Choose the witnesses that the question needs; the others are left out before their engine is imported."""
     for witness in witnesses:
         reason = None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import DependencyError, InputError
 from fourbar_validation.engines import workers as processes
-from fourbar_validation.report.machine import code, differing, machine
+from fourbar_validation.report.machine import find_differing, name_code, name_machine
 
 if TYPE_CHECKING:
     from distributed import Future
@@ -25,16 +25,16 @@ class ClusterError(DependencyError):
     """The scheduler is gone, or its workers are not set up for this run; what is finished is kept."""
 
 
-def here() -> tuple[dict[str, str], str]:
+def describe_here() -> tuple[dict[str, str], str]:
     """Tell what decides the numbers of this worker, and its machine."""
-    return code(), machine()
+    return name_code(), name_machine()
 
 
 def apply_alike(
     wanted: dict[str, str], seconds: float, function: Callable[[Any], Any], items: Sequence[Any]
 ) -> list[Any]:
     """Apply a function in a worker, which may have joined later: with the code and libraries of here, or not at all."""
-    if difference := differing(wanted, code()):
+    if difference := find_differing(wanted, name_code()):
         raise ClusterError(f"a worker is not set up as this machine: {difference}")
     return processes.apply_watched(seconds, function, items)
 
@@ -58,33 +58,33 @@ class Cluster:
             why = str(error) or "no answer"
             raise InputError("--scheduler", scheduler, f"must be the address of a Dask scheduler: {why}") from None
         try:
-            self.machines = self._alike()
+            self.machines = self._name_alike()
         except BaseException:
             self._leave()
             raise
 
-    def _alike(self) -> str:
+    def _name_alike(self) -> str:
         """Name the machines of the workers."""
         try:
             self.client.wait_for_workers(1, timeout=processes.STALL)
         except TimeoutError:
-            raise self._no_workers() from None
+            raise self._say_no_workers() from None
         there = self.client.nthreads()  # type: ignore[no-untyped-call]
         result: Counter[str] = Counter()
         try:
-            tasks = {self.client.submit(here, workers=[worker], pure=False): worker for worker in there}
+            tasks = {self.client.submit(describe_here, workers=[worker], pure=False): worker for worker in there}
             for task, worker in tasks.items():
                 while not self.done([task], processes.STALL):
                     if self.lost([task]):
-                        raise self._no_workers()
+                        raise self._say_no_workers()
                 known, where = self.result(task)
-                if difference := differing(code(), known):
+                if difference := find_differing(name_code(), known):
                     raise ClusterError(f"{self.scheduler}: worker {worker} is not set up as this machine: {difference}")
                 result[where] += 1
         except DependencyError:
             raise
         except Exception as error:  # whatever a scheduler or a worker without this checkout comes up with
-            raise self._unfit(error) from None
+            raise self._find_unfit(error) from None
         return "; ".join(f"{count} workers on {where}" for where, count in sorted(result.items()))
 
     def over(
@@ -97,9 +97,9 @@ class Cluster:
         """Apply a function to chunks of items, each as it is done; `seconds`: after which an item is taken to hang."""
         self.task = (seconds, function)
         try:
-            yield from processes.as_done(chunks, self, instead)
+            yield from processes.yield_done(chunks, self, instead)
         except processes.StalledError:
-            raise self._no_workers() from None
+            raise self._say_no_workers() from None
         finally:
             self._leave()
 
@@ -110,7 +110,7 @@ class Cluster:
 
     def submit(self, items: Sequence[Any]) -> "Future[list[Any]]":
         """Hand in some items."""
-        return self.client.submit(apply_alike, code(), *self.task, items, retries=0, pure=False)
+        return self.client.submit(apply_alike, name_code(), *self.task, items, retries=0, pure=False)
 
     def done(self, tasks: "Collection[Future[Any]]", seconds: float) -> "set[Future[Any]]":
         """Wait for those that are finished, until there is one; none after some seconds."""
@@ -119,8 +119,8 @@ class Cluster:
             finished = {task for task in tasks if task.done()}  # type: ignore[no-untyped-call]
             if finished or time.monotonic() > until:
                 return finished
-            if not self._connected():
-                raise self._gone()
+            if not self._connect():
+                raise self._say_gone()
             time.sleep(POLL)
 
     def result(self, task: "Future[Any]") -> Any:
@@ -132,12 +132,12 @@ class Cluster:
                 if self.lost([task]):
                     raise processes.StalledError from None
             except CancelledError:  # what was unfinished when the scheduler was lost
-                raise self._gone() from None
+                raise self._say_gone() from None
             except ImportError as error:  # a worker that joined later; what an engine does not find is in its row
-                raise self._unfit(error) from None
+                raise self._find_unfit(error) from None
             except Exception:
-                if not self._connected():
-                    raise self._gone() from None
+                if not self._connect():
+                    raise self._say_gone() from None
                 raise
 
     def lost(self, _: "Collection[Future[Any]]") -> bool:
@@ -145,9 +145,9 @@ class Cluster:
         try:
             return not self.client.nthreads()  # type: ignore[no-untyped-call]
         except (OSError, RuntimeError):
-            raise self._gone() from None
+            raise self._say_gone() from None
 
-    def _connected(self) -> bool:
+    def _connect(self) -> bool:
         comm = self.client.scheduler_comm
         return self.client.status == "running" and comm is not None and not comm.comm.closed()
 
@@ -156,13 +156,13 @@ class Cluster:
         with suppress(OSError, RuntimeError):  # nobody is there, or nobody answers
             self.client.close(timeout=ENDING)  # type: ignore[no-untyped-call]
 
-    def _gone(self) -> ClusterError:
+    def _say_gone(self) -> ClusterError:
         return ClusterError(f"{self.scheduler}: the scheduler is gone; what is finished is kept")
 
-    def _no_workers(self) -> processes.NoWorkersError:
+    def _say_no_workers(self) -> processes.NoWorkersError:
         return processes.NoWorkersError(f"{self.scheduler}: no workers; start some, what is finished is kept")
 
-    def _unfit(self, error: BaseException) -> ClusterError:
+    def _find_unfit(self, error: BaseException) -> ClusterError:
         why = error.__cause__ or error
         return ClusterError(
             f"{self.scheduler}: scheduler and workers must be able to import fourbar_validation (PYTHONPATH) and its "

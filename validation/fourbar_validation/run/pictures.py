@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from fourbar.errors import FourBarError
-from fourbar.mjcf import mjcf
-from fourbar_validation.compare.rows import plain
-from fourbar_validation.engines.mujoco.picture import pictures
+from fourbar.mjcf import write_mjcf
+from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.record import Record
 from fourbar_validation.run import pool
@@ -28,7 +28,7 @@ def draw_scenes(
               for record in records}  # fmt: skip
     groups: dict[tuple[Witness, ...], list[int]] = {}
     for index in places:
-        without = broken[plain(suite.name(index))]
+        without = broken[make_plain(suite.name(index))]
         groups.setdefault(tuple(each for each in witnesses if each.name not in without), []).append(index)
     for who, indices in groups.items():
         chunks = [(index, range(index, index + 1)) for index in indices]
@@ -41,7 +41,7 @@ def picture_models(suite: Suite, places: Iterable[int]) -> tuple[dict[str, str],
     texts = {}
     for index in places:
         try:
-            texts[suite.name(index)] = mjcf(suite.scene(index))
+            texts[suite.name(index)] = write_mjcf(suite.scene(index))
         except FourBarError:  # bars without mass, a motion law: the engines' own rows say so
             continue
-    return pictures(texts)
+    return render_pictures(texts)

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from fourbar_validation.compare.rows import breakdown, plain
+from fourbar_validation.compare.rows import make_breakdown, make_plain
 from fourbar_validation.engines import workers as processes
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.record import Record
-from fourbar_validation.run.judge import judged
+from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.scenes.suites import Files, Suite
 
 if TYPE_CHECKING:
@@ -30,24 +30,24 @@ class Job:
     @property
     def name(self) -> str:
         """The scene's."""
-        return plain(self.suite.name(self.scene))
+        return make_plain(self.suite.name(self.scene))
 
 
-def jobs(suite: Suite, scenes: Iterable[int], witnesses: Sequence[Witness], draw: bool) -> list[Job]:
+def make_jobs(suite: Suite, scenes: Iterable[int], witnesses: Sequence[Witness], draw: bool) -> list[Job]:
     """Make the jobs of some scenes; one of a file carries its own text alone."""
     if isinstance(suite, Files):
         return [Job(replace(suite, texts=(suite.texts[i],)), 0, witnesses, draw) for i in scenes]
     return [Job(suite, i, witnesses, draw) for i in scenes]
 
 
-def longest(suite: Suite) -> float:
+def find_longest(suite: Suite) -> float:
     """Give the seconds after which a scene of the suite is taken to hang."""
     return processes.SECONDS + SECONDS_PER_POSITION * (suite.positions if isinstance(suite, Files) else 0)
 
 
 def judge_job(job: Job) -> Record:
     """Judge one scene; runs in a worker."""
-    return judged(job.name, job.suite.scene(job.scene), job.witnesses, draw=job.draw)
+    return judge_for_report(job.name, job.suite.scene(job.scene), job.witnesses, draw=job.draw)
 
 
 def judge_by_engine(job: Job, _: Exception, attempt: processes.Attempt) -> Record:
@@ -59,7 +59,7 @@ def judge_by_engine(job: Job, _: Exception, attempt: processes.Attempt) -> Recor
         if isinstance(result, Record):
             record = result if record is None else record.joined(result)
         else:
-            failed.append(breakdown(job.name, who[0].name if who else "formulas", result))
+            failed.append(make_breakdown(job.name, who[0].name if who else "formulas", result))
     record = record or Record(job.name)
     return replace(record, rows=[*record.rows, *failed])
 
@@ -74,8 +74,8 @@ def judge_chunks(
     cluster: "Cluster | None" = None,
 ) -> Iterator[tuple[int, list[Record]]]:
     """Judge chunks of scenes, each as it is done; `seconds`: after which a scene is taken to hang."""
-    made = ((number, jobs(suite, scenes, witnesses, draw)) for number, scenes in chunks)
-    seconds = longest(suite) if seconds is None else seconds
+    made = ((number, make_jobs(suite, scenes, witnesses, draw)) for number, scenes in chunks)
+    seconds = find_longest(suite) if seconds is None else seconds
     if cluster is not None:
         return cluster.over(judge_job, made, seconds, judge_by_engine)
-    return processes.over_processes(judge_job, made, workers, seconds=seconds, instead=judge_by_engine)
+    return processes.apply_over_processes(judge_job, made, workers, seconds=seconds, instead=judge_by_engine)

@@ -14,7 +14,13 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.rows import FAILS, FORMULAS, UNDECIDED, Row
-from fourbar_validation.compare.scales import reference_of, scale_of, smallest_scale, strictest_condition, term_sizes
+from fourbar_validation.compare.scales import (
+    make_reference,
+    scale_of,
+    sum_terms,
+    take_smallest_scale,
+    take_strictest_condition,
+)
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
@@ -22,20 +28,20 @@ from fourbar_validation.compare.tolerance import (
     NOTHING_TO_TELL,
     Array,
     K,
-    condition_of,
-    half_turns,
+    count_half_turns,
+    divide,
+    find_condition,
+    find_error,
+    find_worst,
     magnitude,
-    of_length,
-    relative,
-    relative_error,
-    worst,
+    sum_lengths,
 )
-from fourbar_validation.engines.description import speeds
-from fourbar_validation.engines.exact import BallArithmetic, unknown
+from fourbar_validation.engines.description import list_speeds
+from fourbar_validation.engines.exact import BallArithmetic, find_refusal
 from fourbar_validation.engines.free_body import move
-from fourbar_validation.engines.free_body_effects import acting
-from fourbar_validation.engines.prediction import from_data
-from fourbar_validation.engines.witnesses import not_installed
+from fourbar_validation.engines.free_body_effects import sum_acting
+from fourbar_validation.engines.prediction import predict_from_data
+from fourbar_validation.engines.witnesses import find_missing
 from fourbar_validation.run.question import Question, select_positions
 
 SAMPLE = 5
@@ -49,10 +55,12 @@ ROUNDED_SOMEWHERE = 20
 def check_points(question: Question) -> Iterator[Row]:
     """Check the scene's own points."""
     if question.scene.points and question.reference is not None and question.at.speed is not None:
-        yield points(question, question.scene, question.solution, question.reference)
+        yield compare_points(question, question.scene, question.solution, question.reference)
 
 
-def points(question: Question, scene: Scene, solution: Solution, reference: Solution, least: float = 0.0) -> Row:
+def compare_points(
+    question: Question, scene: Scene, solution: Solution, reference: Solution, least: float = 0.0
+) -> Row:
     """Compare places, velocities and accelerations of a scene's own points, from the angles of another derivation.
 
     `least`: the condition from which on they are judged.
@@ -60,8 +68,8 @@ def points(question: Question, scene: Scene, solution: Solution, reference: Solu
     link, n = scene.linkage, len(reference)
     zero = np.zeros(n)
     theta = {1: zero + link.ground_angle, 2: reference.theta_2, 3: reference.theta_3, 4: reference.theta_4}
-    speed = {bar: zero if bar == 1 else _known(reference, f"omega_{bar}", n) for bar in theta}
-    growth = {bar: zero if bar == 1 else _known(reference, f"alpha_{bar}", n) for bar in theta}
+    speed = {bar: zero if bar == 1 else _find_known(reference, f"omega_{bar}", n) for bar in theta}
+    growth = {bar: zero if bar == 1 else _find_known(reference, f"alpha_{bar}", n) for bar in theta}
 
     def swing(bar: int, distance: float, angle: float) -> list[NDArray[np.complex128]]:
         arm = distance * np.exp(1j * (theta[bar] + angle))
@@ -70,24 +78,24 @@ def points(question: Question, scene: Scene, solution: Solution, reference: Solu
     first_pins = {3: swing(2, link.input.length, 0.0), 4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero]}
     error = np.zeros(n)
     usable = (solution.status_code == OK) & (reference.condition >= least)
-    usable &= condition_of("F12", link, reference) * NOTHING_TO_TELL > EPS
+    usable &= find_condition("F12", link, reference) * NOTHING_TO_TELL > EPS
     for point in scene.points:
         own, first_pin = swing(point.bar, *point.from_pin), first_pins.get(point.bar, [zero, zero, zero])
         tables, like = (solution.points, solution.velocity, solution.acceleration), ("B", "v_B", "a_B")
         for ours, kind, arm, at_foot in zip(tables, like, own, first_pin, strict=True):
             if point.name in ours:
                 theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
-                size = np.abs(arm) + np.abs(at_foot) + of_length(scene.linkage)
+                size = np.abs(arm) + np.abs(at_foot) + sum_lengths(scene.linkage)
                 if kind != "B":
-                    size = np.abs(arm) + np.abs(at_foot) + term_sizes(kind, scene, reference)
-                apart = relative_error(kind, ours[point.name], theirs, size) * condition_of(kind, link, reference)
+                    size = np.abs(arm) + np.abs(at_foot) + sum_terms(kind, scene, reference)
+                apart = find_error(kind, ours[point.name], theirs, size) * find_condition(kind, link, reference)
                 error = np.where(usable, np.maximum(error, np.where(np.isnan(apart), np.inf, apart)), error)
-    allowed = EQUIVALENCE.factor * half_turns(link.ground_angle, solution.theta_2)
+    allowed = EQUIVALENCE.factor * count_half_turns(link.ground_angle, solution.theta_2)
     what = f"the {len(scene.points)} points of the scene"
     return question.row("points", error, allowed, what, usable, theta_2=solution.theta_2)
 
 
-def _known(reference: Solution, quantity: str, n: int) -> Array:
+def _find_known(reference: Solution, quantity: str, n: int) -> Array:
     values: Array | None = getattr(reference, quantity)
     return np.zeros(n) if values is None else values
 
@@ -114,16 +122,16 @@ def check_blocks(question: Question) -> Iterator[Row]:
         error[known != np.isfinite(magnitude(one))] = np.inf
         with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
             size = scale_of(quantity, scene, solution, ours)[long[ends]]
-        condition = condition_of(quantity, scene.linkage, solution)[long[ends]]
+        condition = find_condition(quantity, scene.linkage, solution)[long[ends]]
         condition = np.where(np.isnan(condition), 1.0, condition)  # what the command decides where nothing closes
         # evaluated by the same code, but not in the same company of a processor's registers
-        apart = relative_error(quantity, one, other, size) * condition
+        apart = find_error(quantity, one, other, size) * condition
         error[known] = np.maximum(error[known], apart[known])
     alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
     solve(scene, at=at, out=alone)  # they are found without vectors then
     for angle, result in alone.items():
-        apart = relative_error(angle, result, getattr(solution, angle), np.ones(n))
-        apart *= condition_of(angle, scene.linkage, solution) / half_turns(scene.linkage.ground_angle, at.angle)
+        apart = find_error(angle, result, getattr(solution, angle), np.ones(n))
+        apart *= find_condition(angle, scene.linkage, solution) / count_half_turns(scene.linkage.ground_angle, at.angle)
         error[-1] = max(error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0))
     reason = f"{len(long)} positions at once against {n}"
     yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=whole.theta_2[ends])
@@ -132,46 +140,48 @@ def check_blocks(question: Question) -> Iterator[Row]:
 def check_error_bars(question: Question) -> Iterator[Row]:
     """Check the error bars by the true error, in 320 bits; no bar may be larger than what a comparison is allowed."""
     scene, at, solution = question.scene, question.at, question.solution
-    if at.omega_2 is None or at.remainder is not None or unknown(scene) or not_installed("flint"):
+    if at.omega_2 is None or at.remainder is not None or find_refusal(scene) or find_missing("flint"):
         return
     # the sense of dry friction at a pin at rest is no question of rounding
     usable = np.flatnonzero((solution.status_code == OK) & ~question.reversing(EQUIVALENCE.factor))
     if not len(usable):
         return
     spread = np.linspace(0, len(usable) - 1, SAMPLE).astype(int).tolist()
-    where = usable[np.unique([*spread, *(int(np.argmin(pull[usable])) for pull in _pulls(scene, at, solution))])]
+    where = usable[
+        np.unique([*spread, *(int(np.argmin(pull[usable])) for pull in _compute_pulls(scene, at, solution))])
+    ]
     sampled = select_positions(at, where)
     exact, ours = BallArithmetic().answer(scene, sampled), solve(scene, "error", at=sampled)
-    other = reference_of(scene, exact)
+    other = make_reference(scene, exact)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
         true = np.max([magnitude(getattr(ours, q) - exact.quantities[q]) for q in quantities], axis=0)
-        size = np.max([smallest_scale(q, scene, ours, other) for q in quantities], axis=0)
-        condition = strictest_condition(quantities[0], scene.linkage, ours, other)
+        size = np.max([take_smallest_scale(q, scene, ours, other) for q in quantities], axis=0)
+        condition = take_strictest_condition(quantities[0], scene.linkage, ours, other)
         tells = condition * NOTHING_TO_TELL > EPS
-        turns = np.array([half_turns(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
-        wide = relative(width, size) * condition / (K * EPS * turns)
+        turns = np.array([count_half_turns(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
+        wide = divide(width, size) * condition / (K * EPS * turns)
         if (beyond := tells & (wide > 1.0)).any():  # by what rounding the data does, no more
-            expected = np.max([from_data(scene, sampled, quantity, beyond) for quantity in quantities], axis=0)
-            wide = np.where(beyond, relative(width, expected), wide)
-        share = np.where(tells, np.maximum(relative(true, BARS * width), wide), 0.0)
+            expected = np.max([predict_from_data(scene, sampled, quantity, beyond) for quantity in quantities], axis=0)
+            wide = np.where(beyond, divide(width, expected), wide)
+        share = np.where(tells, np.maximum(divide(true, BARS * width), wide), 0.0)
         share[tells & ~np.isfinite(width)] = np.inf
-        index = worst(share)
+        index = find_worst(share)
         reason = f"the error is {true[index]:.1e}, the bar {width[index]:.1e}, of {size[index]:.1e}"
         yield question.row(bar, share, 1.0, reason, tells, float(condition[index]), sampled.theta_2)
 
 
-def _pulls(scene: Scene, at: Command, solution: Solution) -> Iterator[Array]:
+def _compute_pulls(scene: Scene, at: Command, solution: Solution) -> Iterator[Array]:
     """Compute what each spring, torsion spring and load over a table does, by free bodies: (n,), N and N m together."""
     assert solution.theta_3 is not None and solution.theta_4 is not None
-    motion = move(scene.linkage, at.theta_2, *speeds(at), solution.theta_3, solution.theta_4)
+    motion = move(scene.linkage, at.theta_2, *list_speeds(at), solution.theta_3, solution.theta_4)
     alone: list[Scene] = [replace(scene, loads=(load,), effects=()) for load in scene.loads if load.table is not None]
     for effect in scene.effects:
         if isinstance(effect, (Springs, Torsion)):
             kind = type(effect)
             alone += [replace(scene, loads=(), effects=(kind((one,)),)) for one in effect.springs]  # type: ignore[arg-type]
     for one in alone:
-        wrenches = acting(one, motion)
+        wrenches = sum_acting(one, motion)
         yield sum(np.abs(wrenches.force[bar]) + np.abs(wrenches.moment[bar]) for bar in MOVING_BARS)  # type: ignore[misc]
 
 
@@ -227,20 +237,24 @@ def check_law(question: Question) -> Iterator[Row]:
         jerk = (last - first) / h
         errors.append(np.abs([jerk[1] - jerk[0], jerk[-1] - jerk[-2]]) * float(h.min()) / bent)
     piece = np.clip(np.searchsorted(t, at.time, side="right") - 1, 0, len(h) - 1)
-    theta, omega, alpha = _hermite(at.time - t[piece], angle[piece], speed[piece], first[piece], last[piece], h[piece])
+    theta, omega, alpha = _interpolate_hermite(
+        at.time - t[piece], angle[piece], speed[piece], first[piece], last[piece], h[piece]
+    )
     along = [
         np.abs(theta - at.angle) / max(1.0, farthest),
         np.abs(omega - at.speed) / size,
         np.abs(alpha - at.acceleration) / bent,
     ]
     error = np.max(along, axis=0)
-    error[worst(error)] = np.max([error[worst(error)], *(each.max(initial=0.0) for each in errors)])
+    error[find_worst(error)] = np.max([error[find_worst(error)], *(each.max(initial=0.0) for each in errors)])
     yield question.row(
         "law", error, IDENTITY.factor, "the piecewise cubic through the table, its acceleration continuous"
     )
 
 
-def _hermite(s: Array, angle: Array, speed: Array, first: Array, last: Array, h: Array) -> tuple[Array, Array, Array]:
+def _interpolate_hermite(
+    s: Array, angle: Array, speed: Array, first: Array, last: Array, h: Array
+) -> tuple[Array, Array, Array]:
     """Compute angle, speed and acceleration a time s into a piece, from its acceleration at both ends."""
     jerk = (last - first) / h
     return (

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.compare.answer import Answer, Engine, not_taken
+from fourbar_validation.compare.answer import Answer, Engine, explain_refusal
 from fourbar_validation.compare.compare import Scales
-from fourbar_validation.compare.reversals import Reversal, reversals, reversing
-from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, UNDECIDED, Row, breakdown, plain
-from fourbar_validation.compare.scales import reference_of
-from fourbar_validation.compare.tolerance import Array, Mask, worst
+from fourbar_validation.compare.reversals import Reversal, find_reversals, mark_reversing
+from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, UNDECIDED, Row, make_breakdown, make_plain
+from fourbar_validation.compare.scales import make_reference
+from fourbar_validation.compare.tolerance import Array, Mask, find_worst
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.output import kept
+from fourbar_validation.engines.output import keep_printed
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.report.record import Record, Timing
 
@@ -79,7 +79,7 @@ class Question:
         """Conditions and sizes by free bodies, the reference of every comparison; None: an answer has its own."""
         try:
             with np.errstate(all="ignore"):
-                return None if self.free_body is None else reference_of(self.scene, self.free_body)
+                return None if self.free_body is None else make_reference(self.scene, self.free_body)
         except ArithmeticError:
             return None
 
@@ -92,9 +92,9 @@ class Question:
     def answer(self, witness: Witness) -> Answer:
         """Ask a witness, once."""
         if witness.name not in self.answered:
-            with kept(self.output, witness.name):
+            with keep_printed(self.output, witness.name):
                 engine, begin = self.engine(witness), time.perf_counter()
-                if refusal := not_taken(engine, self.at):
+                if refusal := explain_refusal(engine, self.at):
                     answer = Answer(witness.name, "exact", refusal=refusal)
                 else:
                     answer = ask_at(engine, self.scene, self.at)
@@ -103,12 +103,12 @@ class Question:
 
     def find_reversals(self) -> tuple[()]:
         """Find where dry friction reverses; what is drawn there is no comparison."""
-        self.jumps = reversals(self.scene, self.at, self.solution)
+        self.jumps = find_reversals(self.scene, self.at, self.solution)
         return ()
 
     def reversing(self, slip: float) -> Mask:
         """Mark where dry friction reverses: a pin slips by no more than this part of its speeds."""
-        return reversing(self.scene, self.solution, slip)
+        return mark_reversing(self.scene, self.solution, slip)
 
     def row(
         self,
@@ -129,7 +129,7 @@ class Question:
         """
         if where is not None:
             error = np.where(where, error, 0.0)
-        index = worst(error)
+        index = find_worst(error)
         verdict = AGREES if error[index] <= allowed else FAILS
         if where is not None and not where.any():
             verdict = UNDECIDED
@@ -152,8 +152,8 @@ class Question:
         return Record(
             self.name,
             self.scene,
-            plain(self.scene.title),
-            plain(self.scene.source),
+            make_plain(self.scene.title),
+            make_plain(self.scene.source),
             rows,
             timings,
             self.left_out,
@@ -170,17 +170,17 @@ class Question:
         except NotAskedError as reason:
             self.left_out.append(f"{engine}: {reason}")
         except Exception as error:
-            yield breakdown(self.name, engine, error, part)
+            yield make_breakdown(self.name, engine, error, part)
 
 
 def ask_at(engine: Engine, scene: Scene, at: Command) -> Answer:
     """Give an engine what is commanded, and nothing that the formulas computed from it."""
-    given = without_angles(at)
+    given = remove_angles(at)
     answer = engine.answer(scene, given)
     return replace(answer, at=at) if answer.at is given else answer
 
 
-def without_angles(at: Command) -> Command:
+def remove_angles(at: Command) -> Command:
     """Take out of a command by a stroke the bar's motion, which the formulas computed from it: NaN."""
     if at.stroke is None:
         return at

@@ -22,29 +22,32 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Array, Released
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, FORMULAS, REFUSES, UNDECIDED, Row
-from fourbar_validation.compare.scales import reference_of
+from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
-from fourbar_validation.compare.tolerance import EQUIVALENCE, in_own_unit, relative, worst
+from fourbar_validation.compare.tolerance import EQUIVALENCE, divide, find_worst, replace_zero_size
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.witnesses import Witness, not_installed, predicting_from
+from fourbar_validation.engines.witnesses import Witness, find_missing, make_prediction
 from fourbar_validation.report.record import Timing
 from fourbar_validation.run.question import Question, select_positions
-from fourbar_validation.run.shipped.variants import member, worst_rows
+from fourbar_validation.run.shipped.variants import keep_worst, take_member
 
 
-def _mujoco(step: float) -> Any:
+def _answer_mujoco(step: float) -> Any:
     from fourbar_validation.engines.mujoco.released import MujocoForward
 
     return MujocoForward(step)
 
 
-def _pinocchio(step: float) -> Any:
+def _answer_pinocchio(step: float) -> Any:
     from fourbar_validation.engines.pinocchio_forward import PinocchioReleased
 
     return PinocchioReleased(step)
 
 
-ENGINES = {"mujoco-forward": (_mujoco, 1e-3, "mujoco"), "pinocchio-forward": (_pinocchio, 2e-3, "pinocchio")}
+ENGINES = {
+    "mujoco-forward": (_answer_mujoco, 1e-3, "mujoco"),
+    "pinocchio-forward": (_answer_pinocchio, 2e-3, "pinocchio"),
+}
 """What starts it with a step, longest step (s) and library of each engine that integrates by itself."""
 FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10, "stopped_at": 1e-9}
 """Errors (rad, of the greatest speed, of the greatest energies, of the duration) at which a free motion agrees: the
@@ -75,7 +78,7 @@ class Pendulum(NamedTuple):
         return sense * (2.0 * (amplitude + math.pi * whole) + math.pi), sense * bottom * dn
 
 
-def as_pendulum(scene: Scene) -> Pendulum | None:
+def make_pendulum(scene: Scene) -> Pendulum | None:
     """Give the pendulum that the scene is, or None; it must turn over, or none of this is an answer."""
     d, a, b, c = scene.linkage.lengths
     effects = scene.effects
@@ -108,15 +111,15 @@ def check_released(question: Question) -> Iterator[Row]:
     free = scene.motion.free
     assert free is not None and solution.omega_2 is not None
     times = np.linspace(0.0, free.duration, free.steps + 1)
-    yield from _forces(question)
-    pendulum = as_pendulum(scene)
+    yield from _compare_forces(question)
+    pendulum = make_pendulum(scene)
     truth = _Truth(solution.theta_2, solution.omega_2, solution.stopped_at)
     if pendulum is not None:
         phi, rate = pendulum.motion(times)
         truth = _Truth(phi + math.pi / 2, rate)
         none = np.zeros(len(solution))
         ours = Released("formulas", "exact", solution.theta_2, solution.omega_2, none, none)
-        yield from _rows(question, ours, None, truth)
+        yield from _make_rows(question, ours, None, truth)
 
     def rows(engine: Callable[[float], Any], longest: float) -> list[Row]:
         pairs = math.ceil(free.duration / free.steps / (2.0 * longest) - 1e-6)
@@ -128,16 +131,16 @@ def check_released(question: Question) -> Iterator[Row]:
         question.timings.append(Timing(name, fine.engine, fine.setting, len(times), seconds))
         if fine.refusal is not None:
             question.left_out.append(f"{fine.engine}: {fine.refusal}")
-        return _rows(question, fine, coarse, truth)
+        return _make_rows(question, fine, coarse, truth)
 
     for engine, (start, longest, library) in ENGINES.items():
-        if reason := not_installed(library):
+        if reason := find_missing(library):
             question.left_out.append(f"{engine}: {reason}")
         else:
             yield from question.attempt(partial(rows, start, longest), engine)
 
 
-def _forces(question: Question) -> Iterator[Row]:
+def _compare_forces(question: Question) -> Iterator[Row]:
     """Compare motion, pin forces and the torque, which is none, of every instant, by engines that answer one by one.
 
     They are given theta_2, omega_2 and alpha_2; that these balance without a torque is the equation of motion.
@@ -145,7 +148,7 @@ def _forces(question: Question) -> Iterator[Row]:
     name, scene, solution = question.name, question.scene, question.solution
     none = solution.torque if solution.drive is None else solution.drive_force
     assert solution.omega_2 is not None and solution.alpha_2 is not None and none is not None
-    driven = worst(np.abs(none))
+    driven = find_worst(np.abs(none))
     torque = float(np.abs(none[driven]))
     what = "a released linkage has no drive"
     place = float(solution.theta_2[driven])
@@ -153,38 +156,38 @@ def _forces(question: Question) -> Iterator[Row]:
     held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2, drive=None)
     at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
     driven_ones = [
-        (Question(name, own, select_positions(at, where), output=question.output), member(solution, where))
-        for own, where in _prescribed(held, at)
+        (Question(name, own, select_positions(at, where), output=question.output), take_member(solution, where))
+        for own, where in _prescribe(held, at)
     ]
     for witness in question.witnesses:
         if witness.tolerance == EQUIVALENCE and "theta_3" in witness.expected and not witness.missing():
-            rows = partial(_worst_forces_by, witness, driven_ones)
+            rows = partial(_keep_worst_forces, witness, driven_ones)
             yield from question.attempt(rows, witness.name, "forces")
 
 
-def _worst_forces_by(witness: Witness, driven: list[tuple[Question, Solution]]) -> list[Row]:
+def _keep_worst_forces(witness: Witness, driven: list[tuple[Question, Solution]]) -> list[Row]:
     """Compare what one engine answers to each part of the motion, and keep the worst row of each quantity."""
-    return worst_rows(row for own, solution in driven for row in _forces_by(witness, own, solution))
+    return keep_worst(row for own, solution in driven for row in _compare_forces_by(witness, own, solution))
 
 
-def _forces_by(witness: Witness, driven: Question, solution: Solution) -> list[Row]:
+def _compare_forces_by(witness: Witness, driven: Question, solution: Solution) -> list[Row]:
     """Compare what one engine answers to the motion as a prescribed one."""
     answer, scene = driven.answer(witness), driven.scene
     if answer.refusal is not None:
         return [Row.unmeasured(driven.name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
-    reference = reference_of(scene, answer)
+    reference = make_reference(scene, answer)
     assert reference is not None
     # the formulas are conditioned by the angle that is independent there, an engine by theta_2
     conditioned = replace(solution, condition=reference.condition, drive_condition=reference.drive_condition)
     conditioned.drive_bar, conditioned.at = 2, driven.at
     names = [q for q in UNKNOWNS if q in witness.expected]
     # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
-    predicted = predicting_from(witness, scene, driven.at, answer)
+    predicted = make_prediction(witness, scene, driven.at, answer)
     rows = Comparison(driven.name, scene, answer, conditioned, witness.tolerance, names, predicted, reference).rows()
     return [row for row in rows if row.quantity != "undecided"]
 
 
-def _prescribed(scene: Scene, at: Command) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
+def _prescribe(scene: Scene, at: Command) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
     """Prescribe the instants at which the linkage moves, and each standstill with the couples of dry friction there.
 
     An engine has no friction at rest. A standstill that lasts is held: every pin takes the same part of its torque, and
@@ -226,7 +229,7 @@ class _Truth(NamedTuple):
     stopped_at: float | None = None
 
 
-def _rows(question: Question, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
+def _make_rows(question: Question, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
     free, through, n = question.scene.motion.free, question.scene.motion.through, len(truth.theta_2)
     assert free is not None
     who = (question.name, fine.engine, fine.setting)
@@ -240,24 +243,24 @@ def _rows(question: Question, fine: Released, coarse: Released | None, truth: _T
         if coarse is not None:  # the formulas integrate the energy equation itself; their drift is part of their test
             result["energy"] = of.energy[:n] - of.energy[0]
             if through == "sign":
-                result["stopped_at"] = _end(of.stopped_at, free.duration)
+                result["stopped_at"] = _find_end(of.stopped_at, free.duration)
         return result
 
     right_and_size = {
         "theta_2": (truth.theta_2, 1.0),
         "omega_2": (truth.omega_2, float(np.abs(truth.omega_2).max())),
         "energy": (np.zeros(n), float(fine.terms[:n].max())),
-        "stopped_at": (_end(truth.stopped_at, free.duration), 1.0),
+        "stopped_at": (_find_end(truth.stopped_at, free.duration), 1.0),
     }
     rows = []
     for name, values in numbers(fine).items():
-        right, size = right_and_size[name][0], in_own_unit(np.array(right_and_size[name][1]))
-        error, expected = relative(np.abs(values - right), size), 0.0
+        right, size = right_and_size[name][0], replace_zero_size(np.array(right_and_size[name][1]))
+        error, expected = divide(np.abs(values - right), size), 0.0
         if coarse is not None:
             other = numbers(coarse)[name]
             alike = len(other) == len(values)
-            expected = float(relative(np.abs(values - other).max(), size)) if alike else math.nan
-        index = worst(error)
+            expected = float(divide(np.abs(values - other).max(), size)) if alike else math.nan
+        index = find_worst(error)
         full = FULL[name] * max(1.0, free.duration / UNIT)
         allowed = max(full, TIMES_PREDICTED * expected)
         if error[index] <= full:
@@ -273,6 +276,6 @@ def _rows(question: Question, fine: Released, coarse: Released | None, truth: _T
     return rows
 
 
-def _end(stopped_at: float | None, duration: float) -> Array:
+def _find_end(stopped_at: float | None, duration: float) -> Array:
     """Give when a motion reached its limit, or the stated end, as a part of that duration, (1,)."""
     return np.array([1.0 if stopped_at is None else stopped_at / duration])

@@ -8,20 +8,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
-from fourbar.writing import naming, write_text
+from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.columns import Columns, read_columns
-from fourbar_validation.compare.rows import FAILS, FORMULAS, Row, csv_text, plain
+from fourbar_validation.compare.rows import FAILS, FORMULAS, Row, make_plain, write_csv
 from fourbar_validation.compare.tolerance import IDENTITY
-from fourbar_validation.engines.added import numbers
+from fourbar_validation.engines.added import list_numbers
 from fourbar_validation.engines.hard_suite import Hard
 from fourbar_validation.engines.witnesses import Witness
-from fourbar_validation.regression.record import ABOUT, COLUMNS, TABLE, about, write_about
-from fourbar_validation.regression.scenes import descriptions
+from fourbar_validation.regression.record import ABOUT, COLUMNS, TABLE, describe_run, write_about
+from fourbar_validation.regression.scenes import describe_scenes
 from fourbar_validation.report.colours import NUMBERS
-from fourbar_validation.report.html import html, markdown
-from fourbar_validation.report.machine import code
+from fourbar_validation.report.html import write_html, write_markdown
+from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.sections import sections
+from fourbar_validation.report.sections import collect_sections
 from fourbar_validation.report.summary import PICTURED, Summary
 from fourbar_validation.run import pool
 from fourbar_validation.run.judge import OUTPUT
@@ -87,7 +87,7 @@ def run(
     identity = {
         "scenes": suite.fingerprint(),
         "witnesses": [witness.fingerprint() for witness in witnesses],
-        **code(),
+        **name_code(),
         "draw": draw,
         "time limit": seconds,
     }
@@ -105,42 +105,42 @@ def run(
         summary = Summary()
         summary.tolerances = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
         summary.missing = missing
-        with Columns(out) as columns, drafted(out / OUTPUT) as output, drafted(out / "timings.csv") as times:
-            times.write(csv_text(TIMINGS, []))
+        with Columns(out) as columns, draft_file(out / OUTPUT) as output, draft_file(out / "timings.csv") as times:
+            times.write(write_csv(TIMINGS, []))
             for number, scenes in enumerate(chunks):
                 records = [Record.restore(kept) for kept in store.read(number)]
                 for scene, each in zip(scenes, records, strict=True):
-                    each.rows = each.rows or [mark_missing(plain(suite.name(scene)))]
+                    each.rows = each.rows or [mark_missing(make_plain(suite.name(scene)))]
                     summary.add(each)
-                    times.write(csv_text((), timings(each)))
+                    times.write(write_csv((), list_timings(each)))
                     output.writelines(f"{each.name}: {engine}\n{text}\n\n" for engine, text in each.output.items())
                 columns.add([row for each in records for row in each.rows])
                 yield Collected(len(scenes))
         pictured = {record.name for record in summary.pictured} if options.drawn else set()
-        places = [index for index in range(len(suite)) if plain(suite.name(index)) in pictured]
+        places = [index for index in range(len(suite)) if make_plain(suite.name(index)) in pictured]
         if options.drawn and not draw:
             for shown in draw_scenes(suite, places, summary.pictured, witnesses, workers, seconds):
                 summary.picture(shown)
                 yield Pictured(1)
-        record = about(witnesses, suite.fingerprint(), descriptions(suite))
+        record = describe_run(witnesses, suite.fingerprint(), describe_scenes(suite))
         if cluster is not None:
             record.settings["machines"] = cluster.machines
         write_about(record, out)
-        write_text(out / "report.md", markdown(summary))
+        write_text(out / "report.md", write_markdown(summary))
         models, why_not = picture_models(suite, places) if places and generated else ({}, "")
-        more = sections(read_columns(out / "results.parquet") if isinstance(suite, Hard) else None, out)
-        NUMBERS.update(numbers(witnesses))
-        page = html(summary, columns.first_lines, pictures=models, no_pictures=why_not, sections=more)
+        more = collect_sections(read_columns(out / "results.parquet") if isinstance(suite, Hard) else None, out)
+        NUMBERS.update(list_numbers(witnesses))
+        page = write_html(summary, columns.first_lines, pictures=models, no_pictures=why_not, sections=more)
         write_text(out / "report.html", page)
         store.finish()
     yield summary
 
 
 @contextmanager
-def drafted(path: Path) -> Iterator[TextIO]:
+def draft_file(path: Path) -> Iterator[TextIO]:
     """Write a text file line by line: in place once it is complete, and not there where it is empty."""
     draft = path.with_name(f".{path.name}.part")
-    with naming(path):
+    with name_file(path):
         try:
             with draft.open("w", encoding="utf-8", newline="") as file:
                 yield file
@@ -155,7 +155,7 @@ def mark_missing(scene: str) -> Row:
     return Row.unmeasured(scene, FORMULAS, "", "all", FAILS, "nothing was judged")
 
 
-def timings(record: Record) -> Iterator[list[str]]:
+def list_timings(record: Record) -> Iterator[list[str]]:
     """Give the seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
     for t in record.timings:
         ratio = t.seconds / record.timings[0].seconds

@@ -5,36 +5,36 @@ from pathlib import Path
 
 from fourbar.errors import DependencyError, InputError
 from fourbar_validation.engines import added
-from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard, predicting
+from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard, hold_fully
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, Witness
 from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
-from fourbar_validation.scenes.suites import Random, Suite, model_files, scene_files, suite_file
+from fourbar_validation.scenes.suites import Random, Suite, list_model_files, read_scene_files, read_suite
 
 
-def selected(
+def select_scenes(
     scenes: tuple[Path, ...], named: str | None, count: int | None, seed: int, types: str, adapters: Sequence[str] = ()
 ) -> tuple[Suite, tuple[Witness, ...]]:
     """Select the scenes, and the witnesses with what they are held to there."""
     if named == "hard":
-        own = (*HARD_WITNESSES, *map(predicting, FURTHER))
-        return Hard(), (*own, *map(predicting, _added(adapters, own)))
+        own = (*HARD_WITNESSES, *map(hold_fully, FURTHER))
+        return Hard(), (*own, *map(hold_fully, _find_added(adapters, own)))
     own = (*WITNESSES, *FURTHER)
-    witnesses = (*own, *_added(adapters, own))
+    witnesses = (*own, *_find_added(adapters, own))
     if named is not None:
-        return suite_file(Path(named)), witnesses
+        return read_suite(Path(named)), witnesses
     if count:
-        return Random(count, seed, linkage_types(types)), witnesses
-    return scene_files(scenes or model_files()), witnesses
+        return Random(count, seed, read_linkage_types(types)), witnesses
+    return read_scene_files(scenes or list_model_files()), witnesses
 
 
-def _added(adapters: Sequence[str], own: tuple[Witness, ...]) -> tuple[Witness, ...]:
+def _find_added(adapters: Sequence[str], own: tuple[Witness, ...]) -> tuple[Witness, ...]:
     """Find the witnesses of the command line (`adapters`, "module:Class"), and those that installed packages bring."""
     known = [witness.name for witness in own]
-    here = added.named(adapters, known)
-    return (*here, *added.installed([*known, *(witness.name for witness in here)]))
+    here = added.read_witnesses(adapters, known)
+    return (*here, *added.find_installed([*known, *(witness.name for witness in here)]))
 
 
-def chosen(
+def choose_witnesses(
     engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES, adapters: Sequence[str] = ()
 ) -> tuple[Witness, ...]:
     """Choose the witnesses named in a comma-separated list, and those of `adapters`, which are named by being given.
@@ -54,7 +54,7 @@ def chosen(
     )
 
 
-def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:
+def find_askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:
     """Find those that can answer here, and the others with the reason; DependencyError where those were named."""
     missing = [(witness.name, reason) for witness in witnesses if (reason := witness.missing())]
     if missing and by_name:
@@ -62,7 +62,7 @@ def askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Wit
     return tuple(witness for witness in witnesses if not witness.missing()), missing
 
 
-def linkage_types(text: str) -> tuple[DrawnType, ...]:
+def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
     """Read the types named in a comma-separated list; none for uneven linkages."""
     if text == UNEVEN_TYPE:
         return ()

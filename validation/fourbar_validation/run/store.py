@@ -59,7 +59,7 @@ class Store:
         same = marker.is_file() and marker.read_text(encoding="utf-8") == self._identity
         if not same:
             if marker.is_file() and self.parts.is_dir() and any(self.parts.iterdir()):
-                self.notes.append(f"made again: the parts of another run ({self._other(marker)})")
+                self.notes.append(f"made again: the parts of another run ({self._name_difference(marker)})")
             marker.unlink(missing_ok=True)
             shutil.rmtree(self.parts, ignore_errors=True)
         self.parts.mkdir(exist_ok=True)
@@ -68,7 +68,7 @@ class Store:
         if not same:
             write_text(marker, self._identity)
 
-    def _other(self, marker: Path) -> str:
+    def _name_difference(self, marker: Path) -> str:
         """Name what the earlier run differs in from this one."""
         try:
             before, now = json.loads(marker.read_text(encoding="utf-8")), json.loads(self._identity)
@@ -81,7 +81,7 @@ class Store:
         result = set()
         for path in sorted(self.parts.iterdir()):
             try:
-                self._packed(path)
+                self._unpack(path)
                 result.add(int(path.name))
             except ValueError as error:
                 self.notes.append(f"made again: {path.parent.name}/{path.name}: {error}")
@@ -92,12 +92,12 @@ class Store:
         """Write a finished chunk, its results as JSON has them."""
         packed = gzip.compress("\n".join(map(json.dumps, results)).encode(), 1, mtime=0)
         head = {"chunk": chunk, "run": self._run, "sha256": hashlib.sha256(packed).hexdigest()}
-        write_bytes(self._path(chunk), json.dumps(head).encode() + b"\n" + packed)
+        write_bytes(self._find_path(chunk), json.dumps(head).encode() + b"\n" + packed)
 
-    def _path(self, chunk: int) -> Path:
+    def _find_path(self, chunk: int) -> Path:
         return self.parts / f"{chunk:06d}"
 
-    def _packed(self, path: Path) -> bytes:
+    def _unpack(self, path: Path) -> bytes:
         """Read what follows the first line of a part; ValueError that says what is wrong with it."""
         if not path.is_file():
             raise ValueError("is no file")
@@ -116,9 +116,9 @@ class Store:
 
     def read(self, chunk: int) -> list[Any]:
         """Read the results of a chunk, in order; DependencyError where the part was damaged meanwhile."""
-        path = self._path(chunk)
+        path = self._find_path(chunk)
         try:
-            lines = gzip.decompress(self._packed(path)).decode().splitlines()
+            lines = gzip.decompress(self._unpack(path)).decode().splitlines()
         except (ValueError, FileNotFoundError) as error:
             raise DependencyError(f"{path}: {error}; run it again, and this part is made again") from None
         return [json.loads(line) for line in lines]

@@ -14,14 +14,14 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, Free, Motion, Sweep
 from fourbar_validation.scenes.hard_linkages import (
     Lengths,
-    at,
-    collinear_2_3,
-    collinear_3_4,
-    dressed,
-    linkage_of,
-    moving,
-    parallel_2_4,
-    with_bars,
+    draw_linkage,
+    dress,
+    find_collinear_2_3,
+    find_collinear_3_4,
+    find_parallel_2_4,
+    list_moving,
+    replace_bars,
+    set_angles,
 )
 from fourbar_validation.scenes.random import DrawnType
 
@@ -43,30 +43,30 @@ def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) ->
     """Approach bars 3, 4 in line from inside, and the same distances beyond it."""
     for kind in ROCKERS:
         for seed in seeds:
-            lengths = linkage_of(kind, seed)
-            for psi, stretched in collinear_3_4(lengths):
+            lengths = draw_linkage(kind, seed)
+            for psi, stretched in find_collinear_3_4(lengths):
                 inward = -1.0 if stretched else 1.0
                 inside = psi + inward * np.array([*REGULAR, *distances])
                 beyond = psi - inward * np.array(distances)
                 for branch, name in BRANCH_NAMES.items():
                     label = f"{kind.value} {seed} {'stretched' if stretched else 'folded'} {name}"
-                    yield label, at(dressed(lengths, seed), [*inside, *beyond[::-1]], branch)
+                    yield label, set_angles(dress(lengths, seed), [*inside, *beyond[::-1]], branch)
 
 
-def poles(*, bar: int, distances: tuple[float, ...] = POLE, seeds: range = range(2)) -> Scenes:
+def approach_poles(*, bar: int, distances: tuple[float, ...] = POLE, seeds: range = range(2)) -> Scenes:
     """Approach the position where the driven bar 3 or 4 stands still, from both sides."""
     offsets = np.array([*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]])
     for seed in seeds:
-        lengths = linkage_of(CRANK, seed)
-        result = parallel_2_4(lengths) if bar == 3 else collinear_2_3(lengths)
+        lengths = draw_linkage(CRANK, seed)
+        result = find_parallel_2_4(lengths) if bar == 3 else find_collinear_2_3(lengths)
         for number, (psi, branch) in enumerate(result[:3]):
-            yield f"{seed} {number}", at(dressed(lengths, seed), psi + offsets, branch, drive_bar=bar)
+            yield f"{seed} {number}", set_angles(dress(lengths, seed), psi + offsets, branch, drive_bar=bar)
 
 
 def driven_output(*, steps: int = 180, seeds: range = range(2)) -> Scenes:
     """Drive on bar 4 through a whole turn of the input, across both positions where omega_4 = 0."""
     for seed in seeds:
-        scene = dressed(linkage_of(CRANK, seed), seed)
+        scene = dress(draw_linkage(CRANK, seed), seed)
         for branch, name in BRANCH_NAMES.items():
             motion = Motion(Sweep(0.05, 0.05 + 2 * math.pi, steps), 3.0, 0.0, branch)
             yield f"{seed} {name}", replace(scene, motion=motion, drive_bar=4)
@@ -81,89 +81,89 @@ CHANGE_POINTS: dict[str, tuple[Lengths, int, tuple[float, ...]]] = {
 """Lengths, branch just beyond psi = 0, change points psi. The kite a = d has A on O4 at its own."""
 
 
-def change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
+def approach_change_point(*, distances: tuple[float, ...] = CHANGE) -> Scenes:
     """Close to a change point, on both sides and both branches."""
     offsets = np.array([*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]])
     for kind, (lengths, _, points) in CHANGE_POINTS.items():
         for psi in points:
             for branch, name in BRANCH_NAMES.items():
-                yield f"{kind} {math.degrees(psi):.0f} {name}", at(dressed(lengths), psi + offsets, branch)
+                yield f"{kind} {math.degrees(psi):.0f} {name}", set_angles(dress(lengths), psi + offsets, branch)
 
 
-def through_change_point(*, steps: int = 73) -> Scenes:
+def sweep_change_point(*, steps: int = 73) -> Scenes:
     """Sweep through the change points, once by the sign of the branch and once along the smooth path."""
     for kind, (lengths, branch, _) in CHANGE_POINTS.items():
         for through in ("sign", "follow"):
-            scene = dressed(lengths)
+            scene = dress(lengths)
             start = scene.linkage.ground_angle + 0.3
             motion = Motion(Sweep(start, start + 2 * math.pi, steps), 3.0, 0.0, branch, through)
             yield f"{kind} {through}", replace(scene, motion=motion)
 
 
-def near_grashof(*, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: int = 60) -> Scenes:
+def miss_grashof(*, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: int = 60) -> Scenes:
     """Miss s + l = p + q by a hair on either side: the sweep passes close to where it would change."""
     for gap in gaps:
         for sign in (1.0, -1.0):
             d, a, b = 0.4, 0.1, 0.25
-            scene = dressed((d, a, b, d + a - b + sign * gap))
+            scene = dress((d, a, b, d + a - b + sign * gap))
             sweep = Sweep(scene.linkage.ground_angle, scene.linkage.ground_angle + 2 * math.pi, steps)
             yield f"{sign * gap:+.0e}", replace(scene, motion=replace(scene.motion, theta_2=sweep, alpha_2=0.0))
 
 
-def sweep_of(scene: Scene, steps: int = 36) -> Scene:
+def sweep_turn(scene: Scene, steps: int = 36) -> Scene:
     """Sweep through one turn of the input."""
     return replace(scene, motion=replace(scene.motion, theta_2=Sweep(0.1, 0.1 + 2 * math.pi, steps), alpha_2=0.0))
 
 
-def bar_ratio(*, exponents: range = range(-6, 0)) -> Scenes:
+def shorten_crank(*, exponents: range = range(-6, 0)) -> Scenes:
     """Shorten the crank against the coupler, again and again."""
     for k in exponents:
-        yield f"1e{k}", sweep_of(dressed((0.3, 0.25 * 10.0**k, 0.25, 0.22)))
+        yield f"1e{k}", sweep_turn(dress((0.3, 0.25 * 10.0**k, 0.25, 0.22)))
 
 
-def mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
+def vary_mass_ratio(*, exponents: tuple[int, ...] = (-6, -3, 3, 6)) -> Scenes:
     """Make one bar heavier or lighter than the others by up to 1e6."""
-    base = sweep_of(dressed(PLAIN))
-    for name, bar in moving(base):
+    base = sweep_turn(dress(PLAIN))
+    for name, bar in list_moving(base):
         for k in exponents:
             heavy = replace(bar, mass=bar.mass * 10.0**k, inertia=bar.moment_of_inertia * 10.0**k)
-            yield f"{name} 1e{k:+d}", with_bars(base, **{name: heavy})
+            yield f"{name} 1e{k:+d}", replace_bars(base, **{name: heavy})
 
 
-def without_inertia() -> Scenes:
+def remove_inertia() -> Scenes:
     """Take bars without rotational inertia, without mass, and loads only on massless bars."""
-    base = sweep_of(dressed(PLAIN))
-    for name, bar in moving(base):
-        yield f"{name} point mass", with_bars(base, **{name: replace(bar, inertia=0.0)})
-        yield f"{name} massless", with_bars(base, **{name: Bar(bar.length)})
-    yield "all massless", with_bars(base, **{name: Bar(bar.length) for name, bar in moving(base)})
+    base = sweep_turn(dress(PLAIN))
+    for name, bar in list_moving(base):
+        yield f"{name} point mass", replace_bars(base, **{name: replace(bar, inertia=0.0)})
+        yield f"{name} massless", replace_bars(base, **{name: Bar(bar.length)})
+    yield "all massless", replace_bars(base, **{name: Bar(bar.length) for name, bar in list_moving(base)})
 
 
-def far_centres(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
+def move_centres_out(*, times: tuple[float, ...] = (3.0, 100.0, 1e4)) -> Scenes:
     """Put mass centres far outside the bar."""
-    base = sweep_of(dressed(PLAIN))
-    for name, bar in moving(base):
+    base = sweep_turn(dress(PLAIN))
+    for name, bar in list_moving(base):
         for k in times:
-            yield f"{name} {k:g}", with_bars(base, **{name: replace(bar, centre=(k * bar.length, 2.0))})
+            yield f"{name} {k:g}", replace_bars(base, **{name: replace(bar, centre=(k * bar.length, 2.0))})
 
 
-def sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
+def scale_sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
     """Scale the same shape from micrometres to a thousand kilometres."""
     for k in exponents:
-        yield f"1e{k:+d} m", sweep_of(dressed(tuple(x * 10.0**k for x in PLAIN)))  # type: ignore[arg-type]
+        yield f"1e{k:+d} m", sweep_turn(dress(tuple(x * 10.0**k for x in PLAIN)))  # type: ignore[arg-type]
 
 
-def speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
+def scale_speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
     """omega_2 from 1e-6 to 1e6 rad/s, in both senses."""
-    base = sweep_of(dressed(PLAIN))
+    base = sweep_turn(dress(PLAIN))
     for k in exponents:
         for sign, name in ((1.0, "+"), (-1.0, "-")):
             yield f"{name}1e{k:+d}", replace(base, motion=replace(base.motion, omega_2=sign * 10.0**k))
 
 
-def loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
+def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
     """Load from 1e-9 to 1e9 of the weights."""
-    base = sweep_of(dressed(PLAIN))
+    base = sweep_turn(dress(PLAIN))
     for k in exponents:
         scaled = []
         for load in base.loads:
@@ -172,22 +172,22 @@ def loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
         yield f"1e{k:+d}", replace(base, loads=tuple(scaled))
 
 
-def out_and_back(*, beyond: float = 0.5, steps: int = 40, seeds: range = range(2)) -> Scenes:
+def sweep_out_and_back(*, beyond: float = 0.5, steps: int = 40, seeds: range = range(2)) -> Scenes:
     """Sweep out of the range in which the linkage assembles, and back."""
     for seed in seeds:
-        lengths = linkage_of(ROCKER, seed)
-        (psi, stretched), *_ = collinear_3_4(lengths)
+        lengths = draw_linkage(ROCKER, seed)
+        (psi, stretched), *_ = find_collinear_3_4(lengths)
         outward = 1.0 if stretched else -1.0
         out = np.linspace(psi - outward * 0.6, psi + outward * beyond, steps)
         for branch, name in BRANCH_NAMES.items():
-            yield f"{seed} {name}", at(dressed(lengths, seed), [*out, *out[::-1]], branch)
+            yield f"{seed} {name}", set_angles(dress(lengths, seed), [*out, *out[::-1]], branch)
 
 
-def thesis_limits(*, steps: int = 120) -> Scenes:
+def drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
     """Drive the thesis's double rocker (bars 20, 48, 55, 20 cm) from one limit position to the other."""
     bars = (Bar(0.48, 57.0, 11.119275, (0.765, 0.0)), Bar(0.55, 0.544), Bar(0.20, 0.2))
     linkage = FourBar(0.20, *bars, math.radians(45.0))
-    (psi, _), *_ = collinear_3_4(linkage.lengths)
+    (psi, _), *_ = find_collinear_3_4(linkage.lengths)
     for branch, name in BRANCH_NAMES.items():
         sweep = Sweep(linkage.ground_angle + psi, linkage.ground_angle + 2 * math.pi - psi, steps)
         yield name, Scene(linkage, Motion(sweep, 0.2244, branch=branch), 4)
@@ -218,21 +218,21 @@ FAMILIES = tuple(
     for name, scenes in {
         "toggle": toggle,
         "toggle-near": lambda: toggle(distances=NEAR),
-        "pole-T3": lambda: poles(bar=3),
-        "pole-T4": lambda: poles(bar=4),
+        "pole-T3": lambda: approach_poles(bar=3),
+        "pole-T4": lambda: approach_poles(bar=4),
         "driven-output": driven_output,
-        "change-point": change_point,
-        "change-point-through": through_change_point,
-        "near-grashof": near_grashof,
-        "bar-ratio": bar_ratio,
-        "mass-ratio": mass_ratio,
-        "no-inertia": without_inertia,
-        "far-centres": far_centres,
-        "sizes": sizes,
-        "speeds": speeds,
-        "loads": loads,
-        "out-and-back": out_and_back,
-        "thesis-limits": thesis_limits,
+        "change-point": approach_change_point,
+        "change-point-through": sweep_change_point,
+        "near-grashof": miss_grashof,
+        "bar-ratio": shorten_crank,
+        "mass-ratio": vary_mass_ratio,
+        "no-inertia": remove_inertia,
+        "far-centres": move_centres_out,
+        "sizes": scale_sizes,
+        "speeds": scale_speeds,
+        "loads": scale_loads,
+        "out-and-back": sweep_out_and_back,
+        "thesis-limits": drive_thesis_to_limits,
         "released": released,
     }.items()
 )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import Flywheel, Friction, Gravity, Load, Spring, SpringEnd, Springs, Torsion, Viscous
-from fourbar.formulas.mobility import default_range
+from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
@@ -18,28 +18,28 @@ Draw = Callable[[np.random.Generator], float]
 """A number drawn at random."""
 
 
-def uniform(low: float, high: float) -> Draw:
+def draw_uniform(low: float, high: float) -> Draw:
     """Between two numbers."""
     return lambda rng: float(rng.uniform(low, high))
 
 
-def decades(low: float, high: float) -> Draw:
+def draw_decades(low: float, high: float) -> Draw:
     """Ten to a power between two numbers."""
     return lambda rng: float(10.0 ** rng.uniform(low, high))
 
 
-def sometimes(share: float, draw: Draw, otherwise: float = 0.0) -> Draw:
+def draw_chance(share: float, draw: Draw, otherwise: float = 0.0) -> Draw:
     """Drawn in this share of all cases."""
     return lambda rng: draw(rng) if rng.random() < share else otherwise
 
 
-def product(*draws: Draw) -> Draw:
+def draw_product(*draws: Draw) -> Draw:
     """Draw the product of several draws."""
     return lambda rng: math.prod(draw(rng) for draw in draws)
 
 
-ANY_ANGLE, ANY_PART, EITHER_SIGN = uniform(-math.pi, math.pi), uniform(0.0, 1.0), uniform(-1.0, 1.0)
-ANY_SPEED = decades(-1.0, 2.0)
+ANY_ANGLE, ANY_PART, EITHER_SIGN = draw_uniform(-math.pi, math.pi), draw_uniform(0.0, 1.0), draw_uniform(-1.0, 1.0)
+ANY_SPEED = draw_decades(-1.0, 2.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,13 +92,13 @@ SHORTEST = {
 }
 """Which of (ground, input, coupler, output) is the shortest bar of a Grashof linkage of that type."""
 UNEVEN_TYPE = "uneven"
-"""Named in place of types: see `uneven_scene`."""
+"""Named in place of types: see `draw_uneven_scene`."""
 POSITIONS = 37
 CLEARANCE = 0.02
 """A random linkage keeps this part of its longest bar away from the change-point equality s + l = p + q."""
 
 
-def random_lengths(rng: np.random.Generator, kind: DrawnType) -> tuple[float, float, float, float]:
+def draw_lengths(rng: np.random.Generator, kind: DrawnType) -> tuple[float, float, float, float]:
     """(ground, input, coupler, output) of the given type, longest bar 1, away from change points."""
     while True:
         lengths = np.sort(rng.uniform(0.1, 1.0, 4))
@@ -116,7 +116,7 @@ def random_lengths(rng: np.random.Generator, kind: DrawnType) -> tuple[float, fl
             return tuple(float(x) for x in others)  # type: ignore[return-value]
 
 
-def random_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> list[Bar]:
+def draw_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> list[Bar]:
     """Draw bars 2, 3, 4 of these lengths (m)."""
     bars = []
     for length in lengths:
@@ -126,10 +126,10 @@ def random_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Rang
     return bars
 
 
-def drawn(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> Scene:
+def draw_scene(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> Scene:
     """Draw a scene on (ground, input, coupler, output), m, at theta_2 = 0."""
     d, *moving = (float(length) for length in lengths)
-    bars = random_bars(rng, moving, ranges)
+    bars = draw_bars(rng, moving, ranges)
     linkage = FourBar(d, bars[0], bars[1], bars[2], ranges.ground_angle(rng))
     weight = 9.81 * (math.fsum(bar.mass for bar in bars) or 1.0)
     loads = tuple(_load(rng, linkage, weight, ranges) for _ in range(int(rng.integers(0, 3))))
@@ -138,7 +138,7 @@ def drawn(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) ->
     for kind, share in ((Viscous, ranges.viscous), (Friction, ranges.friction)):
         if rng.random() < share:
             effects.append(kind.at(**{pin: couple * float(rng.random()) for pin in PINS if rng.random() < 0.5}))
-    effects += _sprung(rng, linkage, weight, ranges) if ranges.sprung else []
+    effects += _draw_springs(rng, linkage, weight, ranges) if ranges.sprung else []
     omega = float(rng.choice([-1.0, 1.0])) * ranges.speed(rng)
     alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
     motion = Motion(0.0, omega, alpha, OPEN if rng.random() < 0.5 else CROSSED)
@@ -155,7 +155,7 @@ def _load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ran
     return Load(bar, force, at, moment, "bar" if rng.random() < 0.5 else "world")
 
 
-def _sprung(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> list[Any]:
+def _draw_springs(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> list[Any]:
     """Springs, torsion springs and flywheels that carry the weights about as they are loaded."""
     result: list[Any] = []
     size = weight * abs(ranges.load(rng))
@@ -180,7 +180,7 @@ def _sprung(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: R
     return result
 
 
-def uneven_lengths(rng: np.random.Generator, crank: Draw, coupler: Draw) -> tuple[Sequence[float], float]:
+def draw_uneven_lengths(rng: np.random.Generator, crank: Draw, coupler: Draw) -> tuple[Sequence[float], float]:
     """(ground, input, coupler, output), m, and an angle theta_2 - theta_1 at which they close, rad.
 
     Parameters
@@ -196,14 +196,14 @@ def uneven_lengths(rng: np.random.Generator, crank: Draw, coupler: Draw) -> tupl
     return (d, a, b, c), angle
 
 
-TEN_DECADES = decades(-5.0, 5.0)
+TEN_DECADES = draw_decades(-5.0, 5.0)
 UNEVEN = Ranges(
-    mass=sometimes(0.9, TEN_DECADES),
-    inertia=product(uniform(0.02, 0.4), sometimes(0.5, TEN_DECADES, 1.0)),
-    centre=product(uniform(-1.0, 2.0), sometimes(0.3, TEN_DECADES, 1.0)),
-    centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
-    load=product(EITHER_SIGN, TEN_DECADES),
-    arm=product(ANY_PART, sometimes(0.3, TEN_DECADES, 1.0)),
+    mass=draw_chance(0.9, TEN_DECADES),
+    inertia=draw_product(draw_uniform(0.02, 0.4), draw_chance(0.5, TEN_DECADES, 1.0)),
+    centre=draw_product(draw_uniform(-1.0, 2.0), draw_chance(0.3, TEN_DECADES, 1.0)),
+    centre_angle=draw_chance(0.5, draw_uniform(-3.0, 3.0)),
+    load=draw_product(EITHER_SIGN, TEN_DECADES),
+    arm=draw_product(ANY_PART, draw_chance(0.3, TEN_DECADES, 1.0)),
     without_force=0.2,
     speed=TEN_DECADES,
     viscous=0.3,
@@ -214,29 +214,29 @@ UNEVEN = Ranges(
 """Masses, inertias, arms, loads and speeds each over ten decades."""
 
 
-def uneven_scene(seed: int, index: int) -> Scene:
+def draw_uneven_scene(seed: int, index: int) -> Scene:
     """Draw a linkage whose lengths, masses, arms and loads are in ratios of 1e-5 to 1e5, with every kind of effect."""
     rng = np.random.default_rng([seed, index])
-    lengths, psi = uneven_lengths(rng, TEN_DECADES, TEN_DECADES)
+    lengths, psi = draw_uneven_lengths(rng, TEN_DECADES, TEN_DECADES)
     size = 10.0 ** rng.uniform(-3.0, 3.0)
-    scene = drawn(rng, [size * x for x in lengths], UNEVEN)
+    scene = draw_scene(rng, [size * x for x in lengths], UNEVEN)
     theta_2 = scene.linkage.ground_angle + psi + np.array([0.0, 1e-3, rng.uniform(-3.0, 3.0)])
     return replace(scene, motion=replace(scene.motion, theta_2=theta_2), title=f"uneven {index}")
 
 
 MACHINES = Ranges(
-    mass=decades(-1.0, 1.0),
-    inertia=uniform(1.0 / 24.0, 1.0 / 6.0),
-    centre=uniform(0.2, 0.8),
-    centre_angle=uniform(-1.0, 1.0),
-    arm=uniform(0.0, 0.5),
-    speed=decades(-0.5, 1.5),
-    acceleration=uniform(-0.1, 0.1),
+    mass=draw_decades(-1.0, 1.0),
+    inertia=draw_uniform(1.0 / 24.0, 1.0 / 6.0),
+    centre=draw_uniform(0.2, 0.8),
+    centre_angle=draw_uniform(-1.0, 1.0),
+    arm=draw_uniform(0.0, 0.5),
+    speed=draw_decades(-0.5, 1.5),
+    acceleration=draw_uniform(-0.1, 0.1),
 )
 """Bars as machines have them."""
 
 
-def random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
+def draw_random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
     """Draw random bars, loads, gravity and drive, at POSITIONS positions over the range the linkage can move.
 
     Parameters
@@ -244,10 +244,10 @@ def random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
     types : taken in turn; none of them: an uneven one.
     """
     if not types:
-        return uneven_scene(seed, index)
+        return draw_uneven_scene(seed, index)
     rng = np.random.default_rng([seed, index])
     kind = types[index % len(types)]
     size = 10.0 ** rng.uniform(-1.5, 1.0)
-    scene = drawn(rng, [size * x for x in random_lengths(rng, kind)], MACHINES)
-    sweep = Sweep(*default_range(scene.linkage), POSITIONS - 1)
+    scene = draw_scene(rng, [size * x for x in draw_lengths(rng, kind)], MACHINES)
+    sweep = Sweep(*choose_range(scene.linkage), POSITIONS - 1)
     return replace(scene, motion=replace(scene.motion, theta_2=sweep), title=f"{kind.value} {index}")

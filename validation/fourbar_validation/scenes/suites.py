@@ -13,9 +13,9 @@ from fourbar.errors import InputError
 from fourbar.files import loads, read_text, reading
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Free, Sweep
-from fourbar_validation.compare.rows import plain
+from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.places import MODELS
-from fourbar_validation.scenes.random import DrawnType, random_scene
+from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
 MOST_POSITIONS = 100_000
 """Of a scene in a run, where every engine solves each of them: 3 ms each, with all engines."""
@@ -83,47 +83,47 @@ class Random:
 
     def scene(self, index: int) -> Scene:
         """Draw a scene."""
-        return random_scene(self.seed, index, self.types)
+        return draw_random_scene(self.seed, index, self.types)
 
     def fingerprint(self) -> str:
         """State what the scenes are drawn from."""
         return f"random {self.count} {self.seed} {','.join(kind.value for kind in self.types)}"
 
 
-def model_files() -> list[Path]:
+def list_model_files() -> list[Path]:
     """List the scene files of `models/`, sorted."""
     return sorted(MODELS.glob("*.toml"))
 
 
-def scene_files(paths: Iterable[Path]) -> Files:
+def read_scene_files(paths: Iterable[Path]) -> Files:
     """Read and check scene files; each is named by its stem, or by its path where two stems are alike.
 
     What does not print in a name is written as its escape. Raises InputError for a file that is bad, and for two of
     one name, at once: a long run does not start on bad input.
     """
     files = list(dict.fromkeys(Path(path) for path in paths))
-    stems = Counter(_printed(file.stem) for file in files)
+    stems = Counter(_write_printed(file.stem) for file in files)
     texts: dict[str, str] = {}
     most = 0
     for file in files:
-        name = _printed(file.stem)
+        name = _write_printed(file.stem)
         if stems[name] > 1:
-            name = _printed(file.with_suffix("").as_posix())
+            name = _write_printed(file.with_suffix("").as_posix())
         if name in texts:
             raise InputError("SCENE", str(file), f"must have a name of its own: another file is {name!r} too")
         text = read_text(file)
-        most = max(most, _positions(loads(text, str(file)), file))
+        most = max(most, _count_positions(loads(text, str(file)), file))
         texts[name] = text
     if not texts:
         raise InputError("SCENE", [], "no scene file to run")
     return Files(tuple(sorted(texts.items())), most)
 
 
-def _printed(name: str) -> str:
-    return plain(name).replace("\n", "\\n")
+def _write_printed(name: str) -> str:
+    return make_plain(name).replace("\n", "\\n")
 
 
-def _positions(scene: Scene, file: Path) -> int:
+def _count_positions(scene: Scene, file: Path) -> int:
     """Count the positions that a scene asks for, or what takes as long; InputError beyond the most."""
     for key, stated in ((f"motion.{scene.motion.names[0]}", scene.motion.angle), ("motion.free", scene.motion.free)):
         if isinstance(stated, (Sweep, Free)):
@@ -141,7 +141,7 @@ LARGEST_LIST = 16 * 2**20
 """Bytes; a hundred thousand names."""
 
 
-def suite_file(path: Path) -> Files:
+def read_suite(path: Path) -> Files:
     """Read the scenes that a file lists, named from its own folder: TOML with `scenes = [...]`, or one per line.
 
     An entry may hold * for any name. InputError where an entry leaves the folder or names no file.
@@ -154,7 +154,7 @@ def suite_file(path: Path) -> Files:
         raise refuse(path.name, 'must be "hard" or a file that lists scenes: there is no such file')
     text = reading.read_text(path, "--suite", LARGEST_LIST)
     try:
-        entries = tomllib.loads(text).get("scenes") if path.suffix == ".toml" else _listed(text)
+        entries = tomllib.loads(text).get("scenes") if path.suffix == ".toml" else _read_listed(text)
     except (ValueError, RecursionError):  # no TOML
         raise refuse(path.name, "is no list of scenes") from None
     if not isinstance(entries, list) or not all(isinstance(entry, str) and entry for entry in entries):
@@ -169,10 +169,10 @@ def suite_file(path: Path) -> Files:
         if not result:
             raise refuse(entry, "names no file")
         files += result
-    return scene_files(files)
+    return read_scene_files(files)
 
 
-def _listed(text: str) -> list[str]:
+def _read_listed(text: str) -> list[str]:
     """Read one entry per line; # begins a comment."""
     lines = (line.partition("#")[0].strip() for line in text.splitlines())
     return [line for line in lines if line]

@@ -13,24 +13,24 @@ from matplotlib.text import Text
 
 import fourbar
 from fourbar.effects import Effect, Flywheel, PinFriction, Spring, SpringEnd, Springs, Torsion
-from fourbar.effects.actions import bodies
+from fourbar.effects.actions import list_bodies
 from fourbar.errors import DependencyError, InputError, NotAssembledError
-from fourbar.formulas.mobility import intervals
-from fourbar.formulas.path import state
+from fourbar.formulas.mobility import find_intervals
+from fourbar.formulas.path import compute_state
 from fourbar.formulas.torque import inertia
 from fourbar.scene.motion_law import Law
 from fourbar.show import plot
-from fourbar.show.between import between
-from fourbar.show.duty import energies
-from fourbar.show.plot.curves import broken, limit_of, poles
-from fourbar.show.plot.figures import FIGURES, drawn
-from fourbar.show.plot.film import frames
-from fourbar.show.plot.freebody import free_body
+from fourbar.show.between import locate_between
+from fourbar.show.duty import compute_energies
+from fourbar.show.plot.curves import break_at_poles, choose_limit, find_poles
+from fourbar.show.plot.figures import FIGURES, draw_figure
+from fourbar.show.plot.film import choose_frames
+from fourbar.show.plot.freebody import list_actions
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.mechanism import draw_mechanism
-from fourbar.show.plot.style import INK, number, plain, unit_for
-from fourbar.show.plot.transmission import free_place
-from fourbar.show.plot.view import CLEAR, common_position, on_branch, view
+from fourbar.show.plot.style import INK, choose_unit, shorten_text, write_number
+from fourbar.show.plot.transmission import find_free_place
+from fourbar.show.plot.view import CLEAR, choose_common_position, make_view, set_branch
 from tests.support.scenes import crank_rocker, thesis
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}
@@ -51,7 +51,7 @@ CRANK_ROCKER = crank_rocker()
 @cache
 def composed(scene, name, branches="one", position=None, units="SI"):
     """A figure of a scene, composed once for all that look at it."""
-    return drawn(scene, name, position=position, branches=branches, units=fourbar.units(units)).figure
+    return draw_figure(scene, name, position=position, branches=branches, units=fourbar.units(units)).figure
 
 
 @pytest.mark.parametrize("file_format", plot.FORMATS)
@@ -106,7 +106,7 @@ def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> Non
 
 def test_no_text_stands_on_a_bar() -> None:
     scene = fourbar.load(Path(__file__).parents[4] / "models" / "gallery" / "hoecken.toml")
-    figure = drawn(scene, "linkage", dimensions=True).figure
+    figure = draw_figure(scene, "linkage", dimensions=True).figure
     (axes,) = figure.axes
     bars = [line.get_path().transformed(axes.transData) for line in axes.lines if line.get_linewidth() > 4.0]
     boxes = [text.get_window_extent().padded(2.25 * figure.dpi / 72.0) for text in axes.texts]
@@ -129,7 +129,7 @@ def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None
 def solved(scene: fourbar.Scene) -> fourbar.Solution:
     """At the positions of a scene, and those that a figure shows between them."""
     solution = fourbar.solve(scene)
-    found = between(scene, solution)
+    found = locate_between(scene, solution)
     return solution if found is None else found.solution
 
 
@@ -160,7 +160,7 @@ def test_bars_are_drawn_to_scale_at_the_requested_position() -> None:
 
 def test_the_coupler_figure_shows_the_points_of_the_scene() -> None:
     scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)), fourbar.Point("Q", 4, (0.1, 0.0))))
-    (axes,) = drawn(scene, "coupler", units=fourbar.units("m")).figure.axes
+    (axes,) = draw_figure(scene, "coupler", units=fourbar.units("m")).figure.axes
     curves = {line.get_label(): line.get_xydata() for line in axes.lines if line.get_label()[0] != "_"}
     assert list(curves) == ["$A$", "$B$", "P"]  # Q belongs to the output
     np.testing.assert_allclose(curves["P"], solved(scene).points["P"], atol=1e-15)
@@ -172,18 +172,18 @@ def test_couples_of_a_free_body_have_an_arrow_and_no_sign() -> None:
 
 
 def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> None:
-    shown = view(thesis(FULL_TURN))
+    shown = make_view(thesis(FULL_TURN))
     panel = composed(thesis(FULL_TURN), "torque").axes[0]
     curve = panel.lines[1]
     closed = np.degrees(shown.sweep.theta_2[~shown.sweep.assembled])
     assert closed.size > 30
     at_closed = np.isin(curve.get_xdata(), closed)
     assert np.all(np.isnan(curve.get_ydata()[at_closed]))
-    (pole,) = poles(shown)
+    (pole,) = find_poles(shown)
     # the torque of bar 4 diverges where omega_4 changes sign, bars 2 and 3 being in line
     assert shown.sweep.omega_4[pole] * shown.sweep.omega_4[pole + 1] < 0
     assert shown.sweep.torque[pole] * shown.sweep.torque[pole + 1] < 0
-    assert np.isnan(broken(shown.sweep.torque, np.array([pole]))[pole + 1])
+    assert np.isnan(break_at_poles(shown.sweep.torque, np.array([pole]))[pole + 1])
     _, top = panel.get_ylim()
     assert top < np.nanmax(np.abs(shown.sweep.torque))
     caption = " ".join(
@@ -193,9 +193,9 @@ def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> 
 
 
 def test_an_ordinary_curve_is_not_clipped() -> None:
-    assert limit_of([np.sin(np.linspace(0, 6, 100))]) is None
-    assert limit_of([1.0 / np.linspace(-1, 1, 100)]) is not None
-    assert limit_of([np.full(3, np.nan)]) is None
+    assert choose_limit([np.sin(np.linspace(0, 6, 100))]) is None
+    assert choose_limit([1.0 / np.linspace(-1, 1, 100)]) is not None
+    assert choose_limit([np.full(3, np.nan)]) is None
 
 
 def test_transmission_angle_marks_limits_and_dead_centres() -> None:
@@ -237,9 +237,9 @@ CYLINDER = fourbar.LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7)
     "effects", [EFFECTS, *((one,) for one in EFFECTS)], ids=lambda some: "+".join(e.key for e in some)
 )
 def test_free_bodies_balance(drive_bar: int | None, effects: tuple[Effect, ...]) -> None:
-    shown = view(crank_rocker(drive_bar=drive_bar, drive=None if drive_bar else CYLINDER, effects=effects))
+    shown = make_view(crank_rocker(drive_bar=drive_bar, drive=None if drive_bar else CYLINDER, effects=effects))
     for bar in (2, 3, 4):
-        arrows, couples = free_body(shown, bar)
+        arrows, couples = list_actions(shown, bar)
         forces = np.array([arrow.force for arrow in arrows])
         assert np.abs(forces.sum()) <= BALANCE * np.abs(forces).max()
         moments = [(a.at.conjugate() * a.force).imag for a in arrows] + [c.moment for c in couples]
@@ -252,11 +252,11 @@ def test_a_linear_drive_is_drawn_with_its_force_and_the_poles_of_that(tmp_path: 
     for figure in ("overview", "torque", "freebody"):
         plot.draw(scene, tmp_path / f"{figure}.svg", figure)
     assert "Force of the drive" in "".join(
-        drawn(scene, "torque").figure.axes[0].get_title(loc=at) for at in ("left", "center")
+        draw_figure(scene, "torque").figure.axes[0].get_title(loc=at) for at in ("left", "center")
     )
-    shown = view(scene)
+    shown = make_view(scene)
     stands = np.flatnonzero(np.diff(np.sign(shown.sweep.stroke_speed)))
-    assert len(stands) and np.array_equal(poles(shown), stands)
+    assert len(stands) and np.array_equal(find_poles(shown), stands)
 
 
 def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
@@ -268,20 +268,20 @@ def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
 
 
 def test_the_position_drawn_of_both_branches_is_one_and_stands_clear_of_their_poles() -> None:
-    alone = view(thesis(FULL_TURN)).here
-    scenes = [on_branch(thesis(FULL_TURN), sign) for sign in (1, -1)]
-    position = common_position(scenes)
+    alone = make_view(thesis(FULL_TURN)).here
+    scenes = [set_branch(thesis(FULL_TURN), sign) for sign in (1, -1)]
+    position = choose_common_position(scenes)
     assert position is not None
-    sweeps = [view(scene).sweep for scene in scenes]
+    sweeps = [make_view(scene).sweep for scene in scenes]
     both = np.fmin.reduce([quality for s in sweeps for quality in (s.condition, s.drive_condition)])
     best = min(CLEAR, float(np.nanmax(both)))  # the two poles leave no position clear of both by more than 0.25
     assert best > 0.2
     for scene in scenes:
-        here = view(scene, position).here
+        here = make_view(scene, position).here
         assert min(here.condition[0], here.drive_condition[0]) >= best
     assert min(alone.condition[0], alone.drive_condition[0]) >= CLEAR
     # the position of the open branch alone is a pole of the crossed one
-    assert view(scenes[1], float(alone.theta_2[0])).here.drive_condition[0] < CLEAR
+    assert make_view(scenes[1], float(alone.theta_2[0])).here.drive_condition[0] < CLEAR
     titles = {axes.get_title(loc="left").split(",")[0] for axes in composed(thesis(FULL_TURN), "linkage", "both").axes}
     assert len(titles) == 1
 
@@ -293,15 +293,15 @@ def test_a_remark_stands_where_the_curve_keeps_away() -> None:
         (90.0 * share, 0.6, 1.0),
         (90.0 - 90.0 * share, 0.0, 0.4),
     ):
-        assert low <= free_place(mu) <= high
-    assert 0.0 < free_place(np.full(361, np.nan)) < 1.0
+        assert low <= find_free_place(mu) <= high
+    assert 0.0 < find_free_place(np.full(361, np.nan)) < 1.0
 
 
 def test_hostile_titles_are_text(tmp_path: Path) -> None:
     title = "$\\frac{ <script>alert(1)</script> & \x1b[31m\u2028 %s {0} " + 300 * "x"
     plot.draw(replace(crank_rocker(), title=title), tmp_path / "a.svg", "linkage")
     assert "<script" not in (tmp_path / "a.svg").read_text(encoding="utf-8")
-    assert len(plain(title, 50)) == 50
+    assert len(shorten_text(title, 50)) == 50
 
 
 @pytest.mark.parametrize(
@@ -350,7 +350,7 @@ def test_branches_that_are_released_for_different_times_share_their_scales() -> 
     bars = [fourbar.Bar(0.22, 0.5), fourbar.Bar(0.25, 0.8), fourbar.Bar(0.2, 0.4)]
     motion = fourbar.Motion(math.radians(60.0), 0.0, free=fourbar.Free(2.0, 200))
     scene = fourbar.Scene(fourbar.FourBar(0.3, *bars), motion, effects=(fourbar.Gravity(),))
-    lasting = [len(view(on_branch(scene, sign)).sweep) for sign in (1, -1)]
+    lasting = [len(make_view(set_branch(scene, sign)).sweep) for sign in (1, -1)]
     assert lasting[0] != lasting[1]  # each stops at a limit position of its own
     for name in ("kinematics", "energy"):
         axes = composed(scene, name, "both").axes
@@ -361,7 +361,7 @@ def test_branches_that_are_released_for_different_times_share_their_scales() -> 
 
 
 def test_the_position_of_a_motion_through_time_is_one_that_it_passes(tmp_path: Path) -> None:
-    shown = view(released(), position=0.3)
+    shown = make_view(released(), position=0.3)
     k = int(np.argmin(np.abs(shown.sweep.theta_2 - 0.3)))
     assert shown.here.time[0] == shown.sweep.time[k] and shown.here.F12[0] == pytest.approx(shown.sweep.F12[k])
     with pytest.raises(NotAssembledError, match="does not pass"):
@@ -375,9 +375,12 @@ ENERGY = 1e-6
 def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:
     scene = released(effects=(fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001), Flywheel(0.01, 4)))
     motion = fourbar.solve(scene)
-    found = energies(scene, motion)
+    found = compute_energies(scene, motion)
     assert set(found.work) == {"loads", "gravity", "viscous"}
-    carried, place = bodies(scene.linkage, scene.effects), state(scene.linkage, motion.theta_2, motion.branch)
+    carried, place = (
+        list_bodies(scene.linkage, scene.effects),
+        compute_state(scene.linkage, motion.theta_2, motion.branch),
+    )
     of_input, of_others = inertia(scene.linkage.input.length, carried, place.at, place.k)
     expected = 0.5 * (of_input + of_others) * motion.omega_2**2
     np.testing.assert_allclose(found.kinetic, expected, rtol=1e-9, atol=1e-15)
@@ -448,13 +451,13 @@ def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path:
     ],
 )
 def test_numbers_have_three_digits(value: float, shown: str) -> None:
-    assert number(value) == shown
+    assert write_number(value) == shown
 
 
 def test_units_get_the_prefix_that_suits() -> None:
-    assert unit_for(0.94, "N m") == (1e3, "mN m")
-    assert unit_for(15218.0, "N m") == (1e-3, "kN m")
-    assert unit_for(0.0, "N") == (1.0, "N")
+    assert choose_unit(0.94, "N m") == (1e3, "mN m")
+    assert choose_unit(15218.0, "N m") == (1e-3, "kN m")
+    assert choose_unit(0.0, "N") == (1.0, "N")
 
 
 BOTTOM, SIDE = SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17)
@@ -485,7 +488,7 @@ def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
     usual = np.abs(s.drive_force[order]) < np.percentile(np.abs(s.drive_force), 80.0)
     np.testing.assert_allclose(drawn_at[usual], s.drive_force[order][usual], rtol=2e-2, atol=2e-2)
     (linkage,) = composed(scene, "linkage").axes
-    place = getattr(view(scene).here, name)[0]
+    place = getattr(make_view(scene).here, name)[0]
     at = f"stroke = {1000.0 * place:.4g} mm" if name == "stroke" else f"θ₄ = {math.degrees(place):.4g}°"
     assert at in linkage.get_title(loc="left").replace("θ₃", "θ₄")
 
@@ -498,21 +501,21 @@ def test_every_figure_takes_every_command(label: str, figure: str) -> None:
 
 @pytest.mark.parametrize("label", COMMANDS)
 def test_a_film_goes_along_what_is_commanded_and_back(label: str) -> None:
-    shown = view(commanding(COMMANDS[label]))
-    order, last = frames(shown, 21), len(shown.sweep) - 1
+    shown = make_view(commanding(COMMANDS[label]))
+    order, last = choose_frames(shown, 21), len(shown.sweep) - 1
     assert order[0] == 0 and max(order) == last and order.index(last) == 9 and order[-1] > 0
     assert (np.diff(shown.sweep.at.places) > 0.0).all()
 
 
 def test_one_position_of_another_command_stands_in_its_range() -> None:
     single = replace(COMMANDS["stroke (mm)"], stroke=0.3)
-    shown = view(commanding(single))
+    shown = make_view(commanding(single))
     triangle = 0.34, 0.16  # the cylinder's longest and shortest stroke
     places = shown.sweep.at.places
     assert shown.at == "stroke = 300 mm" and shown.here.stroke[0] == pytest.approx(0.3, rel=1e-14)
     assert places.max() < triangle[0] and places.min() > triangle[1] and len(places) == 362
-    shown = view(commanding(fourbar.Motion(theta_4=2.0, omega_4=1.0)))
-    (low, high), *_ = (own for own in intervals(CRANK_ROCKER.linkage, 4) if own[0] < 2.0 + math.tau < own[1])
+    shown = make_view(commanding(fourbar.Motion(theta_4=2.0, omega_4=1.0)))
+    (low, high), *_ = (own for own in find_intervals(CRANK_ROCKER.linkage, 4) if own[0] < 2.0 + math.tau < own[1])
     assert shown.sweep.theta_4.min() > low and shown.sweep.theta_4.max() < high
     assert shown.at == "θ₄ = 114.6°"
 
@@ -530,7 +533,7 @@ def test_dead_centres_stand_where_the_bars_are_in_line_on_every_axis() -> None:
 
 def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out() -> None:
     scene, lengths = commanding(COMMANDS["stroke (mm)"]), []
-    shown = view(scene)
+    shown = make_view(scene)
     from matplotlib.figure import Figure
 
     for index in (0, 20, 40):
@@ -548,4 +551,4 @@ def test_the_stroke_is_a_figure_where_it_is_not_the_axis() -> None:
     np.testing.assert_allclose(np.interp(np.degrees(s.theta_4), *curve.get_data()), 1000.0 * s.stroke, rtol=1e-14)
     for other in (CRANK_ROCKER, commanding(COMMANDS["stroke (mm)"])):
         with pytest.raises(InputError, match="needs a linear drive"):
-            drawn(other, "stroke")
+            draw_figure(other, "stroke")

@@ -19,9 +19,9 @@ from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse
 from fourbar_validation.engines.pinocchio import PinocchioInverse
 from fourbar_validation.engines.witnesses import Witness
-from fourbar_validation.run.answers import statements
+from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.judge import judge
-from fourbar_validation.scenes.random import DrawnType, random_scene
+from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import crank_rocker
 
 ROCKER, TRIPLE, CHANGE = (0.3, 0.1, 0.25, 0.22), (0.22, 0.2, 0.32, 0.18), (0.3, 0.1, 0.3, 0.1)
@@ -39,10 +39,10 @@ def judged(
 ) -> dict[str, Row]:
     bars = uniform(*lengths)
     linkage = fourbar.FourBar(bars.ground, bars.input, bars.coupler, bars.output, theta_1)
-    low, high = mobility.default_range(linkage)
+    low, high = mobility.choose_range(linkage)
     scene = Scene(linkage, fourbar.Motion(fourbar.Sweep(low + 0.01, high - 0.01, 7), 2.0), drive_bar=4)
     witness = engine()
-    rows = statements("scene", scene, witness, witness.answer(scene, command(scene)))
+    rows = check_statements("scene", scene, witness, witness.answer(scene, command(scene)))
     return {row.quantity: row for row in rows}
 
 
@@ -56,9 +56,9 @@ def test_what_is_stated_holds(lengths: tuple[float, ...], engine: type) -> None:
 
 def test_what_is_stated_holds_of_random_linkages() -> None:
     for index in range(20):
-        scene = random_scene(1, index, tuple(DrawnType))
+        scene = draw_random_scene(1, index, tuple(DrawnType))
         engine = PinocchioInverse()
-        rows = statements("scene", scene, engine, engine.answer(scene, command(scene)))
+        rows = check_statements("scene", scene, engine, engine.answer(scene, command(scene)))
         assert all(row.passed for row in rows), rows
 
 
@@ -81,16 +81,16 @@ FAULTS = {
     "interval begins late": (
         TRIPLE,
         "range",
-        changed("intervals", lambda found: tuple((low + SEEN, high) for low, high in found)),
+        changed("find_intervals", lambda found: tuple((low + SEEN, high) for low, high in found)),
     ),
     "the complement of the range": (
         TRIPLE,
         "range",
-        changed("intervals", lambda found: tuple((high, low + 2 * math.pi) for low, high in found)),
+        changed("find_intervals", lambda found: tuple((high, low + 2 * math.pi) for low, high in found)),
     ),
     "turns fully": (TRIPLE, "range", changed("turns_fully", lambda found: True)),
     "a full turn denied": (ROCKER, "range", changed("turns_fully", lambda found: False)),
-    "sweep leaves the range": (TRIPLE, "range", changed("default_range", lambda found: (found[0] - 0.1, found[1]))),
+    "sweep leaves the range": (TRIPLE, "range", changed("choose_range", lambda found: (found[0] - 0.1, found[1]))),
     "swing": (ROCKER, "range", changed("swing", lambda found: found + SEEN)),
     "change point": (CHANGE, "range", changed("change_points", lambda found: found[:1])),
     "a change point that is none": (ROCKER, "range", changed("change_points", lambda found: (0.4,))),
@@ -151,7 +151,7 @@ FAULTS = {
     ),
     "time ratio": (ROCKER, "transmission", changed("time_ratio", lambda found: 1.0 / found)),
     "no time ratio": (ROCKER, "transmission", changed("time_ratio", lambda found: None)),
-    "branch through a change point": (CHANGE, "through", changed("on_smooth_path", np.negative)),
+    "branch through a change point": (CHANGE, "through", changed("follow_smooth_path", np.negative)),
 }
 
 

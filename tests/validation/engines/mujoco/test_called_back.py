@@ -15,7 +15,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion_law import Law
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.engines.mujoco import motions, simulate
-from fourbar_validation.engines.mujoco.called_back import OVERRUN, within
+from fourbar_validation.engines.mujoco.called_back import OVERRUN, clip_angles
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
@@ -72,10 +72,10 @@ def test_a_table_that_ends_where_the_sweep_does(omega: float) -> None:
 def test_an_overrun_is_put_back_only_if_it_is_a_rounding() -> None:
     posed = crank_rocker(loads=(PART_OF_A_TURN,))
     angles = np.array([0.1, 2.0, 2.0 * math.pi + 0.5])
-    put_back = within(posed, angles + np.array([-OVERRUN, OVERRUN, 0.0]) / 2.0)
+    put_back = clip_angles(posed, angles + np.array([-OVERRUN, OVERRUN, 0.0]) / 2.0)
     assert put_back == pytest.approx(angles, abs=1e-15)
     with pytest.raises(fourbar.FourBarError, match="leaves the table"):
-        within(posed, angles + 2.0 * OVERRUN)
+        clip_angles(posed, angles + 2.0 * OVERRUN)
 
 
 def changed(right: Callable[..., Any], factor: float) -> Callable[..., Any]:
@@ -84,9 +84,11 @@ def changed(right: Callable[..., Any], factor: float) -> Callable[..., Any]:
 
 @pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])
 def test_a_fault_in_a_table_fails_the_run(factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    right = simulate.of_loads
+    right = simulate.evaluate_loads
     monkeypatch.setattr(
-        simulate, "of_loads", lambda scene: {name: changed(of_load, factor) for name, of_load in right(scene).items()}
+        simulate,
+        "evaluate_loads",
+        lambda scene: {name: changed(of_load, factor) for name, of_load in right(scene).items()},
     )
     motion = fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * math.pi, 12), 10.0)
     assert "torque" in failing(crank_rocker(motion=motion, loads=(WHOLE_TURN,), effects=()))

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.mjcf import mjcf
-from fourbar.mjcf.appearance import frame
-from fourbar_validation.engines.mujoco.picture import HEIGHT, MOST, WIDTH, pictures
+from fourbar.mjcf import write_mjcf
+from fourbar.mjcf.appearance import compute_frame
+from fourbar_validation.engines.mujoco.picture import HEIGHT, MOST, WIDTH, render_pictures
 from tests.support.scenes import crank_rocker, thesis
 
 HUES = {2: (0.0, 0.5, 1.0), 3: (1.0, 0.6, 0.0), 4: (0.1, 0.9, 0.2)}
@@ -20,14 +20,14 @@ NEAR = 0.45
 
 def test_the_bars_are_seen_where_the_formulas_put_them() -> None:
     scene = thesis(np.radians([100.0, 250.0]))
-    drawn, why_not = pictures({"thesis": mjcf(scene)})
+    drawn, why_not = render_pictures({"thesis": write_mjcf(scene)})
     if why_not:
         pytest.skip(why_not)
     from matplotlib.image import imread
 
     image = imread(io.BytesIO(base64.b64decode(drawn["thesis"])))[..., :3]
     assert image.shape == (HEIGHT, WIDTH, 3)
-    seen = frame(scene.linkage)
+    seen = compute_frame(scene.linkage)
     s = fourbar.solve(scene)
     O4 = scene.linkage.ground * np.exp(1j * scene.linkage.ground_angle)
     ends = {2: (np.zeros(2), s.A[0]), 3: (s.A[0], s.B[0]), 4: (np.array([O4.real, O4.imag]), s.B[0])}
@@ -42,7 +42,7 @@ def test_the_bars_are_seen_where_the_formulas_put_them() -> None:
 
 @pytest.mark.parametrize("scene", [thesis(), crank_rocker()], ids=["thesis", "crank-rocker"])
 def test_no_position_leaves_the_frame(scene: fourbar.Scene) -> None:
-    seen = frame(scene.linkage)
+    seen = compute_frame(scene.linkage)
     linkage = scene.linkage
     for branch in (1, -1):
         motion = fourbar.Motion(fourbar.Sweep(0.0, 6.3, 500), branch=branch)
@@ -54,10 +54,10 @@ def test_no_position_leaves_the_frame(scene: fourbar.Scene) -> None:
 
 def test_without_opengl_there_is_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUJOCO_GL", "disabled")
-    drawn, why_not = pictures({"thesis": mjcf(thesis())})
+    drawn, why_not = render_pictures({"thesis": write_mjcf(thesis())})
     assert drawn == {} and "off screen" in why_not
 
 
 def test_many_scenes_are_left_out_with_a_reason() -> None:
-    drawn, why_not = pictures(dict.fromkeys(map(str, range(MOST + 1)), ""))
+    drawn, why_not = render_pictures(dict.fromkeys(map(str, range(MOST + 1)), ""))
     assert drawn == {} and str(MOST) in why_not

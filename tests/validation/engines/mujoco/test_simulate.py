@@ -20,12 +20,12 @@ from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.led import Lead
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
-from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observed_order
+from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observe_order
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.answers import compare_answer
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import Question
-from fourbar_validation.scenes.random import DrawnType, random_scene
+from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.scenes import crank_rocker, thesis
 from tests.validation.engines.test_engines import commanded
 
@@ -83,7 +83,7 @@ def test_within_1e_5_of_the_scale(name: str) -> None:
 @pytest.mark.parametrize("loaded", [False, True], ids=["bare", "loaded"])
 def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     """One pass of Newton's method is all they get; under loads the closure must be the stiffer for it."""
-    drawn = random_scene(7, index, tuple(DrawnType))
+    drawn = draw_random_scene(7, index, tuple(DrawnType))
     slow = replace(drawn, motion=replace(drawn.motion, omega_2=0.001 if loaded else 0.01, alpha_2=0.0), drive_bar=2)
     posed = slow if loaded else replace(slow, loads=(), effects=())
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
@@ -155,7 +155,7 @@ def test_error_falls_with_the_fourth_power_of_the_timestep() -> None:
     def error(answer: Answer) -> float:
         return float(np.abs(answer.quantities["F43"] - fourbar.solve(posed, at=answer.at).F43).max())  # type: ignore[operator]
 
-    coarse, fine, order = observed_order(posed, fourbar.command(posed), error)
+    coarse, fine, order = observe_order(posed, fourbar.command(posed), error)
     assert fine < coarse and 3.0 < order < 6.0, (coarse, fine, order)
 
 
@@ -170,7 +170,7 @@ def test_a_residual_that_is_no_number_raises_its_alarm(monkeypatch: pytest.Monke
 
 def test_without_an_error_there_is_no_order(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(MujocoSimulated, "answer", lambda *_: Answer("", ""))
-    assert math.isnan(observed_order(crank_rocker(), fourbar.command(crank_rocker()), lambda _: 0.0)[2])
+    assert math.isnan(observe_order(crank_rocker(), fourbar.command(crank_rocker()), lambda _: 0.0)[2])
 
 
 def hood(links: float, output: float | None = None) -> fourbar.Scene:
@@ -195,7 +195,7 @@ def test_the_closure_is_as_stiff_as_the_lightest_bar_that_it_joins_needs(links: 
 
 
 def test_a_simulation_that_fails_names_the_ratio_of_masses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fourbar.mjcf.document.mass_ratio", lambda linkage: 1.0)  # pads for bars of one size
+    monkeypatch.setattr("fourbar.mjcf.document.compute_mass_ratio", lambda linkage: 1.0)  # pads for bars of one size
     (failed,) = (row for row in judge("hood", hood(1e-3), SIMULATION).rows if row.verdict == FAILS)
     assert failed.quantity == "torque_inertia"
     assert failed.reason == "modelling + integration; of coupler and output one is 9.1e+06 times lighter"
@@ -265,7 +265,7 @@ def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(what: str, mon
 
 
 def test_an_input_that_must_hurry_is_not_led() -> None:
-    near = float(fourbar.formulas.mobility.limit_angles(crank_rocker().linkage, 4)[0])
+    near = float(fourbar.formulas.mobility.find_limit_angles(crank_rocker().linkage, 4)[0])
     (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
     motion = fourbar.Motion(theta_4=near + np.linspace(0.3, 1e-6, 20), omega_4=-1.0)
     rows = judge("", crank_rocker(motion=motion), [simulated], order=False).rows
@@ -274,7 +274,7 @@ def test_an_input_that_must_hurry_is_not_led() -> None:
 
 def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused() -> None:
     """One of ten thousand random linkages stands 1.5e-3 rad from where omega_3 vanishes: T3 and every force diverge."""
-    scene = random_scene(2026, 2265, tuple(DrawnType))
+    scene = draw_random_scene(2026, 2265, tuple(DrawnType))
     assert np.nanmin(fourbar.solve(scene).drive_condition) < 0.003
     (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
     assert not [row for row in judge("", scene, [simulated]).rows if row.failed]

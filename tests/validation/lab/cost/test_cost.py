@@ -15,17 +15,17 @@ from click.testing import CliRunner
 import fourbar
 from fourbar.mjcf import Settings
 from fourbar.scene import command
-from fourbar.show.plot.style import matplotlib_style
-from fourbar_validation.advise.errors import NO_ANSWER, QUANTITIES, WorstErrors, errors
+from fourbar.show.plot.style import apply_style
+from fourbar_validation.advise.worst_errors import NO_ANSWER, QUANTITIES, WorstErrors, compute_errors
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.one_state import MujocoOneState
 from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
 from fourbar_validation.engines.pinocchio_forward import PinocchioForward
 from fourbar_validation.lab.cost import formulas, laws, orders, pictures, study
-from fourbar_validation.lab.cost.cost import cost, front_lines
-from fourbar_validation.lab.cost.curves import BEST
+from fourbar_validation.lab.cost.cost import cost, list_front
+from fourbar_validation.lab.cost.series import BEST
 from fourbar_validation.lab.stress.bench import LINKAGE
-from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from tests.support.scenes import crank_rocker, thesis
 
 
@@ -40,7 +40,7 @@ def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Setting
 
     def error(settings: Settings) -> WorstErrors:
         trial = setup.try_out(settings, build)
-        return NO_ANSWER if trial.broken else errors(scene, trial.at, trial.quantities)
+        return NO_ANSWER if trial.broken else compute_errors(scene, trial.at, trial.quantities)
 
     return error
 
@@ -82,8 +82,8 @@ def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc() 
 
 def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path: Path) -> None:
     made = study.CostStudy("s", turning(), tmp_path)
-    (curve,) = [c for c in study.curves(turning()) if c.name == "RK4, MuJoCo's defaults"]
-    ladder = made._curve(replace(curve, spots=tuple(spot for spot in curve.spots if spot.x in (320, 2560))))
+    (curve,) = [c for c in study.design_curves(turning()) if c.name == "RK4, MuJoCo's defaults"]
+    ladder = made._try_curve(replace(curve, spots=tuple(spot for spot in curve.spots if spot.x in (320, 2560))))
     coarse, fine = (p.worst for p in ladder)
     assert fine > laws.FLOORED * coarse
     assert ladder[1].torque == pytest.approx(4e-3, rel=0.3) and ladder[1].force == pytest.approx(7e-3, rel=0.3)
@@ -132,7 +132,7 @@ def test_one_state_is_wrong_in_proportion_and_right_in_the_limit() -> None:
         at = command(scene)
 
         def wrong(*impedances: float, scene: fourbar.Scene = scene, at: object = at) -> float:
-            return errors(scene, at, MujocoOneState(impedances).answer(scene, at).quantities).worst  # type: ignore[arg-type]
+            return compute_errors(scene, at, MujocoOneState(impedances).answer(scene, at).quantities).worst  # type: ignore[arg-type]
 
         soft, stiff = wrong(0.999), wrong(0.9999)
         assert soft / stiff == pytest.approx(10.0, rel=0.1)
@@ -146,16 +146,16 @@ def test_pinocchio_forward_converges_to_the_formulas(scene: fourbar.Scene) -> No
     found = []
     for n in (80, 160):
         ran = PinocchioForward(scene, command(scene), n, n / 4).forward()
-        found.append(errors(scene, ran.at, ran.quantities).worst)
+        found.append(compute_errors(scene, ran.at, ran.quantities).worst)
     assert found[1] < 1e-6 and found[0] / found[1] > 8.0, found
 
 
 def test_formulas_in_four_precisions() -> None:
     for scene in (turning(positions=8), crank_rocker(), thesis(np.radians([100.0, 135.0, 220.0]))):
-        at = formulas.few(command(scene))
-        exact = formulas.fifty_digits(scene, at, 2 * formulas.FIFTY_DIGITS)
+        at = formulas.choose_few(command(scene))
+        exact = formulas.evaluate_balls(scene, at, 2 * formulas.FIFTY_DIGITS)
         wrong = {
-            name: formulas.against_reference(scene, at, method(scene, at), exact).worst
+            name: formulas.compare_with_reference(scene, at, method(scene, at), exact).worst
             for name, method in formulas.METHODS.items()
         }
         assert wrong["formulas, double"] < 1e-13 and wrong["13x13"] < 1e-12
@@ -165,21 +165,23 @@ def test_formulas_in_four_precisions() -> None:
 
 def test_single_precision_slides_too() -> None:
     scene = replace(crank_rocker(), effects=(fourbar.PinFriction.at(A=(0.2, 0.02), O4=(0.3, 0.03)),))
-    assert errors(scene, command(scene), formulas.single(scene, command(scene))).worst < 1e-4
+    assert compute_errors(scene, command(scene), formulas.evaluate_single(scene, command(scene))).worst < 1e-4
     with pytest.raises(NotImplementedError, match="pin forces"):  # thirteen equations that are not linear
-        formulas.thirteen_equations(scene, command(scene))
+        formulas.solve_thirteen_equations(scene, command(scene))
 
 
 def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
     scene = turning(positions=8)
-    at = formulas.few(command(scene))
-    exact, ours = formulas.fifty_digits(scene, at), formulas.double(scene, at)
+    at = formulas.choose_few(command(scene))
+    exact, ours = formulas.evaluate_balls(scene, at), formulas.evaluate_double(scene, at)
     ours["torque"][3], ours["F12"][2, 1] = math.nan, math.nan
-    found = formulas.against_reference(scene, at, ours, {**exact, "F14": [(None, None)] * 9})
+    found = formulas.compare_with_reference(scene, at, ours, {**exact, "F14": [(None, None)] * 9})
     assert found.torque == found.F12 == found.F14 == math.inf and found.F43 < 1e-13
     still = replace(scene, motion=replace(scene.motion, omega_2=0.0), drive_bar=4)
     solution = fourbar.solve(still, "force")
-    assert errors(still, command(still), {name: getattr(solution, name) for name in QUANTITIES}).torque == math.inf
+    assert (
+        compute_errors(still, command(still), {name: getattr(solution, name) for name in QUANTITIES}).torque == math.inf
+    )
 
 
 def point(steps: float, worst: float, curve: str = "c", kind: str = study.STEPPED) -> study.CostPoint:
@@ -193,13 +195,13 @@ def test_fit_floor_and_warning() -> None:
     slope, sigma = laws.fit([1.0, 2.0, 4.0, 8.0], [3.0, 6.0, 12.0, 24.0])
     assert slope == pytest.approx(1.0) and sigma < 1e-9
     falling = [point(10.0 * 2**k, 2.0 ** (-4 * k)) for k in range(6)]
-    assert laws.floor(falling, "F12") is None
+    assert laws.find_floor(falling, "F12") is None
     floored = [*falling, point(640.0, 9e-7), point(1280.0, 9e-7)]
-    assert laws.floor(floored, "F12") == 9e-7
-    (line,) = laws.warnings({"c": floored})
+    assert laws.find_floor(floored, "F12") == 9e-7
+    (line,) = laws.list_warnings({"c": floored})
     for quantity in QUANTITIES:
         assert f"{quantity} beyond 320 (9.0e-07)" in line  # 320 has 9.5e-7: within a fifth of the floor
-    wrong = laws.laws({"RK4, tc held": [point(10.0 * 2**k, 0.05 * 2.0 ** (-2 * k)) for k in range(6)]})
+    wrong = laws.fit_laws({"RK4, tc held": [point(10.0 * 2**k, 0.05 * 2.0 ** (-2 * k)) for k in range(6)]})
     assert [law.quantity for law in wrong] == list(QUANTITIES)
     assert all(not law.holds and law.decided and "FAILS" in str(law) for law in wrong)
 
@@ -214,46 +216,46 @@ JUMPING = (6.4e-2, 3.2e-2, 1.6e-2, 8e-3, 4e-3, 0.44, 1e-3, 5e-4)
 def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping: tuple[float, ...]) -> None:
     ladder = [point(20.0 * 2**k, 0.05 / 2**k) for k in range(8)]
     ladder = [replace(each, F43=error) for each, error in zip(ladder, jumping, strict=True)]
-    found = {law.quantity: law for law in laws.laws({"Euler, tc held": ladder})}
+    found = {law.quantity: law for law in laws.fit_laws({"Euler, tc held": ladder})}
     assert {name for name, law in found.items() if not law.holds} == {"F43"} and found["F43"].decided
     jump = f"jumps from 4.0e-03 to {jumping[5]:.1e} at 640/rev"
-    assert laws.warnings({"Euler, tc held": ladder}) == [f"Euler, tc held: F43: {jump}"]
-    assert "F43 jumps" in orders.statement({"Euler, tc held": ladder})
-    drawn = {line.get_gid(): len(line.get_xdata()) for axes in orders.picture({"Euler, tc held": ladder}, "").axes
+    assert laws.list_warnings({"Euler, tc held": ladder}) == [f"Euler, tc held: F43: {jump}"]
+    assert "F43 jumps" in orders.write_statement({"Euler, tc held": ladder})
+    drawn = {line.get_gid(): len(line.get_xdata()) for axes in orders.draw_picture({"Euler, tc held": ladder}, "").axes
              for line in axes.lines if line.get_gid() and len(line.get_xdata())}  # fmt: skip
     assert drawn == {"jump-F43": 1}
-    (line,) = laws.lines(list(found.values()))
+    (line,) = laws.write_laws(list(found.values()))
     assert f"; F43: FAILS, {jump}" in line and "torque, F12, F32, F14: holds, 1.00" in line
 
 
 def test_each_quantity_has_its_own_order_and_floor() -> None:
     ladder = [replace(point(20.0 * 2**k, 2.0 ** (-4 * k - 8)), F14=0.05 / 2**k, F32=1e-3) for k in range(8)]
-    found = {law.quantity: law for law in laws.laws({"RK4, tc held": ladder})}
+    found = {law.quantity: law for law in laws.fit_laws({"RK4, tc held": ladder})}
     assert found["torque"].holds and found["F14"].exponent == pytest.approx(1.0) and not found["F14"].holds
-    (line,) = laws.warnings({"RK4, tc held": ladder})
+    (line,) = laws.list_warnings({"RK4, tc held": ladder})
     assert line.endswith("F32 beyond 20 (1.0e-03)") and "torque" not in line
 
 
 def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported() -> None:
     """In the thesis's mechanism the torque falls by its order with Euler, and the pin forces are wrong throughout."""
     ladder = [replace(point(160.0 * 2**k, 0.05 / 2**k), F12=error) for k, error in enumerate((1.8, 0.9, 1.1, 0.7))]
-    found = {law.quantity: law for law in laws.laws({"Euler, tc held": ladder})}
+    found = {law.quantity: law for law in laws.fit_laws({"Euler, tc held": ladder})}
     assert found["torque"].holds and not found["F12"].decided and not found["F12"].holds
-    assert laws.warnings({"Euler, tc held": ladder}) == [
+    assert laws.list_warnings({"Euler, tc held": ladder}) == [
         "Euler, tc held: no timestep of the ladder brings F12 below 0.1"
     ]
-    assert orders.statement({"Euler, tc held": ladder}) == "No time step brings F12 below 0.1 with Euler"
+    assert orders.write_statement({"Euler, tc held": ladder}) == "No time step brings F12 below 0.1 with Euler"
 
 
 def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump() -> None:
     """Where two sources cancel the error dips; the softest closures, and the fewest steps, carry no motion at all."""
     ladder = [point(20.0 * 2**k, each) for k, each in enumerate((0.9, math.inf, 0.3, 3e-2, 1e-4, 1.2e-2, 6e-3, 3e-3))]
-    assert not any(laws.jumps(ladder, quantity) for quantity in QUANTITIES)
+    assert not any(laws.find_jumps(ladder, quantity) for quantity in QUANTITIES)
 
 
 def test_the_front_holds_what_nothing_beats() -> None:
     points = [point(10, 1e-2), point(20, 1e-3), point(30, 5e-3), point(40, 1e-5), point(50, float("inf"))]
-    assert [p.steps for p in laws.pareto(points, "torque")] == [10, 20, 40]
+    assert [p.steps for p in laws.find_pareto(points, "torque")] == [10, 20, 40]
 
 
 def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
@@ -285,8 +287,8 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
     scene = tmp_path / "small.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
     few = {"RK4, tc held", "RK4, MuJoCo's defaults", "tolerance, Newton", "softness d", "sag d, slow"}
-    every = study.curves
-    monkeypatch.setattr(study, "curves", lambda scene: [c for c in every(scene) if c.name in few])
+    every = study.design_curves
+    monkeypatch.setattr(study, "design_curves", lambda scene: [c for c in every(scene) if c.name in few])
     monkeypatch.setattr(study, "FORWARD_STEPS", (20, 40))
     monkeypatch.setattr(study, "REQUIRED", (1e-3, 1e-5))
     monkeypatch.setattr(study, "ROUNDS", 1)
@@ -309,16 +311,16 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
 
 def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
     scene, out = tmp_path / "law.toml", tmp_path / "out"
-    scene.write_text(fourbar.dump(SPECIMENS["law"]))
+    scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
     result = CliRunner().invoke(cost, [str(scene), "--out", str(out)], standalone_mode=False)
     assert isinstance(result.exception, fourbar.errors.LimitError) and "motion law" in str(result.exception)
     assert not out.exists()
 
 
 def test_the_scatter_of_timings_is_that_of_their_middle_half() -> None:
-    middle, scatter = study.clocked([1.0, 9.0, 2.0, 2.2, 1.8])
+    middle, scatter = study.summarise_timings([1.0, 9.0, 2.0, 2.2, 1.8])
     assert middle == 2.0 and scatter == pytest.approx(0.5 * (2.2 - 1.8) / 2.0)
-    lines = front_lines({"c": [point(10, 1e-2), replace(point(20, 1e-3), scatter=math.nan)]})
+    lines = list_front({"c": [point(10, 1e-2), replace(point(20, 1e-3), scatter=math.nan)]})
     assert lines[1].endswith("3 %  c: 10/rev") and lines[2].endswith("0.02     -  c: 20/rev")
 
 
@@ -326,12 +328,12 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
     near = {"kind": "exact", "torque": 1e-12, "seconds_per_revolution": 0.3}
     curves = {
         "inverse": [replace(point(1, 1e-12), setting=name, **near) for name in ("pinocchio-inverse", "mujoco-inverse")],
-        "one state": [replace(point(1, 1e-12), setting="one state, extrapolated", dial=0.0, **near)],
+        "one state": [replace(point(1, 1e-12), setting="one state, extrapolated", setting_value=0.0, **near)],
         "Euler": [replace(point(20, 0.2), setting=pictures.DEFAULT, seconds_per_revolution=0.3)],
         "recommended": [replace(point(20 * 2**k, 1e-3 / 8**k), setting="tc = 20 h") for k in range(4)],
     }
-    with matplotlib_style():
-        figure = pictures._work_precision(curves, "torque", "title")
+    with apply_style():
+        figure = pictures._draw_work_precision(curves, "torque", "title")
     boxes = [text.get_window_extent() for text in figure.axes[0].texts]
     assert len(boxes) == 7 and not any(one.overlaps(other) for one, other in combinations(boxes, 2))
     assert all(figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1 for box in boxes)
@@ -339,6 +341,6 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
 
 def test_statement_of_a_picture() -> None:
     curves = {"recommended": [point(30, 5e-5)], "d": [replace(point(300, 4e-3), setting=pictures.DEFAULT)]}
-    assert pictures.statement(curves, "torque") == (
+    assert pictures.write_statement(curves, "torque") == (
         "Four digits of torque cost 0.03 ms a revolution; the defaults pay 0.3 ms for an error of 4e-3"
     )

@@ -48,6 +48,6 @@ def test_the_table_has_a_row_for_each_effect_and_flag(
 def test_an_engine_that_is_missing_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(cost, "not_installed", lambda _: "mujoco is not installed")
+    monkeypatch.setattr(cost, "find_missing", lambda _: "mujoco is not installed")
     assert status(["cost", "--effects", "--engines", "formulas,mujoco-inverse"]) == BROKEN
     assert capsys.readouterr().err == "error: mujoco-inverse: mujoco is not installed\n"

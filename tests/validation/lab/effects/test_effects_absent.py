@@ -16,8 +16,8 @@ import pytest
 import fourbar
 from fourbar import effects
 from fourbar.effects import FILE_OF, Friction, Viscous
-from fourbar.mjcf import mjcf
-from fourbar_validation.engines.mujoco.stepping import opened
+from fourbar.mjcf import write_mjcf
+from fourbar_validation.engines.mujoco.stepping import open_model
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
@@ -32,7 +32,7 @@ PROBE = """
 import hashlib, json, sys
 sys.path.insert(0, sys.argv[1])
 import fourbar
-from fourbar.mjcf import mjcf
+from fourbar.mjcf import write_mjcf
 link = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.25, 0.5, 0.004, (0.13, 0.3)), fourbar.Bar(0.22, 0.4))
 scene = fourbar.Scene(link, fourbar.Motion(fourbar.Sweep(0.1, 6.3, 60), 10.0, 5.0))
 fourbar.solve(scene)
@@ -44,7 +44,7 @@ sys.setprofile(note)
 solution = fourbar.solve(scene)
 sys.setprofile(None)
 numbers = {name: hashlib.sha256(getattr(solution, name).tobytes()).hexdigest() for name in solution.evaluated()}
-print(json.dumps({"file": fourbar.__file__, "numbers": numbers, "calls": calls, "mjcf": mjcf(scene)}))
+print(json.dumps({"file": fourbar.__file__, "numbers": numbers, "calls": calls, "mjcf": write_mjcf(scene)}))
 """
 """What a checkout makes of a scene without effects: digests of every array, the calls made, the MJCF."""
 
@@ -99,7 +99,7 @@ def differences(whole: dict[str, object], other: dict[str, object]) -> list[str]
 
 def contents(text: str) -> dict[str, object]:
     """The compiled model: sizes, rows of its constraints at the keyframe, flags, and the whole of it as bytes."""
-    model, data = opened(text)
+    model, data = open_model(text)
     whole = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
     mujoco.mj_saveModel(model, None, whole)
     sizes = {name: int(getattr(model, name)) for name in ("nv", "neq", "nu", "ntendon", "nsensor", "njnt")}
@@ -160,7 +160,7 @@ def test_an_effect_that_is_named_runs() -> None:
 
 def compiled(*names: str) -> mujoco.MjModel:
     effects = tuple(ACTING[name] for name in names)
-    return mujoco.MjModel.from_xml_string(mjcf(crank_rocker(loads=(), effects=effects)))
+    return mujoco.MjModel.from_xml_string(write_mjcf(crank_rocker(loads=(), effects=effects)))
 
 
 def rows(model: mujoco.MjModel) -> int:
@@ -214,8 +214,8 @@ def test_each_effect_adds_what_it_needs_and_no_more(
 
 def test_an_effect_of_zero_size_is_still_named() -> None:
     """A torque of 0 that the scene writes down is the scene's; what it leaves out is not there at all."""
-    named = mjcf(crank_rocker(loads=(), effects=(Friction.at(A=0.0),)))
-    assert "frictionloss=" in named and 'frictionloss="0.0"' not in mjcf(crank_rocker(loads=(), effects=()))
+    named = write_mjcf(crank_rocker(loads=(), effects=(Friction.at(A=0.0),)))
+    assert "frictionloss=" in named and 'frictionloss="0.0"' not in write_mjcf(crank_rocker(loads=(), effects=()))
 
 
 POSITIONS_ONLY = """

@@ -16,7 +16,7 @@ from fourbar.solve import solve
 from fourbar_validation.cli import status as ended
 from fourbar_validation.lab.stress import against, bench, contenders
 from fourbar_validation.lab.stress.bench_picture import draw_bench
-from fourbar_validation.lab.stress.timed import command, example
+from fourbar_validation.lab.stress.timed import make_command, make_example
 
 ROOT = Path(__file__).parents[4]
 
@@ -48,10 +48,10 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
 
 
 def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, at = example(), command(500)
+    scene, at = make_example(), make_command(500)
     own = solve(scene, at=at, compiled=False)
     expected = np.concatenate([np.atleast_2d(getattr(own, name).T) for name in UNKNOWNS])
-    peers = contenders.loops()
+    peers = contenders.collect_loops()
     assert {"NumPy", "C"} <= set(peers.here) or "C" in peers.not_run
     for name, loop in peers.here.items():
         out = np.full((15, 500), np.nan)
@@ -65,7 +65,7 @@ def test_more_positions_than_fit_are_evaluated_in_pieces(monkeypatch: pytest.Mon
     monkeypatch.setattr(contenders, "AT_ONCE", 1000)
     monkeypatch.setattr(contenders, "SHORTEST", 1)
     sizes: list[int] = []
-    times = contenders.over_positions({"it": lambda theta_2, out: sizes.append(len(theta_2))}, 10_000, 1)
+    times = contenders.time_positions({"it": lambda theta_2, out: sizes.append(len(theta_2))}, 10_000, 1)
     assert set(times["it"]) == {1000, 10_000} and sizes == [1000] * (2 + 2 * 10)
 
 
@@ -73,7 +73,7 @@ def test_what_is_missing_is_named_with_its_reason(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setenv("PATH", "")
     for library in ("numba", "jax", "torch"):
         monkeypatch.setitem(sys.modules, library, None)
-    peers = contenders.loops()
+    peers = contenders.collect_loops()
     assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"compiled", "C", "JAX", "PyTorch"}
     rows = {"growth from 1000 positions on": 1.0}
     monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, peers.not_run))
@@ -139,7 +139,7 @@ def test_a_slower_tree_is_found_by_every_timing(repository: Path) -> None:
     with (repository / "fourbar" / "__init__.py").open("a") as module:
         module.write(SLOWER)
     before = sorted(path for path in repository.iterdir())
-    rows = against.against("HEAD", 1000, 1, repository)
+    rows = against.time_against("HEAD", 1000, 1, repository)
     assert len(rows) == 5
     for row in rows.values():
         assert row.least <= row.ratio <= row.most
@@ -164,7 +164,7 @@ def reported(capsys: pytest.CaptureFixture[str], revision: str) -> tuple[int, st
 def test_a_revision_that_cannot_be_timed_is_one_line(
     revision: str, words: str, repository: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(against, "checkout", lambda _: repository)
+    monkeypatch.setattr(against, "find_checkout", lambda _: repository)
     status, line = reported(capsys, revision)
     assert status == BAD_INPUT and line.startswith("error: ") and line.count("\n") == 1 and words in line
     assert {path.name for path in repository.iterdir()} == {".git", "fourbar"}
@@ -173,7 +173,7 @@ def test_a_revision_that_cannot_be_timed_is_one_line(
 def test_without_a_repository_no_revision_exists(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(against, "checkout", lambda _: tmp_path)
+    monkeypatch.setattr(against, "find_checkout", lambda _: tmp_path)
     status, line = reported(capsys, "HEAD")
     assert status == BAD_INPUT and line.count("\n") == 1
 

@@ -9,16 +9,16 @@ import pytest
 import fourbar
 from fourbar.effects import SpringEnd
 from fourbar.scene import Scene, command
-from fourbar.studies.keys import entries, left_out
+from fourbar.studies.keys import is_left_out, list_entries
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
-from fourbar_validation.lab.stress.mutation.specimens import SPECIMENS
+from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from fourbar_validation.run import judge
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.shipped import calls, files
-from fourbar_validation.run.shipped.variants import moved, stated
+from fourbar_validation.run.shipped.variants import find_stated, move_numbers
 from tests.support.scenes import crank_rocker
 
-SHIPPED = SPECIMENS["shipped"]
+SHIPPED = FAULT_SCENES["shipped"]
 CHECKS = [check.rows for check in judge.CHECKS if check.shipped]
 ENGINES = {"compiled", "study", "sensitivity", "extremes", "tolerances", "equilibria", "sdf", "usd"}
 
@@ -192,17 +192,17 @@ def test_what_breaks_down_costs_its_own_rows_and_what_is_missing_is_named(monkey
 
 
 def test_what_a_file_cannot_hold_is_refused() -> None:
-    (row,) = rows_of(SPECIMENS["sliding pins"], "usd")
+    (row,) = rows_of(FAULT_SCENES["sliding pins"], "usd")
     assert row.verdict == REFUSES and "pin_friction" in row.reason
 
 
 @pytest.mark.parametrize("name", ["crank-rocker", "damped", "sprung", "flywheel", "sliding pins", "table"])
 def test_every_number_that_a_scene_states_is_found_in_its_file(name: str) -> None:
-    scene = SPECIMENS[name]
-    known = {key for key, entry in entries(scene).items() if not left_out(scene, entry)}
-    found = stated(scene, known)
+    scene = FAULT_SCENES[name]
+    known = {key for key, entry in list_entries(scene).items() if not is_left_out(scene, entry)}
+    found = find_stated(scene, known)
     assert found.keys() >= known - {key for key in known if ".centre." in key or ".inertia" in key}
-    changed = moved(scene, {"lengths.coupler": 0.01})
+    changed = move_numbers(scene, {"lengths.coupler": 0.01})
     assert changed.linkage.coupler.length == scene.linkage.coupler.length + 0.01
     assert np.array_equal(command(changed).theta_2, command(scene).theta_2)
 

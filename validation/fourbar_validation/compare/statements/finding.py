@@ -13,7 +13,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.answer import Answer, Engine
 from fourbar_validation.compare.rows import AGREES, FAILS, Row
-from fourbar_validation.compare.tolerance import EQUIVALENCE, half_turns, used, wrapped
+from fourbar_validation.compare.tolerance import EQUIVALENCE, count_half_turns, find_used, wrap_angle
 
 Place = tuple[float, int]
 """theta_2 (rad) and branch."""
@@ -31,10 +31,10 @@ class Finding(NamedTuple):
     what: str
 
 
-def worst(name: str, answer: Answer, quantity: str, findings: Sequence[Finding]) -> Row:
+def make_worst_row(name: str, answer: Answer, quantity: str, findings: Sequence[Finding]) -> Row:
     """Make the row of a quantity of the finding that exceeds what it is allowed by most."""
     errors, bounds = (np.array(column) for column in zip(*(each[:2] for each in findings), strict=True))
-    result = findings[int(np.argmax(used(errors, bounds)))]
+    result = findings[int(np.argmax(find_used(errors, bounds)))]
     holds = result.error <= result.allowed
     error, allowed, theta_2 = (float(number) for number in result[:3])
     verdict, condition = AGREES if holds else FAILS, float(EQUIVALENCE.factor / max(result.allowed, EQUIVALENCE.factor))
@@ -51,12 +51,12 @@ def look(engine: Engine, linkage: FourBar, places: Iterable[Place]) -> Seen:
     bars = uniform(*linkage.lengths)
     scene = Scene(FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0))
     theta_2, branch = (np.array(column) for column in zip(*each, strict=True))
-    answer = given(engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)).quantities
+    answer = require_answer(engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)).quantities
     names = [name for name in OF_BARS if name in answer]
     return {place: {name: float(answer[name][i]) for name in names} for i, place in enumerate(each)}
 
 
-def given(engine: Engine, scene: Scene, at: Command) -> Answer:
+def require_answer(engine: Engine, scene: Scene, at: Command) -> Answer:
     """Give an engine's answer; LimitError where it refuses those positions."""
     answer = engine.answer(scene, at)
     if answer.refusal is not None:
@@ -64,10 +64,12 @@ def given(engine: Engine, scene: Scene, at: Command) -> Answer:
     return answer
 
 
-def same(what: str, stated: Sequence[float], found: Sequence[float], linkage: FourBar) -> Finding:
+def compare_angles(what: str, stated: Sequence[float], found: Sequence[float], linkage: FourBar) -> Finding:
     """Compare lists of angles, modulo 2 pi in any order: the largest distance of one from the nearest of the other."""
     if not stated or not found:
         return Finding(0.0 if len(stated) == len(found) else math.inf, 0.0, 0.0, what)
-    apart = np.abs(wrapped(np.subtract.outer(np.array(stated), np.array(found))))
+    apart = np.abs(wrap_angle(np.subtract.outer(np.array(stated), np.array(found))))
     error = float(max(apart.min(axis=0).max(), apart.min(axis=1).max()))
-    return Finding(error, EQUIVALENCE.factor * half_turns(linkage.ground_angle, np.array(stated)), stated[0], what)
+    return Finding(
+        error, EQUIVALENCE.factor * count_half_turns(linkage.ground_angle, np.array(stated)), stated[0], what
+    )

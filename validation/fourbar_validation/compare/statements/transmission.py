@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.formulas import mobility, transmission
-from fourbar.formulas.path import drive_sine, singular
-from fourbar.formulas.path import state as state_of
+from fourbar.formulas.path import compute_state as state_of
+from fourbar.formulas.path import drive_sine, find_singular
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Answer
@@ -21,34 +21,34 @@ from fourbar_validation.compare.tolerance import (
     NOTHING_TO_TELL,
     TURN,
     Array,
-    half_turns,
-    lever,
-    roundoff,
-    used,
-    worst,
-    wrapped,
+    count_half_turns,
+    find_lever,
+    find_roundoff,
+    find_used,
+    find_worst,
+    wrap_angle,
 )
 
 RADII = (0.2, 0.3)
 """m; where the forces of the mechanical advantage act. Any two that differ."""
 
 
-def places(linkage: FourBar) -> list[Place]:
+def choose_places(linkage: FourBar) -> list[Place]:
     """Where an engine is looked at for it: at the extremes that are no limits, and in both strokes of bar 4."""
-    strokes = _strokes(linkage)
-    inner = [(theta_2, 1) for value, theta_2, collinear in _ends(linkage) if value != collinear]
+    strokes = _find_strokes(linkage)
+    inner = [(theta_2, 1) for value, theta_2, collinear in _find_ends(linkage) if value != collinear]
     return inner + ([] if strokes is None else [(theta_2, -1) for theta_2 in strokes.middles])
 
 
-def transmitted(scene: Scene, seen: Seen, answer: Answer, predicted: Predicted | None) -> Iterator[Finding]:
+def compare_transmission(scene: Scene, seen: Seen, answer: Answer, predicted: Predicted | None) -> Iterator[Finding]:
     """Over the scene's own motion, if it is one, at the stated extremes, and between the stated limits of bar 4."""
     if answer.at is not None and answer.at.omega_2 is not None:
-        yield from _over(scene, answer, predicted)
-    yield from _extremes(scene.linkage, seen)
-    yield from _time_ratio(scene.linkage, seen)
+        yield from _compare_over(scene, answer, predicted)
+    yield from _compare_extremes(scene.linkage, seen)
+    yield from _compare_time_ratio(scene.linkage, seen)
 
 
-def _over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator[Finding]:
+def _compare_over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator[Finding]:
     at, linkage = answer.at, scene.linkage
     extremes = transmission.transmission_extremes(linkage)
     assert at is not None and at.omega_2 is not None and answer.assembled is not None
@@ -58,16 +58,16 @@ def _over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator
     drive = scene.drive_bar or 2  # the leverage of a line is compared as a quantity
     one, other = (theta[bar] for bar in MOVING_BARS if bar != drive)
     driven = np.abs(np.sin(other - one))
-    angle = np.abs(wrapped(theta[4] - theta[3]))
+    angle = np.abs(wrap_angle(theta[4] - theta[3]))
     sine = np.abs(np.sin(angle))
     with np.errstate(divide="ignore", invalid="ignore"):
-        allowed = EQUIVALENCE.factor * half_turns(linkage.ground_angle, at.theta_2) / (lever(linkage) * sine)
+        allowed = EQUIVALENCE.factor * count_half_turns(linkage.ground_angle, at.theta_2) / (find_lever(linkage) * sine)
         ratio = answer.quantities["omega_4"] / at.omega_2
         gained = transmission.mechanical_advantage(state, *RADII) * ratio * (RADII[1] / RADII[0]) - 1.0
         largest = np.maximum(1.0, np.maximum(np.abs(ratio), np.abs(answer.quantities["omega_3"] / at.omega_2)))
         allowed_gain = allowed / sine * largest / np.abs(ratio)
     closed = (
-        answer.assembled & (half.outer >= 0.0) & (half.inner >= 0.0) & ~singular(state.at)
+        answer.assembled & (half.outer >= 0.0) & (half.inner >= 0.0) & ~find_singular(state.at)
     )  # whether both say so is a row of its own
     where = closed & ~(allowed >= NOTHING_TO_TELL)  # a missing number is none that holds
     moving = where & (at.omega_2 != 0.0)
@@ -90,11 +90,11 @@ def _over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator
             bound = np.where(beyond, np.fmax(bound, DEGRADED * lost), bound)  # noqa: PLW2901
             counts = counts & ~(bound >= NOTHING_TO_TELL)  # noqa: PLW2901
         if counts.any():
-            most = np.flatnonzero(counts)[worst(used(error[counts], bound[counts]))]
+            most = np.flatnonzero(counts)[find_worst(find_used(error[counts], bound[counts]))]
             yield Finding(float(error[most]), float(bound[most]), float(at.theta_2[most]), what)
     branch = at.branch.astype(float)
     nearest = transmission.distance_to_singular(linkage, at.theta_2, drive, branch)
-    result = _to_singular(scene, at.theta_2, branch)
+    result = _compute_to_singular(scene, at.theta_2, branch)
     error = np.where(np.isinf(nearest) == np.isinf(result), 0.0, math.inf)
     finite = np.isfinite(nearest) & np.isfinite(result)
     error[finite] = np.abs(nearest[finite] - result[finite])
@@ -103,15 +103,15 @@ def _over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator
     yield Finding(float(error[most]), float(bound[most]), float(at.theta_2[most]), "distance to a singular position")
 
 
-def _always(linkage: FourBar) -> list[float]:
+def _find_collinear(linkage: FourBar) -> list[float]:
     """theta_2 where bars 3 and 4 are collinear on either branch."""
     limits = mobility.limit_positions(linkage)
     return [*(limit.theta_2 for limit in limits), *mobility.change_points(linkage)]
 
 
-def _to_singular(scene: Scene, theta_2: Array, branch: Array) -> Array:
+def _compute_to_singular(scene: Scene, theta_2: Array, branch: Array) -> Array:
     """Compute the angle to the nearest position where bars must not be collinear and are; inf where there is none."""
-    drive, always = scene.drive_bar or 2, _always(scene.linkage)
+    drive, always = scene.drive_bar or 2, _find_collinear(scene.linkage)
     dead = mobility.limit_positions(scene.linkage, drive) if drive != 2 else ()
     nearest = np.full(theta_2.shape, math.inf)
     for point, side in [*((point, 0) for point in always), *((limit.theta_2, limit.branch) for limit in dead)]:
@@ -120,22 +120,22 @@ def _to_singular(scene: Scene, theta_2: Array, branch: Array) -> Array:
     return nearest
 
 
-def _ends(linkage: FourBar) -> tuple[tuple[float, float, float], ...]:
+def _find_ends(linkage: FourBar) -> tuple[tuple[float, float, float], ...]:
     """Least and greatest angle between bars 3 and 4, theta_2 there, and what the angle is where they are collinear."""
     of = transmission.transmission_extremes(linkage)
     return (of.least, of.theta_2_least, 0.0), (of.greatest, of.theta_2_greatest, math.pi)
 
 
-def _extremes(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
-    for value, theta_2, collinear in _ends(linkage):
+def _compare_extremes(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
+    for value, theta_2, collinear in _find_ends(linkage):
         if value == collinear:
-            error = min((abs(wrapped(theta_2 - point)) for point in _always(linkage)), default=math.inf)
-            yield Finding(error, EQUIVALENCE.factor * half_turns(0.0, theta_2), theta_2, "extreme at a limit")
+            error = min((abs(wrap_angle(theta_2 - point)) for point in _find_collinear(linkage)), default=math.inf)
+            yield Finding(error, EQUIVALENCE.factor * count_half_turns(0.0, theta_2), theta_2, "extreme at a limit")
             continue
-        angle = abs(wrapped(seen[(theta_2, 1)]["theta_4"] - seen[(theta_2, 1)]["theta_3"]))
-        digits = lever(linkage) * math.sin(angle)
+        angle = abs(wrap_angle(seen[(theta_2, 1)]["theta_4"] - seen[(theta_2, 1)]["theta_3"]))
+        digits = find_lever(linkage) * math.sin(angle)
         if not digits * NOTHING_TO_TELL <= EPS:
-            yield Finding(abs(angle - value), roundoff(linkage) / digits, theta_2, "extreme of the angle at B")
+            yield Finding(abs(angle - value), find_roundoff(linkage) / digits, theta_2, "extreme of the angle at B")
     of = transmission.transmission_extremes(linkage)
     smallest = min(of.least, math.pi - of.greatest)
     yield Finding(abs(of.worst - smallest), EPS, of.theta_2_least, "smallest transmission angle")
@@ -150,7 +150,7 @@ class _Strokes(NamedTuple):
     """theta_2 amid each."""
 
 
-def _strokes(linkage: FourBar) -> _Strokes | None:
+def _find_strokes(linkage: FourBar) -> _Strokes | None:
     dead = [limit.theta_2 for limit in mobility.limit_positions(linkage, 4) if limit.branch == -1]
     if len(dead) != 2 or not mobility.turns_fully(linkage) or mobility.change_points(linkage):
         return None
@@ -158,8 +158,8 @@ def _strokes(linkage: FourBar) -> _Strokes | None:
     return _Strokes(there, (dead[0] + there / 2.0, dead[1] + (TURN - there) / 2.0))
 
 
-def _time_ratio(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
-    ratio, strokes, theta_1 = mobility.time_ratio(linkage), _strokes(linkage), linkage.ground_angle
+def _compare_time_ratio(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
+    ratio, strokes, theta_1 = mobility.time_ratio(linkage), _find_strokes(linkage), linkage.ground_angle
     known = (strokes is None) == (ratio is None)
     yield Finding(float(not known), 0.0, theta_1, "whether there is a time ratio")
     if strokes is not None and ratio is not None:
@@ -168,4 +168,6 @@ def _time_ratio(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
         yield Finding(float(not one * other < 0.0), 0.0, place, "bar 4 turns in both senses")
         shorter, longer = sorted((strokes.there, TURN - strokes.there))
         # both angles are differences of two that were rounded
-        yield Finding(abs(ratio / (longer / shorter) - 1.0), roundoff(linkage) * TURN / shorter, place, "time ratio")
+        yield Finding(
+            abs(ratio / (longer / shorter) - 1.0), find_roundoff(linkage) * TURN / shorter, place, "time ratio"
+        )

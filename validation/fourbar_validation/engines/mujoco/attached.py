@@ -7,7 +7,7 @@ import numpy as np
 
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.mujoco.fields import ACTUATOR, RANGES, TENDON
+from fourbar_validation.engines.mujoco.model_fields import ACTUATOR, RANGES, TENDON
 from fourbar_validation.engines.mujoco.topology import Topology
 
 Value = float | str | tuple[float, ...]
@@ -17,39 +17,39 @@ DRIVE = {"actuator_damping": "drive damping", "actuator_dampingpoly": "drive dam
 """Of an actuator on the crank, what remains when its gain and bias are taken off."""
 
 
-def direct(model: mujoco.MjModel, field: str, row: int, key: str) -> Described:
+def read_row(model: mujoco.MjModel, field: str, row: int, key: str) -> Described:
     """Read one row of a field as it stands; nothing where this MuJoCo does not have it."""
     if not hasattr(model, field):
         return {}
-    return {key: _numbers(getattr(model, field)[row])}
+    return {key: _read_numbers(getattr(model, field)[row])}
 
 
-def _numbers(entry: Array) -> Value:
+def _read_numbers(entry: Array) -> Value:
     return float(entry) if np.ndim(entry) == 0 else tuple(float(x) for x in entry)
 
 
-def limits(model: mujoco.MjModel, field: str, row: int, key: str, *, switched_on: bool = True) -> Described:
+def read_range(model: mujoco.MjModel, field: str, row: int, key: str, *, switched_on: bool = True) -> Described:
     """Read a range, or "free" where it does not hold."""
     holds, name = RANGES[field]
     if not hasattr(model, field):
         return {}
     free = not switched_on or not getattr(model, holds)[row]
-    return {f"{key}.{name}": "free" if free else _numbers(getattr(model, field)[row])}
+    return {f"{key}.{name}": "free" if free else _read_numbers(getattr(model, field)[row])}
 
 
-def on_the_drive(topology: Topology, pin: str) -> Described:
+def sum_damping_of_drive(topology: Topology, pin: str) -> Described:
     """Damping that actuators on the crank's pin bring along."""
     model = topology.model
     if pin != "O2":
         return {}
     return {
-        f"pins.O2.{name}": _numbers(getattr(model, field)[topology.drives()].sum(axis=0))
+        f"pins.O2.{name}": _read_numbers(getattr(model, field)[topology.drives()].sum(axis=0))
         for field, name in DRIVE.items()
         if hasattr(model, field)
     }
 
 
-def actuators(topology: Topology) -> Described:
+def describe_actuators(topology: Topology) -> Described:
     """Describe every actuator but the drive, which is taken off: what it acts on, where, and with which wrench."""
     model, result = topology.model, Described()
     for i in sorted({*range(len(model.actuator_trntype))} - {*topology.drives()}):
@@ -59,19 +59,19 @@ def actuators(topology: Topology) -> Described:
         gear = model.actuator_gear[out] * model.actuator_biasprm[i, 0]  # a control is 0: the bias is all there is
         site, frame = (int(number) for number in model.actuator_trnid[i])
         if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE:
-            result |= _at_site(topology, key, gear, site, frame)
+            result |= _resolve_at_site(topology, key, gear, site, frame)
         else:
-            result[key] = _target(topology, i)
-            result[f"{key}.gear"] = _numbers(gear)
-        result[f"{key}.biasprm"] = _numbers(model.actuator_biasprm[i, 1:])
+            result[key] = _describe_target(topology, i)
+            result[f"{key}.gear"] = _read_numbers(gear)
+        result[f"{key}.biasprm"] = _read_numbers(model.actuator_biasprm[i, 1:])
         for field, name in ACTUATOR.items():
-            result |= direct(model, field, i, f"{key}.{name}")
+            result |= read_row(model, field, i, f"{key}.{name}")
         for field in ACTUATOR_RANGES:
-            result |= limits(model, field, i, key)
+            result |= read_range(model, field, i, key)
     return result
 
 
-def _at_site(topology: Topology, key: str, gear: Array, site: int, frame: int) -> Described:
+def _resolve_at_site(topology: Topology, key: str, gear: Array, site: int, frame: int) -> Described:
     """Resolve a force along and across the linkage's plane in the axes that it keeps, (Fx, Fy, Fz, Mx, My, Mz)."""
     model, data = topology.model, topology.data
     bar, bearer = topology.bar(model.site_bodyid[site]), topology.bar(model.site_bodyid[frame if frame >= 0 else site])
@@ -88,7 +88,7 @@ def _at_site(topology: Topology, key: str, gear: Array, site: int, frame: int) -
     return {key: f"a site of {name}, in {turning}", f"{key}.site": at, f"{key}.gear": tuple(wrench)}
 
 
-def _target(topology: Topology, actuator: int) -> str:
+def _describe_target(topology: Topology, actuator: int) -> str:
     model = topology.model
     kind, number = model.actuator_trntype[actuator], int(model.actuator_trnid[actuator, 0])
     if kind in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
@@ -96,7 +96,7 @@ def _target(topology: Topology, actuator: int) -> str:
     return str(mujoco.mjtTrn(kind).name).removeprefix("mjTRN_").lower()
 
 
-def tendons(topology: Topology) -> Described:
+def describe_tendons(topology: Topology) -> Described:
     """Describe every tendon: over which pins or between which points, and what it does."""
     model, result = topology.model, Described()
     for i in range(model.ntendon):
@@ -105,18 +105,18 @@ def tendons(topology: Topology) -> Described:
         run = range(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i])
         spring = [float(x) for x in model.tendon_lengthspring[i]]
         if model.wrap_type[run[0]] == mujoco.mjtWrap.mjWRAP_JOINT:
-            result |= _over_pins(topology, key, run, spring, float(model.tendon_length0[i]))
+            result |= _read_fixed_tendon(topology, key, run, spring, float(model.tendon_length0[i]))
         else:
-            result |= _between_points(topology, key, run)
+            result |= _read_spatial_tendon(topology, key, run)
             result[f"{key}.springlength"] = tuple(spring)
         for field, name in TENDON.items():
-            result |= direct(model, field, i, f"{key}.{name}")
+            result |= read_row(model, field, i, f"{key}.{name}")
         for field in ("tendon_range", "tendon_actfrcrange"):
-            result |= limits(model, field, i, key)
+            result |= read_range(model, field, i, key)
     return result
 
 
-def _over_pins(topology: Topology, key: str, run: range, spring: Sequence[float], rest: float) -> Described:
+def _read_fixed_tendon(topology: Topology, key: str, run: range, spring: Sequence[float], rest: float) -> Described:
     """Read a fixed tendon: coefficients by pin, counter-clockwise positive; its spring by the angles of the bars."""
     model, turns = topology.model, {}
     for pin, joint in topology.hinge.items():
@@ -132,7 +132,7 @@ def _over_pins(topology: Topology, key: str, run: range, spring: Sequence[float]
     }
 
 
-def _between_points(topology: Topology, key: str, run: range) -> Described:
+def _read_spatial_tendon(topology: Topology, key: str, run: range) -> Described:
     """Read a spatial tendon: the points of the bars that it runs through; what it winds round counts as no point."""
     model, data = topology.model, topology.data
     bars, path = [], []

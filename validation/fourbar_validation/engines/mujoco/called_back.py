@@ -24,25 +24,25 @@ ActuatorForce = Callable[[mujoco.MjModel, mujoco.MjData], float]
 """The force of an actuator, in units of its gear."""
 
 
-def at_full_size(scene: Scene) -> Scene:
+def take_full_size(scene: Scene) -> Scene:
     """Give the scene with loads over theta_2 at the largest size that they ever have: what MJCF can say of them."""
     loads = []
     for load in scene.loads:
-        peak = _peak(load)
+        peak = _find_peak(load)
         force = None if load.force is None else (load.force[0] * peak, load.force[1])
         loads.append(replace(load, force=force, moment=load.moment * peak, table=None))
     return replace(scene, loads=tuple(loads))
 
 
-def _peak(load: Load) -> float:
+def _find_peak(load: Load) -> float:
     return 1.0 if load.table is None else max(map(abs, load.table.factor)) or 1.0
 
 
-def of_loads(scene: Scene) -> dict[str, ActuatorForce]:
+def evaluate_loads(scene: Scene) -> dict[str, ActuatorForce]:
     """Evaluate each load over theta_2, by the actuator's name: its factor at MuJoCo's own theta_2, by the largest."""
 
     def force_of(load: Load) -> ActuatorForce:
-        table, peak = load.table, _peak(load)
+        table, peak = load.table, _find_peak(load)
         assert table is not None
         first, last = table.theta_2[0], table.theta_2[-1]
 
@@ -57,7 +57,7 @@ def of_loads(scene: Scene) -> dict[str, ActuatorForce]:
     return {f"load_{index}": force_of(load) for index, load in enumerate(scene.loads, 1) if load.table is not None}
 
 
-def within(scene: Scene, theta_2: Array) -> Array:
+def clip_angles(scene: Scene, theta_2: Array) -> Array:
     """Put angles that overran the end of a table by a rounding of the motion back on it; LimitError beyond that."""
     inside = theta_2.copy()
     for load in scene.loads:
@@ -73,8 +73,8 @@ def within(scene: Scene, theta_2: Array) -> Array:
     return inside
 
 
-def receiving(loop: ClosedLoop, supplied: dict[str, ActuatorForce]) -> ClosedLoop:
-    """Let the actuators of these names in a loop take their force from `supplying`."""
+def receive_forces(loop: ClosedLoop, supplied: dict[str, ActuatorForce]) -> ClosedLoop:
+    """Let the actuators of these names in a loop take their force from `supply_forces`."""
     for number in range(loop.model.nu):
         if loop.model.actuator(number).name in supplied:
             loop.model.actuator_biastype[number] = mujoco.mjtBias.mjBIAS_USER
@@ -82,7 +82,7 @@ def receiving(loop: ClosedLoop, supplied: dict[str, ActuatorForce]) -> ClosedLoo
 
 
 @contextmanager
-def supplying(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
+def supply_forces(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
     """MuJoCo takes these forces as long as this lasts; its callbacks are of the whole process."""
     if not supplied:
         yield

@@ -8,7 +8,7 @@ import numpy as np
 from fourbar.mjcf.model import CYLINDER
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loaded import Assembled
-from fourbar_validation.engines.tree import closed
+from fourbar_validation.engines.tree import solve_closed
 
 CARRIED_BY = {"input": ("input",), "coupler": ("coupler", "input"), "output": ("output",)}
 """The bodies whose parent bears what acts on a body."""
@@ -80,7 +80,7 @@ class ClosedLoop(Assembled):
         """Start from own joint angles at the speed of a bar or of the stroke, with the gap kept closed."""
         mujoco.mj_resetData(self.model, self.data)
         self.place(q)
-        self.data.qvel[:3] = closed(self.jacobian()[:, :3], speed, self.drive_column(bar))
+        self.data.qvel[:3] = solve_closed(self.jacobian()[:, :3], speed, self.drive_column(bar))
 
     def forward(self) -> None:
         """Everything at the present state: after a Runge-Kutta step some fields are still of the step before."""
@@ -179,7 +179,7 @@ class ClosedLoop(Assembled):
         return sum(int(self.data.warning[kind].number) for kind in WARNINGS)
 
 
-def couple_elsewhere(
+def solve_couple_elsewhere(
     loop: ClosedLoop, light: ClosedLoop, drive_bar: int | None, alpha_2: float, crank_torque: float
 ) -> float | None:
     """Solve for what accelerates the crank as before; None where it does not move the crank.
@@ -209,12 +209,12 @@ def couple_elsewhere(
         mujoco.mj_forward(light.model, d)
         return float(d.qacc[O2])
 
-    couple = couple_for(crank_acceleration, happened, *trials)
+    couple = solve_couple(crank_acceleration, happened, *trials)
     mujoco.mj_rnePostConstraint(light.model, d)
     return couple
 
 
-def couple_for(
+def solve_couple(
     acceleration: Callable[[float], float], wanted: float, low: float, high: float, refinements: int = 0
 ) -> float | None:
     """Solve for the couple under which an acceleration, linear in it, is the wanted one, and which was evaluated last.

@@ -13,8 +13,8 @@ import numpy as np
 from fourbar.linkage import BAR_NAMES, FIRST_PIN
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.attached import Value
-from fourbar_validation.engines.mujoco.describe import ENUMERATIONS, described
-from fourbar_validation.engines.mujoco.fields import PIN
+from fourbar_validation.engines.mujoco.describe import ENUMERATIONS, describe_model
+from fourbar_validation.engines.mujoco.model_fields import PIN
 from fourbar_validation.engines.mujoco.topology import ENDS, Topology
 
 Edit = Callable[[Topology, mujoco.MjModel, list[str], Value], None]
@@ -52,11 +52,11 @@ def _switch_on(model: mujoco.MjModel, *flags: str) -> None:
         model.opt.disableflags &= ~int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}", 0))
 
 
-def _bar(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
+def _correct_bar(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
     """Mass, inertia or mass centre, the others of the bar kept; what is welded to it gives it all it has."""
     name, *part = rest
     bar, entry = NUMBER[name], ".".join(part)
-    here = described(topology)
+    here = describe_model(topology)
     entries = {each: here[f"bars.{name}.{each}"] for each in ("mass", "inertia", "centre.distance", "centre.angle")}
     if entry not in entries:
         raise KeyError(entry)
@@ -68,22 +68,22 @@ def _bar(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Valu
     model.body_iquat[root] = (1.0, 0.0, 0.0, 0.0)
     x, y = topology.line(topology.data, bar)
     turned = math.atan2(y, x) + angle
-    arm = _in_space(topology, distance * np.array([math.cos(turned), math.sin(turned)]))
-    model.body_ipos[root] = topology.point[bar, FIRST_PIN[bar]] + _turned(topology, bar).T @ arm
+    arm = _place_in_space(topology, distance * np.array([math.cos(turned), math.sin(turned)]))
+    model.body_ipos[root] = topology.point[bar, FIRST_PIN[bar]] + _rotate(topology, bar).T @ arm
     _settle(model)
 
 
-def _in_space(topology: Topology, vector: Array) -> Array:
+def _place_in_space(topology: Topology, vector: Array) -> Array:
     full = np.zeros(3)
     full[list(topology.axes)] = vector
     return full
 
 
-def _turned(topology: Topology, bar: int) -> Array:
+def _rotate(topology: Topology, bar: int) -> Array:
     return np.asarray(topology.data.xmat[topology.root[bar]].reshape(3, 3))
 
 
-def _length(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
+def _correct_length(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
     """Move a bar's pin along its line; whatever turns about it, or closes the loop there, goes with it."""
     bar = NUMBER[rest[0]]
     own = next((pin for pin, joint in topology.hinge.items() if model.body_weldid[model.jnt_bodyid[joint]]
@@ -91,13 +91,13 @@ def _length(topology: Topology, model: mujoco.MjModel, rest: list[str], value: V
     fixed = own or ENDS[bar][0]
     moved = next(pin for pin in ENDS[bar] if pin != fixed)
     line = topology.point[bar, moved] - topology.point[bar, fixed]
-    across = _turned(topology, bar).T @ topology.normal
+    across = _rotate(topology, bar).T @ topology.normal
     line = line - across * float(across @ line)
     shift = line * (float(value) / math.hypot(*line) - 1.0)  # type: ignore[arg-type]
     if moved in topology.hinge:
         child = int(model.jnt_bodyid[topology.hinge[moved]])
         parent = int(model.body_parentid[child])
-        frame = topology.data.xmat[parent].reshape(3, 3).T @ _turned(topology, bar)
+        frame = topology.data.xmat[parent].reshape(3, 3).T @ _rotate(topology, bar)
         model.body_pos[child] += frame @ shift
     else:
         _move_closure(topology, model, bar, shift)
@@ -113,17 +113,17 @@ def _move_closure(topology: Topology, model: mujoco.MjModel, bar: int, shift: Ar
     end = int((model.eq_obj1id if first else model.eq_obj2id)[number])
     if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
         body = int(model.site_bodyid[end])
-        frame = topology.data.xmat[body].reshape(3, 3).T @ _turned(topology, bar)
+        frame = topology.data.xmat[body].reshape(3, 3).T @ _rotate(topology, bar)
         model.site_pos[end] += frame @ shift
         model.site_sameframe[end] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         return
     swapped = model.eq_type[number] == mujoco.mjtEq.mjEQ_WELD  # it keeps the second body's anchor first
     start = 0 if first != swapped else 3
-    frame = topology.data.xmat[end].reshape(3, 3).T @ _turned(topology, bar)
+    frame = topology.data.xmat[end].reshape(3, 3).T @ _rotate(topology, bar)
     model.eq_data[number, start : start + 3] += frame @ shift
 
 
-def _gravity(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
+def _correct_gravity(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
     _switch_on(model, "GRAVITY")
     axis = topology.normal if rest == ["across"] else np.eye(3)[topology.axes["xy".index(rest[0])]]
     model.opt.gravity += axis * (float(value) - np.dot(axis, model.opt.gravity))  # type: ignore[arg-type]
@@ -145,7 +145,7 @@ def _pin(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Valu
         getattr(model, field)[row if field.startswith("dof") else joint] = value
 
 
-def _closure(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
+def _correct_closure(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
     (name,), number = rest, topology.closure
     if number is None:
         raise KeyError(name)
@@ -154,14 +154,14 @@ def _closure(topology: Topology, model: mujoco.MjModel, rest: list[str], value: 
     elif name == "impedance":
         model.eq_solimp[number, :2] = value
     elif name == "softness":
-        model.body_invweight0[:] *= float(value) / float(described(topology)["closure.softness"])  # type: ignore[arg-type]
+        model.body_invweight0[:] *= float(value) / float(describe_model(topology)["closure.softness"])  # type: ignore[arg-type]
     elif name == "impedance when open" and value == "the same":
         model.eq_solimp[number, 1] = model.eq_solimp[number, 0]
     else:
         raise KeyError(name)
 
 
-def _option(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
+def _correct_option(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
     name = rest[0]
     if name in ENUMERATIONS:
         kind, prefix = ENUMERATIONS[name]
@@ -173,19 +173,19 @@ def _option(topology: Topology, model: mujoco.MjModel, rest: list[str], value: V
         setattr(model.opt, name, int(value) if isinstance(now, int) else value)  # type: ignore[arg-type]
 
 
-def _contacts(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
+def _correct_contacts(topology: Topology, model: mujoco.MjModel, rest: list[str], value: Value) -> None:
     if value != "off":
         raise KeyError("contacts")
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 
 
 EDITS: Mapping[str, Edit] = {
-    "bars": _bar,
-    "lengths": _length,
-    "gravity": _gravity,
+    "bars": _correct_bar,
+    "lengths": _correct_length,
+    "gravity": _correct_gravity,
     "pins": _pin,
-    "closure": _closure,
-    "option": _option,
-    "contacts": _contacts,
+    "closure": _correct_closure,
+    "option": _correct_option,
+    "contacts": _correct_contacts,
 }
 """By the first word of a key; actuators and tendons cannot be made of nothing in a compiled model."""

@@ -7,8 +7,15 @@ import mujoco
 import numpy as np
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar_validation.engines.mujoco.attached import Described, actuators, direct, limits, on_the_drive, tendons
-from fourbar_validation.engines.mujoco.fields import COUNTED, FLAGS, PIN, list_of, members
+from fourbar_validation.engines.mujoco.attached import (
+    Described,
+    describe_actuators,
+    describe_tendons,
+    read_range,
+    read_row,
+    sum_damping_of_drive,
+)
+from fourbar_validation.engines.mujoco.model_fields import COUNTED, FLAGS, PIN, list_members, list_of
 from fourbar_validation.engines.mujoco.topology import ENDS, Topology
 
 NOT_HERE = ("opt", "stat", "vis")
@@ -19,7 +26,7 @@ OPTIONS = (
 )
 
 
-def described(topology: Topology) -> Described:
+def describe_model(topology: Topology) -> Described:
     """Lengths, masses, pins, closure, drive and options as compiled; numbers in SI and rad."""
     model = topology.model
     result: Described = {"plane": topology.plane}
@@ -27,15 +34,15 @@ def described(topology: Topology) -> Described:
         result[f"lengths.{name}"] = topology.length(bar)
     result["lengths.ground_angle"] = topology.ground_angle
     for bar in MOVING_BARS:
-        result |= _bar(topology, bar)
-    gravity = model.opt.gravity * _on(model, "GRAVITY")
+        result |= _describe_bar(topology, bar)
+    gravity = model.opt.gravity * _is_on(model, "GRAVITY")
     result["gravity.x"], result["gravity.y"] = (float(g) for g in topology.in_plane(gravity))
     result["gravity.across"] = float(gravity @ topology.normal)
     for pin, joint in sorted(topology.hinge.items()):
         result |= _pin(topology, pin, joint)
-    result |= _closure(topology)
-    result |= _options(model)
-    result |= actuators(topology) | tendons(topology)
+    result |= _describe_closure(topology)
+    result |= _describe_options(model)
+    result |= describe_actuators(topology) | describe_tendons(topology)
     others = [
         model.equality(i).name or f"(unnamed {i})"
         for i in range(model.neq)
@@ -44,13 +51,13 @@ def described(topology: Topology) -> Described:
     result["other equalities"] = ", ".join(others) or "none"
     result |= {f"others.{name}": float(getattr(model, field, 0)) for field, name in COUNTED.items()}
     for thing in (model, model.opt, model.stat):
-        for field in members(thing):
+        for field in list_members(thing):
             if field not in NOT_HERE and list_of(field) is None:
                 result[f"unknown.{field}"] = np.array2string(np.asarray(getattr(thing, field)), threshold=2**10)
     return result
 
 
-def called(topology: Topology) -> dict[str, str]:
+def find_element(topology: Topology) -> dict[str, str]:
     """Part of a key: the element of the user's file that it is of."""
     model = topology.model
 
@@ -68,13 +75,13 @@ def called(topology: Topology) -> dict[str, str]:
     return result | {f"tendons.{i}": element("tendon", model.tendon(i).name, i) for i in range(model.ntendon)}
 
 
-def _on(model: mujoco.MjModel, *features: str) -> bool:
+def _is_on(model: mujoco.MjModel, *features: str) -> bool:
     """Tell whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
     flags = mujoco.mjtDisableBit
     return not any(model.opt.disableflags & getattr(flags, f"mjDSBL_{name}", 0) for name in features)
 
 
-def _bar(topology: Topology, bar: int) -> Described:
+def _describe_bar(topology: Topology, bar: int) -> Described:
     """Mass, mass centre from the first pin, and inertia about it, of a body and all that is welded to it."""
     model, data = topology.model, topology.data
     parts = np.flatnonzero(model.body_weldid == topology.root[bar])
@@ -98,11 +105,11 @@ def _bar(topology: Topology, bar: int) -> Described:
 def _pin(topology: Topology, pin: str, joint: int) -> Described:
     model = topology.model
     dof = model.jnt_dofadr[joint]
-    spring, damper = (float(_on(model, name, "PASSIVE")) for name in ("SPRING", "DAMPER"))
+    spring, damper = (float(_is_on(model, name, "PASSIVE")) for name in ("SPRING", "DAMPER"))
     key = f"pins.{pin}"
     result: Described = {
         f"{key}.damping": damper * float(model.dof_damping[dof]),
-        f"{key}.friction": float(model.dof_frictionloss[dof]) * _on(model, "FRICTIONLOSS"),
+        f"{key}.friction": float(model.dof_frictionloss[dof]) * _is_on(model, "FRICTIONLOSS"),
         f"{key}.stiffness": spring * float(model.jnt_stiffness[joint]),
         f"{key}.armature": float(model.dof_armature[dof]),
         f"{key}.positive": "counter-clockwise" if topology.sense[pin] > 0 else "clockwise",
@@ -111,13 +118,13 @@ def _pin(topology: Topology, pin: str, joint: int) -> Described:
     turned = topology.sense[pin] * float(model.qpos_spring[address] - model.qpos0[address])
     result[f"{key}.spring angle"] = topology.rest_angle(pin) + turned
     for field, name in PIN.items():
-        result |= direct(model, field, dof if field.startswith("dof") else joint, f"{key}.{name}")
+        result |= read_row(model, field, dof if field.startswith("dof") else joint, f"{key}.{name}")
     for field in ("jnt_range", "jnt_actfrcrange"):
-        result |= limits(model, field, joint, key, switched_on=field != "jnt_range" or _on(model, "LIMIT"))
-    return result | on_the_drive(topology, pin)
+        result |= read_range(model, field, joint, key, switched_on=field != "jnt_range" or _is_on(model, "LIMIT"))
+    return result | sum_damping_of_drive(topology, pin)
 
 
-def _closure(topology: Topology) -> Described:
+def _describe_closure(topology: Topology) -> Described:
     model, number = topology.model, topology.closure
     result: Described = {"closure.pin": topology.cut, "closure.by": topology.closed_by}
     first, second = (bar for bar, ends in ENDS.items() if topology.cut in ends)
@@ -138,7 +145,7 @@ def _closure(topology: Topology) -> Described:
     return result
 
 
-def _options(model: mujoco.MjModel) -> Described:
+def _describe_options(model: mujoco.MjModel) -> Described:
     option = model.opt
     result: Described = {}
     for name in OPTIONS:
@@ -160,5 +167,5 @@ def _options(model: mujoco.MjModel) -> Described:
         result[f"option.switched {state}"] = ", ".join(names) or "nothing that matters here"
     groups = [str(group) for group in range(31) if option.disableactuator >> group & 1]
     result["option.actuatorgroupdisable"] = " ".join(groups) or "none"
-    possible = _on(model, "CONTACT") and (model.npair or (model.geom_contype.any() and model.geom_conaffinity.any()))
+    possible = _is_on(model, "CONTACT") and (model.npair or (model.geom_contype.any() and model.geom_conaffinity.any()))
     return result | {"contacts": "possible" if possible else "off"}

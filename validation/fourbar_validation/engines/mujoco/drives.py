@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from xml.etree import ElementTree as ET
 
-from fourbar.mjcf.model import text as numbers
+from fourbar.mjcf.model import join as numbers
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 
 WHEEL = 1e8
@@ -127,7 +127,7 @@ StiffWheelEquality = partial(WheelEquality, softness=1e-8)
 """Its softness edited down as far as the closure's is by the pads."""
 
 
-def without(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str:
+def remove_attributes(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str:
     """Remove these attributes of the elements at these paths from a text: what they say is left to MuJoCo."""
     root = ET.fromstring(mjcf)
     for path, names in attributes.items():
@@ -138,8 +138,10 @@ def without(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def all_defaults(mjcf: str, _: float = 0.0) -> ClosedLoop:
+def restore_defaults(mjcf: str, _: float = 0.0) -> ClosedLoop:
     """solref, solimp and the solver left to MuJoCo: 0.02 s, impedance 0.9 to 0.95, Newton to 1e-8."""
     return ClosedLoop(
-        without(mjcf, {"option": ("solver", "tolerance", "iterations"), "equality/connect": ("solref", "solimp")})
+        remove_attributes(
+            mjcf, {"option": ("solver", "tolerance", "iterations"), "equality/connect": ("solref", "solimp")}
+        )
     )

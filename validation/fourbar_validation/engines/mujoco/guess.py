@@ -8,7 +8,7 @@ import mujoco
 
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar_validation.engines.mujoco.topology import Topology, bodies_of, body_named, stated_body
+from fourbar_validation.engines.mujoco.topology import Topology, find_body, find_stated_body, list_bodies
 
 ROLES = tuple(BAR_NAMES[bar] for bar in MOVING_BARS)
 SITES = ("B3", "B4")
@@ -30,8 +30,8 @@ def find_topology(
     Raises InputError in one line: why no three bodies fit.
     """
     known = {role: names.get(role, role) for role in (*ROLES, *SITES)}
-    bodies = [stated_body(model, names, role) if role in names else body_named(model, role) for role in ROLES]
-    if None not in bodies and (_site(model, known["B3"]) or names.keys() & {*SITES} or not _open_sites(model)):
+    bodies = [find_stated_body(model, names, role) if role in names else find_body(model, role) for role in ROLES]
+    if None not in bodies and (_find_site(model, known["B3"]) or names.keys() & {*SITES} or not _open_sites(model)):
         return Topology(model, names), []
     candidates = sorted({int(model.body_weldid[model.jnt_bodyid[joint]]) for joint in range(model.njnt)})
     free = [body for body in candidates if body not in bodies]
@@ -43,10 +43,10 @@ def find_topology(
         if not all(guess.values()):
             refused.append("a body without a name, which --name cannot state either")
             continue
-        for sites in _sites(model, {**known, **guess}, names):
+        for sites in _list_sites(model, {**known, **guess}, names):
             try:
                 topology = Topology(model, {**names, **guess, **sites})
-                result.append((_misfit(topology, lengths), not topology.drives(), topology, {**guess, **sites}))
+                result.append((_measure_misfit(topology, lengths), not topology.drives(), topology, {**guess, **sites}))
             except InputError as error:
                 refused.append(error.allowed)
     if not result:
@@ -57,14 +57,14 @@ def find_topology(
         )
         why = refused[0] if refused else few
         nowhere = f"no body is named {', '.join(missing) or 'B3, B4'}, and no guess makes a four-bar ({why})"
-        raise InputError("MJCF", bodies_of(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
+        raise InputError("MJCF", list_bodies(model), f"{nowhere}; say which is which: --name input=BODY, and so on")
     best = min(each[0] for each in result)
     _, _, topology, guessed = min((each for each in result if each[0] <= best + ALIKE), key=lambda each: each[1])
     pairs = ", ".join(f"{role}={name}" for role, name in guessed.items())
     return topology, [f"guessed from what hangs together and from the lengths: {pairs} (--name states it otherwise)"]
 
 
-def _site(model: mujoco.MjModel, name: str) -> bool:
+def _find_site(model: mujoco.MjModel, name: str) -> bool:
     return bool(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name) >= 0)
 
 
@@ -74,17 +74,17 @@ def _open_sites(model: mujoco.MjModel) -> bool:
     return not any(kinds(kind) in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) for kind in model.eq_type)
 
 
-def _sites(model: mujoco.MjModel, known: Mapping[str, str], names: Mapping[str, str]) -> list[dict[str, str]]:
+def _list_sites(model: mujoco.MjModel, known: Mapping[str, str], names: Mapping[str, str]) -> list[dict[str, str]]:
     """List pairs of sites that may mark pin B; none need be given where a connect or a weld closes the loop."""
-    if not _open_sites(model) or names.keys() & {*SITES} or _site(model, known["B3"]):
+    if not _open_sites(model) or names.keys() & {*SITES} or _find_site(model, known["B3"]):
         return [{}]
     on = {role: [model.site(i).name for i in range(model.nsite) if model.site(i).name
-                 and int(model.body_weldid[model.site_bodyid[i]]) == body_named(model, known[role])]
+                 and int(model.body_weldid[model.site_bodyid[i]]) == find_body(model, known[role])]
           for role in ("coupler", "output")}  # fmt: skip
     return [{"B3": three, "B4": four} for three in on["coupler"] for four in on["output"]]
 
 
-def _misfit(topology: Topology, lengths: Sequence[float]) -> float:
+def _measure_misfit(topology: Topology, lengths: Sequence[float]) -> float:
     """Measure how far its lengths are from the scene's: the sum of |log ratio|."""
     theirs = [topology.length(bar) for bar in BAR_NAMES]
     if min(theirs) <= 0.0:

@@ -10,18 +10,18 @@ import numpy as np
 from fourbar.errors import LimitError
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.description import FIRST_PIN, parts, unknown_effect
-from fourbar_validation.engines.effects import TERM_OF, acting
+from fourbar_validation.engines.description import FIRST_PIN, find_unknown, list_parts
+from fourbar_validation.engines.effects import TERM_OF, list_acting
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.tree import Tree
 
 
-def refusal(scene: Scene) -> str:
+def find_refusal(scene: Scene) -> str:
     """Name the declared limit that a scene meets, if any."""
-    if reason := unknown_effect(scene, TERM_OF, linear=True):
+    if reason := find_unknown(scene, TERM_OF, linear=True):
         return reason
-    for part in parts(scene.linkage):
+    for part in list_parts(scene.linkage):
         if min(part.mass, part.inertia) < LIGHTEST.boundary:
             return (
                 f"bar {part.bar} has mass {part.mass:g} kg and inertia {part.inertia:g} kg m^2; "
@@ -37,7 +37,7 @@ class MujocoTree(Tree):
         spec = mujoco.MjSpec()
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT
         bodies: dict[int, Any] = {1: spec.worldbody}
-        for part in parts(scene.linkage):
+        for part in list_parts(scene.linkage):
             body = bodies[part.bar] = bodies[part.bearer].add_body(name=f"bar{part.bar}", pos=[*part.first_pin, 0.0])
             body.explicitinertial = True
             body.mass, body.ipos, body.inertia = part.mass, [*part.centre, 0.0], [part.inertia] * 3
@@ -61,7 +61,7 @@ class MujocoTree(Tree):
         self.at = {name: self.data.site_xpos[site, :2] for name, site in self.site.items()}
         self.turned_to = {bar: self.data.xmat[body].reshape(3, 3)[:2, :2] for bar, body in self.body.items()}
         self._jac, self._dot = np.zeros((3, 3)), np.zeros((3, 3))
-        self.ready(scene, acting(scene, self))
+        self.ready(scene, list_acting(scene, self))
 
     def place(self, q: Sequence[float]) -> None:
         """Bodies, sites and the axes of the Jacobians at q."""
@@ -124,11 +124,11 @@ class MujocoInverse(Exact):
     """Trees in the memory of the one before: allocating it takes MuJoCo longer than all its work."""
 
     def __init__(self) -> None:
-        super().__init__("mujoco-inverse", self._tree)
+        super().__init__("mujoco-inverse", self._make_tree)
         self.data: mujoco.MjData | None = None
 
-    def _tree(self, scene: Scene) -> MujocoTree:
-        if reason := refusal(scene):
+    def _make_tree(self, scene: Scene) -> MujocoTree:
+        if reason := find_refusal(scene):
             raise LimitError(reason)
         tree = MujocoTree(scene, self.data)
         self.data = tree.data

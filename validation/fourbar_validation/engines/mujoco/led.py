@@ -15,18 +15,18 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
-from fourbar.mjcf import RECIPE, Settings, mjcf
+from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.settings import FULL_TURN
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
-from fourbar_validation.engines.free_body_stroke import turned_by
-from fourbar_validation.engines.limits import least_sine
+from fourbar_validation.engines.free_body_stroke import find_angle
+from fourbar_validation.engines.limits import compute_least_sine
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.mujoco.called_back import at_full_size
+from fourbar_validation.engines.mujoco.called_back import take_full_size
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.motions import Steady
-from fourbar_validation.engines.mujoco.runner import assembled
-from fourbar_validation.engines.tree import closed
+from fourbar_validation.engines.mujoco.runner import find_assembled
+from fourbar_validation.engines.tree import solve_closed
 
 MOST_UNEVEN = 20.0
 """Greatest speed of the input over its mean: near a limit of what is commanded it grows without bound, and with it the
@@ -40,15 +40,15 @@ class Lead:
         motion = scene.motion
         if motion.law is not None:
             raise LimitError("a motion law of another bar than the input is not run through time here")
-        still = replace(at_full_size(scene), motion=Motion(0.0, 1.0))
-        self.loop = loop = ClosedLoop(mjcf(still, replace(RECIPE, timestep=1e-3), keyframe=False))
+        still = replace(take_full_size(scene), motion=Motion(0.0, 1.0))
+        self.loop = loop = ClosedLoop(write_mjcf(still, replace(RECIPE, timestep=1e-3), keyframe=False))
         self.bar = None if command.stroke is not None else command.bar
         """None: the stroke."""
         if command.stroke is not None:
-            command = turned_by(command, motion, *loop.cylinder(command.bar))
+            command = find_angle(command, motion, *loop.cylinder(command.bar))
         self.command, self.values = command, command.angle if command.stroke is None else command.stroke
         self.speed, self.acceleration = float(np.max(motion.speed or 0.0)), float(np.max(motion.acceleration))
-        found = assembled(Assembler(loop, command.bar), command, range(len(self.values)))
+        found = find_assembled(Assembler(loop, command.bar), command, range(len(self.values)))
         self.closes = np.array([q is not None for q in found])
         if not self.closes.any():
             raise LimitError("the loop closes at none of the positions")
@@ -78,13 +78,15 @@ class Lead:
         loop.model, loop.data = model, data
         drift = (loop.rate_at("B3") - loop.rate_at("B4")) @ data.qvel
         due = self.acceleration - loop.drive_drift(self.bar)
-        return float(closed(loop.jacobian(), due, loop.drive_column(self.bar), *drift.tolist())[O2])
+        return float(solve_closed(loop.jacobian(), due, loop.drive_column(self.bar), *drift.tolist())[O2])
 
     def least_sine(self) -> float:
         """Compute the least |sin(theta_4 - theta_3)| on the way; 0 where it changes its sign."""
         if np.ptp(self.of_input.branch):
             return 0.0
-        return least_sine(self.scene.linkage, self.of_input.theta_2, np.ones(len(self.of_input.theta_2), dtype=bool))
+        return compute_least_sine(
+            self.scene.linkage, self.of_input.theta_2, np.ones(len(self.of_input.theta_2), dtype=bool)
+        )
 
 
 class Led(Steady):

@@ -15,7 +15,7 @@ MOST = 200_000
 """Steps: a drive that does not get through its range in these is stopped."""
 
 
-def moved(mjcf: str, scene: Scene, low: float, high: float) -> tuple[Command, dict[str, Array]]:
+def step_through(mjcf: str, scene: Scene, low: float, high: float) -> tuple[Command, dict[str, Array]]:
     """Step a model from its keyframe until theta_2 leaves the range: the motion that happened, and what it read.
 
     Angle of the output, torque on the input, the forces of bars 1, 2 and 1 on bars 2, 3 and 4 that their joints carry

@@ -21,7 +21,7 @@ import numpy as np
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
-from fourbar_validation.engines.tree import multipliers
+from fourbar_validation.engines.tree import solve_multipliers
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ OF_THE_DATA = {
 """What the data of the simulation tell without a second look."""
 
 
-def alarms(evidence: dict[str, float], size: float) -> list[str]:
+def list_alarms(evidence: dict[str, float], size: float) -> list[str]:
     """Say what is wrong with a run.
 
     Parameters
@@ -120,7 +120,7 @@ class ResidualMonitor:
         unbalanced = float(np.linalg.norm(seen.needed - carried - seen.drive * torque))
         self._keep("force_gap", unbalanced, float(np.linalg.norm(seen.needed) + np.linalg.norm(carried)))
         try:
-            closed = self._closed(q, v, a, seen)
+            closed = self._close(q, v, a, seen)
         except np.linalg.LinAlgError:  # exactly at a limit position nothing closes the loop
             return dict.fromkeys(seen.answer, math.inf)
         expected = {name: float(np.linalg.norm(value - closed.answer[name])) for name, value in seen.answer.items()}
@@ -153,16 +153,16 @@ class ResidualMonitor:
         for name, x in (("theta", q), ("omega", v), ("alpha", a)):
             answer[f"{name}_3"], answer[f"{name}_4"] = x[O2] + x[A], x[O4]
         try:
-            result = multipliers(jacobian, drive, needed)
+            result = solve_multipliers(jacobian, drive, needed)
         except np.linalg.LinAlgError:
             result = np.full(3, np.inf)
         answer |= {"F43": result[:2], self.drive: result[2]}
-        answer |= self._pins(result[:2], float(result[2]))
+        answer |= self._compute_pins(result[:2], float(result[2]))
         jerk = jacobian @ a + (rate_3 - rate_4) @ v
         a_B = bars.jacobian_at("B4") @ a + rate_4 @ v
         return _Motion(gap, jacobian @ v, jerk, a_B, jacobian, drive, needed, answer)
 
-    def _pins(self, loop_force: Array, drive: float) -> dict[str, Array]:
+    def _compute_pins(self, loop_force: Array, drive: float) -> dict[str, Array]:
         """F12, F32, F14: what carries the bars on the open tree, and the loop force put back."""
         bars, d = self.bars, self.bars.data
         if self.drive_bar is None:  # its line crosses the pins, a couple does not
@@ -173,7 +173,7 @@ class ResidualMonitor:
         on = bars.carried()
         return {"F14": on["output"] + loop_force, "F32": -(on["coupler"] - loop_force), "F12": on["input"] - loop_force}
 
-    def _closed(self, q: Array, v: Array, a: Array, seen: _Motion) -> _Motion:
+    def _close(self, q: Array, v: Array, a: Array, seen: _Motion) -> _Motion:
         """Close the loop at the same theta_2, omega_2, alpha_2 in position, velocity and acceleration."""
         q, v, a = q.copy(), v.copy(), a.copy()
         others = [A, O4]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.mjcf import Settings, run_through
+from fourbar.mjcf import Settings, choose_run
 from fourbar.mjcf.settings import FULL_TURN
 from fourbar.scene import Command
 from fourbar.scene.motion_law import Law
@@ -30,7 +30,7 @@ class Steady:
     def __init__(self, theta_2: Array, segment: Sequence[int], omega: float, alpha: float) -> None:
         self.theta_2 = theta_2
         commanded = theta_2[list(segment)]
-        self.run = run_through(commanded, omega, alpha)
+        self.run = choose_run(commanded, omega, alpha)
         self.width = len(np.unique(commanded)) - 1
         self.omega = omega
         self.fastest = self.turning = self.run.fastest
@@ -95,7 +95,7 @@ class Lawful:
 MotionSegment = Steady | Lawful
 
 
-def extremes(law: Law) -> tuple[float, float]:
+def find_extremes(law: Law) -> tuple[float, float]:
     """Greatest |omega_2| and |alpha_2| of a law: what flywheel and closure are laid out for."""
     _, omega, alpha = law.at(np.linspace(law.time[0], law.time[-1], LOOKED_AT))
     return float(np.abs(omega).max()), float(np.abs(alpha).max())

@@ -1,6 +1,6 @@
 """Off-screen pictures of MJCF texts by MuJoCo's own renderer, in a process of their own.
 
-A missing or broken OpenGL may end the process that asks for it, so `pictures` asks from outside:
+A missing or broken OpenGL may end the process that asks for it, so `render_pictures` asks from outside:
 ``python -m fourbar_validation.engines.mujoco.picture`` reads {name: MJCF} and answers {name: base64 of a PNG}.
 """
 
@@ -20,7 +20,7 @@ BACKENDS = ("egl", "osmesa") if sys.platform == "linux" else ("glfw",)
 """Values of MUJOCO_GL that are tried where the environment does not name one."""
 
 
-def pictures(texts: dict[str, str]) -> tuple[dict[str, str], str]:
+def render_pictures(texts: dict[str, str]) -> tuple[dict[str, str], str]:
     """Base64 PNGs of MJCF texts at their keyframes, and the reason where there are none."""
     if not texts:
         return {}, ""
@@ -50,11 +50,11 @@ def draw(texts: dict[str, str]) -> dict[str, str]:
     import matplotlib.image
     import mujoco
 
-    from fourbar_validation.engines.mujoco.stepping import opened
+    from fourbar_validation.engines.mujoco.stepping import open_model
 
     drawn = {}
     for name, text in texts.items():
-        model, data = opened(text)
+        model, data = open_model(text)
         with mujoco.Renderer(model, HEIGHT, WIDTH) as renderer:
             renderer.update_scene(data, camera="plane")
             png = io.BytesIO()

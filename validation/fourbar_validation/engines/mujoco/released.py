@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.mjcf import RECIPE, mjcf
+from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.scene import Scene, command
 from fourbar_validation.compare.answer import Array, Released
 from fourbar_validation.engines.loop import Assembler, LimitDetector
@@ -39,7 +39,7 @@ class MujocoForward:
         settings = replace(RECIPE, flywheel=0.0, timestep=timestep, time_constant_steps=TIME_CONSTANT_STEPS, pad=None)
         bare = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0))
         try:
-            loop = ClosedLoop(mjcf(bare, settings, keyframe=False))
+            loop = ClosedLoop(write_mjcf(bare, settings, keyframe=False))
         except InputError as error:
             return Released.refused(NAME, setting, str(error))
         q_0 = Assembler(loop).find(float(start.theta_2[0]), int(start.branch[0]))
@@ -72,17 +72,17 @@ class _Work:
         dry = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
         self.any = bool(model.nu or damped or dry)
         mujoco.mj_forward(model, data)
-        self.before = self._power()
+        self.before = self._compute_power()
 
     def add(self) -> None:
         """Add the step just made; after a Runge-Kutta step some fields are still of the step before."""
         if self.any:
             mujoco.mj_forward(self.model, self.data)
-            now = self._power()
+            now = self._compute_power()
             self.done += 0.5 * self.timestep * (self.before + now)
             self.before = now
 
-    def _power(self) -> float:
+    def _compute_power(self) -> float:
         d = self.data
         rubbing = np.isin(d.efc_type, FRICTION)
         own = float(d.qvel @ (d.qfrc_actuator + d.qfrc_damper))

@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import mujoco
 
-from fourbar.mjcf.effects import unwound
+from fourbar.mjcf.effects import unwind
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop, couple_elsewhere
+from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop, solve_couple_elsewhere
 from fourbar_validation.engines.mujoco.motions import MotionSegment
 
 LIGHT_FLYWHEEL = 1e4
@@ -69,7 +69,7 @@ class SimulatedRun:
         timestep: float,
     ) -> None:
         self.scene, self.loop, self.light, self.motion_segment = scene, loop, light, motion_segment
-        wound = unwound(scene, start)
+        wound = unwind(scene, start)
         self.turns = wound[O2] - start[O2]
         """Whole turns by which MuJoCo's theta_2 is ahead: springs at pins count them, rad."""
         loop.set_state(wound, motion_segment.omega, motion_segment.bar)
@@ -89,11 +89,11 @@ class SimulatedRun:
         torque = self.loop.crank_torque()
         if self.light is None:
             return Reading(torque, self.loop.forces())
-        couple = couple_elsewhere(self.loop, self.light, self.scene.drive_bar, self.loop.given(), torque)
+        couple = solve_couple_elsewhere(self.loop, self.light, self.scene.drive_bar, self.loop.given(), torque)
         return Reading(couple, self.light.forces())
 
 
-def assembled(position: Assembler, command: Command, order: Iterable[int]) -> list[Found]:
+def find_assembled(position: Assembler, command: Command, order: Iterable[int]) -> list[Found]:
     """Own joint angles of every commanded position, found one after the other in an order."""
     result: list[Found] = [None] * len(command.angle)
     for index in order:

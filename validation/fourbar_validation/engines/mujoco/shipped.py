@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError, LimitError, NotAssembledError
-from fourbar.mjcf import mjcf
+from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar_validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
 from fourbar_validation.compare.tolerance import EPS, SIMULATED, K
-from fourbar_validation.engines.limits import FASTEST, NEAREST_TOGGLE, least_sine
+from fourbar_validation.engines.limits import FASTEST, NEAREST_TOGGLE, compute_least_sine
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 
 NAME = "mujoco-simulated"
@@ -25,13 +25,13 @@ SPEED = 100.0 * SIMULATED.factor
 """Of the speed: what loads and the closure make of it in as many steps, ten times what was measured."""
 
 
-def shipped(name: str, scene: Scene, at: Command) -> Row | None:
+def compare_shipped(name: str, scene: Scene, at: Command) -> Row | None:
     """Compare the file's rest pose, its keyframe and its drive; give the worst, None where nothing moves."""
     omega = scene.motion.omega_2
     if not omega or scene.motion.law is not None:
         return None
     try:
-        loop = ClosedLoop(mjcf(scene))
+        loop = ClosedLoop(write_mjcf(scene))
     except (InputError, LimitError, NotAssembledError):  # no file is shipped; the simulation's own row says why
         return None
     d, size = loop.data, math.fsum(scene.linkage.lengths)
@@ -59,27 +59,27 @@ def shipped(name: str, scene: Scene, at: Command) -> Row | None:
         moving = omega
     else:  # a motor: on from the keyframe
         moving = omega + scene.motion.alpha_2 * STEPS * loop.model.opt.timestep
-    if (beyond := _not_driven(scene, omega, float(d.qpos[O2]), STEPS * loop.model.opt.timestep)) is not None:
-        error, reason = _worst(result)
+    if (beyond := _find_not_driven(scene, omega, float(d.qpos[O2]), STEPS * loop.model.opt.timestep)) is not None:
+        error, reason = _find_worst(result)
         verdict, reason = (FAILS, reason) if error > 1.0 else (UNDECIDED, f"the drive is not run: {beyond}")
         return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
     mujoco.mj_step(loop.model, d, STEPS)
     lost = d.time < 0.5 * STEPS * loop.model.opt.timestep
     speed = math.inf if lost else abs(float(d.qvel[O2]) - moving) / (SPEED * max(abs(omega), abs(moving)))
     result.append((speed, f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of {moving:.6g} rad/s"))
-    error, reason = _worst(result)
+    error, reason = _find_worst(result)
     verdict = AGREES if error <= 1.0 else FAILS
     return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
 
 
-def _worst(found: list[tuple[float, str]]) -> tuple[float, str]:
+def _find_worst(found: list[tuple[float, str]]) -> tuple[float, str]:
     return max(found, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
 
 
-def _not_driven(scene: Scene, omega_2: float, theta_2: float, seconds: float) -> str | None:
+def _find_not_driven(scene: Scene, omega_2: float, theta_2: float, seconds: float) -> str | None:
     """Name the declared limit of the simulation that the first steps meet, if any."""
     if abs(omega_2) > FASTEST.boundary:
         return FASTEST.reason
     ahead = np.array([theta_2, theta_2 + omega_2 * seconds])
-    least = least_sine(scene.linkage, ahead, np.array([True, True]))
+    least = compute_least_sine(scene.linkage, ahead, np.array([True, True]))
     return None if least >= NEAREST_TOGGLE.boundary else NEAREST_TOGGLE.reason

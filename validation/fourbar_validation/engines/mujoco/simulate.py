@@ -9,31 +9,31 @@ from functools import partial
 import numpy as np
 
 from fourbar.errors import InputError, LimitError
-from fourbar.mjcf import RECIPE, Settings, mjcf
-from fourbar.mjcf.document import mass_ratio
-from fourbar.mjcf.effects import unwound
+from fourbar.mjcf import RECIPE, Settings, write_mjcf
+from fourbar.mjcf.document import compute_mass_ratio
+from fourbar.mjcf.effects import unwind
 from fourbar.mjcf.model import CYLINDER
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar.scene.motion_law import COMMANDS
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines.description import driving, speeds, unknowns
-from fourbar_validation.engines.limits import NEAREST_TOGGLE, least_sine, too_fast_or_loaded
+from fourbar_validation.engines.description import list_speeds, list_unknowns, name_driving
+from fourbar_validation.engines.limits import NEAREST_TOGGLE, compute_least_sine, find_exceeded
 from fourbar_validation.engines.loaded import Values
-from fourbar_validation.engines.loop import MADE, Assembler, blank
+from fourbar_validation.engines.loop import MADE, Assembler, make_blank
 from fourbar_validation.engines.mujoco.called_back import (
     ActuatorForce,
-    at_full_size,
-    of_loads,
-    receiving,
-    supplying,
-    within,
+    clip_angles,
+    evaluate_loads,
+    receive_forces,
+    supply_forces,
+    take_full_size,
 )
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.mujoco.led import Lead, Led
-from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, alarms
-from fourbar_validation.engines.mujoco.motions import Lawful, MotionSegment, Steady, extremes, order_in_time
-from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, split_segments
+from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, list_alarms
+from fourbar_validation.engines.mujoco.motions import Lawful, MotionSegment, Steady, find_extremes, order_in_time
+from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, find_assembled, split_segments
 
 SHARED = (
     "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; what is commanded or the "
@@ -61,11 +61,14 @@ class MujocoSimulated:
         """Run the sweep through in time; read every quantity at the crank's own angle, speed and acceleration."""
         began = time.perf_counter()
         try:
-            refusal, lead = _refusal_of_motion(scene, command), None
+            refusal, lead = _find_refusal_of_motion(scene, command), None
             if refusal is None and (command.bar != 2 or command.stroke is not None):
                 lead = Lead(scene, command)
                 scene, command = lead.scene, lead.command
-            if refusal is None and (refusal := _refusal(scene, command if lead is None else lead.of_input)) is None:
+            if (
+                refusal is None
+                and (refusal := _find_refusal(scene, command if lead is None else lead.of_input)) is None
+            ):
                 answer = _Simulation(self.settings, scene, command, lead).answer()
         except (LimitError, InputError) as error:  # anything else is a failure, not a declared limit
             refusal = str(error)
@@ -75,7 +78,7 @@ class MujocoSimulated:
         return answer
 
 
-def _refusal_of_motion(scene: Scene, command: Command) -> str | None:
+def _find_refusal_of_motion(scene: Scene, command: Command) -> str | None:
     """Say why there is no motion to simulate, or None."""
     if scene.motion.free is not None:
         return "a free motion has no commanded sweep"
@@ -84,15 +87,15 @@ def _refusal_of_motion(scene: Scene, command: Command) -> str | None:
     return None
 
 
-def _refusal(scene: Scene, command: Command) -> str | None:
+def _find_refusal(scene: Scene, command: Command) -> str | None:
     """Say why this motion of the input is not simulated, or None."""
     law = scene.motion.law if command.time is not None else None
-    if law is None and any(np.ptp(values) != 0.0 for values in speeds(command)):
+    if law is None and any(np.ptp(values) != 0.0 for values in list_speeds(command)):
         return "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
     if np.ptp(command.theta_2) == 0.0:
         return "one position: nothing to run through"
-    run = as_run(scene, command)
-    reason = too_fast_or_loaded(run, abs(run.motion.omega_2 or 0.0))
+    run = make_run_scene(scene, command)
+    reason = find_exceeded(run, abs(run.motion.omega_2 or 0.0))
     if reason is not None:
         return reason
     if _passes_change_point(scene, command):
@@ -111,10 +114,10 @@ def _passes_change_point(scene: Scene, command: Command) -> bool:
     return False
 
 
-def as_run(scene: Scene, command: Command) -> Scene:
+def make_run_scene(scene: Scene, command: Command) -> Scene:
     """Make the scene whose MJCF is run through, a law by its greatest speed and acceleration."""
     if scene.motion.law is not None:
-        omega, alpha = extremes(scene.motion.law)
+        omega, alpha = find_extremes(scene.motion.law)
         motion = Motion(command.theta_2, omega, alpha, scene.motion.branch, scene.motion.through)
         return replace(scene, motion=motion)
     omega, alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
@@ -130,33 +133,35 @@ class _Simulation:
         self.bounded, self.lead = bounded, lead
         self.settings, self.command, self.law = settings, command, scene.motion.law
         # the text is that of the command, which a caller may have given instead of the scene's own
-        self.scene = as_run(scene, command) if lead is None else scene
-        self.supplied = of_loads(scene)
+        self.scene = make_run_scene(scene, command) if lead is None else scene
+        self.supplied = evaluate_loads(scene)
         n = len(command.angle)
         values, speed = (command.angle, self.scene.motion.omega_2) if lead is None else (lead.values, lead.speed)
         self.order = order_in_time(values, command.time if self.law else None, speed or 0.0)
-        self.out = blank(n, [*MADE, *unknowns(scene), *(OF_TENDON if scene.drive else ())])
+        self.out = make_blank(n, [*MADE, *list_unknowns(scene), *(OF_TENDON if scene.drive else ())])
         self.branch = command.branch.copy()
-        self.evidence = dict.fromkeys(RESIDUALS, 0.0) | {"mass_ratio": mass_ratio(scene.linkage)}
+        self.evidence = dict.fromkeys(RESIDUALS, 0.0) | {"mass_ratio": compute_mass_ratio(scene.linkage)}
         self.steps_per_revolution = 0.0
-        self.predicted = {name: np.zeros(n) for name in unknowns(scene)}
+        self.predicted = {name: np.zeros(n) for name in list_unknowns(scene)}
 
     def answer(self) -> Answer:
         """Answer over all positions."""
         bar, linkage = self.command.bar, self.scene.linkage
-        position = Assembler(ClosedLoop(self._text(1e-3)), bar)  # kinematics alone: the timestep plays no part
-        result = assembled(position, self.command, self.order)
+        position = Assembler(ClosedLoop(self._write_text(1e-3)), bar)  # kinematics alone: the timestep plays no part
+        result = find_assembled(position, self.command, self.order)
         closes = np.array([angles is not None for angles in result])
-        least = least_sine(linkage, self.command.theta_2, closes) if self.lead is None else self.lead.least_sine()
+        least = (
+            compute_least_sine(linkage, self.command.theta_2, closes) if self.lead is None else self.lead.least_sine()
+        )
         if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
         for segment in split_segments(result, self.order, partial(self._closes_between, position)):
             start = result[segment[0]]
             assert start is not None
             self._run(segment, start)
-        self.out["theta_2"] = within(self.scene, self.out["theta_2"])
+        self.out["theta_2"] = clip_angles(self.scene, self.out["theta_2"])
         # where nothing moved the command stands for the motion
-        commanded = zip(COMMANDS[bar], (self.command.angle, *speeds(self.command)), strict=True)
+        commanded = zip(COMMANDS[bar], (self.command.angle, *list_speeds(self.command)), strict=True)
         made = [np.where(np.isnan(self.out[name]), x, self.out[name]) for name, x in commanded]
         made[0] = made[0] + 2.0 * np.pi * np.round((self.command.angle - made[0]) / (2.0 * np.pi))
         at = Command(made[0], self.branch, made[1], made[2], bar=bar)
@@ -169,11 +174,11 @@ class _Simulation:
             closes,
             values,
             predicted=self.predicted,
-            alarms=alarms(self.evidence, sum(self.scene.linkage.lengths)),
+            alarms=list_alarms(self.evidence, sum(self.scene.linkage.lengths)),
             evidence=self.evidence,
         )
 
-    def _motion_segment(self, segment: list[int]) -> MotionSegment:
+    def _choose_motion(self, segment: list[int]) -> MotionSegment:
         """Choose how the input moves through a segment."""
         if self.law is not None:
             return Lawful(self.law, self.command, segment)
@@ -182,15 +187,17 @@ class _Simulation:
         motion = self.scene.motion
         return Steady(self.command.theta_2, segment, motion.omega_2 or 0.0, motion.alpha_2)
 
-    def _loop(self, timestep: float, supplied: dict[str, ActuatorForce], flywheel: float | None = None) -> ClosedLoop:
-        """Compile a model that takes from `supplying` what its text cannot say."""
-        return receiving(ClosedLoop(self._text(timestep, flywheel)), supplied)
+    def _compile_loop(
+        self, timestep: float, supplied: dict[str, ActuatorForce], flywheel: float | None = None
+    ) -> ClosedLoop:
+        """Compile a model that takes from `supply_forces` what its text cannot say."""
+        return receive_forces(ClosedLoop(self._write_text(timestep, flywheel)), supplied)
 
-    def _text(self, timestep: float, flywheel: float | None = None) -> str:
+    def _write_text(self, timestep: float, flywheel: float | None = None) -> str:
         """Write the generated MJCF without its keyframe."""
         heavy = self.settings.flywheel if flywheel is None else flywheel
         settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
-        return mjcf(at_full_size(self.scene), settings, keyframe=False)
+        return write_mjcf(take_full_size(self.scene), settings, keyframe=False)
 
     def _closes_between(self, position: Assembler, one: int, other: int) -> bool:
         """Tell whether the loop closes everywhere between two positions."""
@@ -203,7 +210,7 @@ class _Simulation:
 
     def _run(self, segment: list[int], start: tuple[float, float, float]) -> None:
         """Step through one segment and read at the step nearest to each position."""
-        motion_segment = self._motion_segment(segment)
+        motion_segment = self._choose_motion(segment)
         timestep = motion_segment.timestep(self.settings)
         if len(segment) > 1:
             turn = 2.0 * np.pi / motion_segment.turning
@@ -213,10 +220,10 @@ class _Simulation:
             supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * motion_segment.alpha(d.time)}
         elif (lead := self.lead) is not None:
             supplied = {**supplied, "drive": lambda m, d: m.dof_armature[O2] * lead.alpha_2(m, d)}
-        with supplying(supplied):
-            loop = self._loop(timestep, supplied)
-            light = None if self.scene.drive_bar == 2 else self._loop(timestep, supplied, LIGHT_FLYWHEEL)
-            monitor = ResidualMonitor(self._loop(timestep, supplied), self.scene.drive_bar)
+        with supply_forces(supplied):
+            loop = self._compile_loop(timestep, supplied)
+            light = None if self.scene.drive_bar == 2 else self._compile_loop(timestep, supplied, LIGHT_FLYWHEEL)
+            monitor = ResidualMonitor(self._compile_loop(timestep, supplied), self.scene.drive_bar)
             run = SimulatedRun(self.scene, loop, light, motion_segment, start, timestep)
             for index in segment:
                 run.to(index)
@@ -231,14 +238,14 @@ class _Simulation:
         loop.forward()
         self._keep_worst(run)
         q = (float(d.qpos[O2]), float(d.qpos[A]), float(d.qpos[O4]))
-        if unwound(self.scene, q) != q:
+        if unwind(self.scene, q) != q:
             raise LimitError("a torsion spring is wound by more than half a turn from its rest")
         self.branch[index] = loop.branch(self.command.bar)
         torque, pins = run.read()
         if torque is None:
             drive = "the cylinder" if self.scene.drive else f"the couple on bar {self.scene.drive_bar}"
             raise LimitError(f"{drive} does not move the input: a pole of its size")
-        values: Values = {driving(self.scene): torque, **pins}
+        values: Values = {name_driving(self.scene): torque, **pins}
         if self.scene.drive is not None:
             tendon = loop.model.tendon(CYLINDER).id
             values |= {"stroke": d.ten_length[tendon], "stroke_speed": d.ten_velocity[tendon]}
@@ -265,7 +272,7 @@ class _Simulation:
             seen[name] = float(np.maximum(seen[name], value))
 
 
-def observed_order(scene: Scene, command: Command, error: Callable[[Answer], float]) -> tuple[float, float, float]:
+def observe_order(scene: Scene, command: Command, error: Callable[[Answer], float]) -> tuple[float, float, float]:
     """Return errors at 4h and 2h with the closure's time constant held in seconds, and log2 of their ratio.
 
     At the recipe's own h the softness is already of the size of the truncation; the order shows above it.

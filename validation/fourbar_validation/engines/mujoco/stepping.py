@@ -5,7 +5,7 @@ from collections.abc import Callable
 import mujoco
 
 
-def opened(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Compiled, at keyframe 0, evaluated there."""
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
@@ -14,9 +14,9 @@ def opened(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     return model, data
 
 
-def steps(text: str) -> Callable[[int], None]:
+def make_stepper(text: str) -> Callable[[int], None]:
     """Make a function that steps the model on from its first keyframe, as often as wanted."""
-    model, data = opened(text)
+    model, data = open_model(text)
 
     def work(amount: int) -> None:
         mujoco.mj_step(model, data, amount)

@@ -16,21 +16,21 @@ import numpy as np
 
 from fourbar.errors import FourBarError, InputError, LimitError
 from fourbar.linkage import PINS
-from fourbar.mjcf import flywheel, mjcf, run_through
+from fourbar.mjcf import choose_run, size_flywheel, write_mjcf
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.engines.description import driving, unknowns
+from fourbar_validation.engines.description import list_unknowns, name_driving
 from fourbar_validation.engines.loaded import Assembled, Values
-from fourbar_validation.engines.loop import MADE, Angles, Assembler, as_made, at_each, blank
+from fourbar_validation.engines.loop import MADE, Angles, Assembler, make_blank, read_each, split_answer
 from fourbar_validation.engines.mujoco.attached import Described, Value
-from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, couple_for, load_force
+from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, load_force, solve_couple
 from fourbar_validation.engines.mujoco.corrections import correct
-from fourbar_validation.engines.mujoco.describe import called, described
+from fourbar_validation.engines.mujoco.describe import describe_model, find_element
 from fourbar_validation.engines.mujoco.guess import find_topology
 from fourbar_validation.engines.mujoco.motions import order_in_time
-from fourbar_validation.engines.mujoco.runner import Stepper, assembled, split_segments
+from fourbar_validation.engines.mujoco.runner import Stepper, find_assembled, split_segments
 from fourbar_validation.engines.mujoco.topology import Topology
-from fourbar_validation.engines.tree import closed
+from fourbar_validation.engines.tree import solve_closed
 
 ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
 POSITIONS = 37
@@ -79,15 +79,15 @@ def compile_text(text: str) -> mujoco.MjModel:
 
 def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examined:
     """Describe an MJCF, evaluate it at single states and through time; None: the one generated from the scene."""
-    model = compile_text(mjcf(scene) if text is None else text)
+    model = compile_text(write_mjcf(scene) if text is None else text)
     topology, guessed = find_topology(model, names, scene.linkage.lengths)
     loop = UserLoop(topology, scene)
-    result = described(topology)
+    result = describe_model(topology)
     for key, value in result.items():
         if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
             raise InputError("MJCF", None, f"{key} is beyond the range of doubles: {value}")
-    answers = _answers(loop, scene)
-    return Examined(result, called(topology), answers, [*guessed, *loop.notes], topology.names)
+    answers = _list_answers(loop, scene)
+    return Examined(result, find_element(topology), answers, [*guessed, *loop.notes], topology.names)
 
 
 def examine_corrected(
@@ -103,22 +103,22 @@ def examine_corrected(
         answers = None
         if time.perf_counter() - start < CORRECTING and (model := correct(topology, key, value)) is not None:
             try:
-                answers = _answers(UserLoop(Topology(model, names), scene), scene)
+                answers = _list_answers(UserLoop(Topology(model, names), scene), scene)
             except FourBarError:  # what the other differences make of it is no four-bar
                 answers = None
         result.append(answers)
     return result
 
 
-def _answers(loop: "UserLoop", scene: Scene) -> list[Answer]:
-    at = _positions(command(scene))
-    answers = [_answered(ONE_STATE, scene, lambda: one_state(loop, at))]
+def _list_answers(loop: "UserLoop", scene: Scene) -> list[Answer]:
+    at = _choose_positions(command(scene))
+    answers = [_answer(ONE_STATE, scene, lambda: answer_one_state(loop, at))]
     if at.omega_2 is not None and np.any(at.omega_2) and np.ptp(at.theta_2) > 0.0:
-        answers.append(_answered(THROUGH_TIME, scene, lambda: through_time(loop, at)))
+        answers.append(_answer(THROUGH_TIME, scene, lambda: answer_through_time(loop, at)))
     return answers
 
 
-def _positions(at: Command) -> Command:
+def _choose_positions(at: Command) -> Command:
     """Choose at most so many of the positions, spread evenly."""
     n = len(at.theta_2)
     if at.omega_2 is None:
@@ -129,7 +129,7 @@ def _positions(at: Command) -> Command:
     return Command(at.theta_2[keep], at.branch[keep], float(np.max(at.omega_2)), float(np.max(at.alpha_2)))
 
 
-def _answered(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
+def _answer(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
     start = time.perf_counter()
     try:
         answer = ask()
@@ -205,7 +205,7 @@ class UserLoop(Assembled):
 
     def speeds(self, omega_2: float) -> Array:
         """Joint speeds that keep the gap closed where the model is placed, (3,)."""
-        return np.asarray(self.to_joints @ closed(self.jacobian(), omega_2))
+        return np.asarray(self.to_joints @ solve_closed(self.jacobian(), omega_2))
 
     def ask(self, q: Array, v: Array, alpha_2: float) -> Values:
         """Everything at a state at which the crank accelerates at alpha_2, the driven bar's couple solved for."""
@@ -227,18 +227,18 @@ class UserLoop(Assembled):
 
         inertia = float(self.model.dof_M0.sum())
         trial = inertia * max(abs(alpha_2 - acceleration(0.0)), np.finfo(float).tiny / np.finfo(float).eps)
-        couple = couple_for(acceleration, alpha_2, 0.0, trial, REFINEMENTS)
+        couple = solve_couple(acceleration, alpha_2, 0.0, trial, REFINEMENTS)
         if couple is None:
             what = "its cylinder" if self.cylinder is not None else f"a couple on bar {drive}"
             raise LimitError(f"{what} does not move the crank of this model")
         mujoco.mj_rnePostConstraint(self.model, data)
-        values: Values = {driving(self.scene): couple}
+        values: Values = {name_driving(self.scene): couple}
         turned = (self.topology.angles(data), self.from_joints @ data.qvel, self.from_joints @ data.qacc)
         for name, (two, three, four) in zip(("theta", "omega", "alpha"), turned, strict=True):
             values |= {f"{name}_2": two, f"{name}_3": two + three, f"{name}_4": four}
-        return values | self._forces()
+        return values | self._read_forces()
 
-    def _forces(self) -> dict[str, Array]:
+    def _read_forces(self) -> dict[str, Array]:
         """F12, F32, F43, F14 in the plane; NaN at a cut pin that no connect or weld holds."""
         data, topology = self.data, self.topology
         on: dict[tuple[int, int], Array] = {}
@@ -246,7 +246,7 @@ class UserLoop(Assembled):
             child, parent = topology.turning(pin)
             force = data.cfrc_int[topology.root[child], 3:].copy()
             for load in self._loads:
-                if self._carries(topology.root[child], self.model.site_bodyid[self.model.actuator_trnid[load, 0]]):
+                if self._is_carried(topology.root[child], self.model.site_bodyid[self.model.actuator_trnid[load, 0]]):
                     force -= load_force(self.model, data, load)
             on[parent, child] = topology.in_plane(force)
         bars = PINS[topology.cut]
@@ -265,14 +265,14 @@ class UserLoop(Assembled):
         wanted = {"F12": (1, 2), "F32": (3, 2), "F43": (4, 3), "F14": (1, 4)}
         return {name: on[i, j] if (i, j) in on else -on[j, i] for name, (i, j) in wanted.items()}
 
-    def _carries(self, bearer: int, body: int) -> bool:
+    def _is_carried(self, bearer: int, body: int) -> bool:
         """Tell whether a body hangs, however far down, on another."""
         while body not in (bearer, 0):
             body = int(self.model.body_parentid[body])
         return body == bearer
 
 
-def one_state(loop: UserLoop, at: Command) -> Answer:
+def answer_one_state(loop: UserLoop, at: Command) -> Answer:
     """Answer every position by itself."""
     contacts = 0
 
@@ -286,14 +286,14 @@ def one_state(loop: UserLoop, at: Command) -> Answer:
         contacts = max(contacts, int(loop.data.ncon))
         return values
 
-    out, assembled, gap = at_each(loop, at, [*unknowns(loop.scene), *MADE], read)
+    out, assembled, gap = read_each(loop, at, [*list_unknowns(loop.scene), *MADE], read)
     if contacts:
         loop.notes.append(f"{contacts} contacts at a position where nothing but pins should touch")
     evidence = {"closure_gap_m": gap, "contacts": float(contacts)}
     return Answer(ONE_STATE, "as compiled", at, assembled, out, evidence=evidence)
 
 
-def through_time(loop: UserLoop, at: Command) -> Answer:
+def answer_through_time(loop: UserLoop, at: Command) -> Answer:
     """Run the longest segment of positions that assembles at the file's own timestep."""
     model, data = loop.model, mujoco.MjData(loop.model)
     data.eq_active[:] = loop.data.eq_active
@@ -302,10 +302,10 @@ def through_time(loop: UserLoop, at: Command) -> Answer:
     assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
     position = Assembler(loop)
     order = order_in_time(at.theta_2, None, at.omega_2)
-    segment = max(split_segments(assembled(position, at, order), order), key=len, default=[])
+    segment = max(split_segments(find_assembled(position, at, order), order), key=len, default=[])
     if len(segment) < 2:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")
-    run = run_through(at.theta_2[segment], at.omega_2, at.alpha_2)
+    run = choose_run(at.theta_2[segment], at.omega_2, at.alpha_2)
     timestep, sense = float(model.opt.timestep), loop.topology.sense["O2"]
     steps = run.time(run.stop) / timestep
     if not 1.0 <= steps <= MOST_STEPS:
@@ -314,9 +314,9 @@ def through_time(loop: UserLoop, at: Command) -> Answer:
         )
     position.find(float(at.theta_2[segment[0]]), int(at.branch[segment[0]]))
     data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(at.omega_2)
-    heavy = max(loop.armature, flywheel(loop.scene))
-    names = [*unknowns(loop.scene), *MADE]
-    out, seen = blank(len(segment), names), {"closure_gap_m": 0.0, "speed_error": 0.0}
+    heavy = max(loop.armature, size_flywheel(loop.scene))
+    names = [*list_unknowns(loop.scene), *MADE]
+    out, seen = make_blank(len(segment), names), {"closure_gap_m": 0.0, "speed_error": 0.0}
     alarms: list[str] = []
     stepper = Stepper(model, data, timestep)
     for i, index in enumerate(segment):
@@ -337,6 +337,6 @@ def through_time(loop: UserLoop, at: Command) -> Answer:
     model.dof_armature[loop.crank] = loop.armature
     known = np.isfinite(out["theta_2"])
     out = {name: array[known] for name, array in out.items()}
-    where, _ = as_made(out, at.branch[segment][known])
+    where, _ = split_answer(out, at.branch[segment][known])
     setting = f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')} {timestep:g} s"
     return Answer(THROUGH_TIME, setting, where, np.ones(known.sum(), dtype=bool), out, evidence=seen, alarms=alarms)

@@ -24,23 +24,23 @@ STRAIGHT = 1e-9
 """A hinge tilted by more than this (sine) leaves the plane."""
 
 
-def body_named(model: mujoco.MjModel, name: str) -> int | None:
+def find_body(model: mujoco.MjModel, name: str) -> int | None:
     """Find the body of a name, by what it is welded to; None where there is none."""
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
     return int(model.body_weldid[number]) if number >= 0 else None
 
 
-def bodies_of(model: mujoco.MjModel) -> str:
+def list_bodies(model: mujoco.MjModel) -> str:
     """List the bodies of a file by name, for a message."""
     return ", ".join(model.body(i).name or f"(unnamed {i})" for i in range(1, model.nbody))
 
 
-def stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str) -> int:
+def find_stated_body(model: mujoco.MjModel, names: Mapping[str, str], role: str) -> int:
     """Find the body of a bar by its given name, or by the bar's; InputError where there is none."""
     name = names.get(role, role)
-    body = body_named(model, name)
+    body = find_body(model, name)
     if body is None:
-        raise InputError("--name", f"{role}={name}", f"no such body; the file has: {bodies_of(model)}")
+        raise InputError("--name", f"{role}={name}", f"no such body; the file has: {list_bodies(model)}")
     return body
 
 
@@ -51,7 +51,7 @@ class Topology:
         self.model, self.data, self.names = model, mujoco.MjData(model), dict(names)
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
-        self.root = {1: 0} | {bar: stated_body(model, names, BAR_NAMES[bar]) for bar in MOVING_BARS}
+        self.root = {1: 0} | {bar: find_stated_body(model, names, BAR_NAMES[bar]) for bar in MOVING_BARS}
         self.bar_of_root = {body: bar for bar, body in self.root.items()}
         if len(self.bar_of_root) < len(self.root):
             raise InputError("--name", dict(names), "input, coupler and output must be three bodies that move")
@@ -72,7 +72,7 @@ class Topology:
         self._line = {bar: math.atan2(y, x) for bar, (x, y) in lines.items()}
         self._rest = self.data.qpos.copy()
         self._rest_angles = np.array((self._line[2], self._line[3] - self._line[2], self._line[4]))
-        self.to_joints = self._to_joints()
+        self.to_joints = self._convert_to_joints()
         """Joint speeds from those of (theta_2, theta_3 - theta_2, theta_4), (3, 3)."""
 
     def drives(self) -> list[int]:
@@ -118,9 +118,9 @@ class Topology:
         self.hinge[pin], self.sense[pin] = joint, math.copysign(1.0, along)
         for bar in bars:
             assert bar is not None
-            self.point[bar, pin] = self._in_bar(bar, self.data.xanchor[joint])
+            self.point[bar, pin] = self._find_in_bar(bar, self.data.xanchor[joint])
 
-    def _in_bar(self, bar: int, world: Array) -> Array:
+    def _find_in_bar(self, bar: int, world: Array) -> Array:
         body = self.root[bar]
         return np.asarray(self.data.xmat[body].reshape(3, 3).T @ (world - self.data.xpos[body]))
 
@@ -134,13 +134,13 @@ class Topology:
             kind = kinds(model.eq_type[number])
             if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) or not model.eq_active0[number]:
                 continue
-            ends = self._ends(number, kind)
+            ends = self._find_ends(number, kind)
             bars = [self.bar(body) for body, _ in ends]
             if None in bars or PIN_OF.get(frozenset(bars)) != self.cut:  # type: ignore[arg-type]
                 continue
             for bar, (_, world) in zip(bars, ends, strict=True):
                 assert bar is not None
-                self.point[bar, self.cut] = self._in_bar(bar, world)
+                self.point[bar, self.cut] = self._find_in_bar(bar, world)
             self.closure, self.first = number, bars[0]
             by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
             word = "connect" if kind == kinds.mjEQ_CONNECT else "weld"
@@ -156,11 +156,11 @@ class Topology:
                     "no connect or weld closes the loop at this pin; where something else does, say where pin B is: "
                     "--name B3=SITE on the coupler, --name B4=SITE on the output",
                 )
-            self.point[bar, "B"] = self._in_bar(bar, self.data.site_xpos[site])
+            self.point[bar, "B"] = self._find_in_bar(bar, self.data.site_xpos[site])
         if (model.eq_type == kinds.mjEQ_TENDON).any():
             self.closed_by = "tendon"
 
-    def _ends(self, number: int, kind: mujoco.mjtEq) -> list[tuple[int, Array]]:
+    def _find_ends(self, number: int, kind: mujoco.mjtEq) -> list[tuple[int, Array]]:
         """Return the body and the world point at either end of an equality."""
         model = self.model
         objects = (int(model.eq_obj1id[number]), int(model.eq_obj2id[number]))
@@ -209,7 +209,7 @@ class Topology:
         cos, sin = math.cos(self._line[bar]), math.sin(self._line[bar])
         return float(cos * x + sin * y), float(cos * y - sin * x)
 
-    def _to_joints(self) -> Array:
+    def _convert_to_joints(self) -> Array:
         turns = {1: np.zeros(3), 2: np.array([1.0, 0, 0]), 3: np.array([1.0, 1.0, 0]), 4: np.array([0, 0, 1.0])}
         matrix = np.zeros((self.model.nv, 3))
         for pin, joint in self.hinge.items():

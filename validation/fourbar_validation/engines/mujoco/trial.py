@@ -18,13 +18,13 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
-from fourbar.mjcf import Settings, mjcf
+from fourbar.mjcf import Settings, write_mjcf
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.loop import Assembler, Trial, as_made, blank
+from fourbar_validation.engines.loop import Assembler, Trial, make_blank, split_answer
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.motions import Steady, order_in_time
-from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, assembled, split_segments
+from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, find_assembled, split_segments
 
 STIFF = 4e-2
 """error (tc/h)^4 of RK4 with tc in steps: measured 1.3e-2 to 6e-2 on crank-rocker, drag link and double rocker."""
@@ -51,7 +51,7 @@ def guess(error: float) -> tuple[float, float]:
     return max(steps, FEWEST_STEPS), min(max(tc, SHORTEST), LONGEST)
 
 
-def dialled(steps_per_revolution: float, time_constant_steps: float) -> Settings:
+def make_settings(steps_per_revolution: float, time_constant_steps: float) -> Settings:
     """Give the recommended settings at a number of steps and a time constant; a window has no steps of its own."""
     return Settings(
         steps_per_revolution=steps_per_revolution,
@@ -89,8 +89,8 @@ class TrialSetup:
         motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
         self.scene, self.command = replace(scene, motion=motion), command
         order = order_in_time(command.theta_2, None, self.omega)
-        position = Assembler(ClosedLoop(mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
-        result = assembled(position, command, order)
+        position = Assembler(ClosedLoop(write_mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
+        result = find_assembled(position, command, order)
         self.segments = [segment for segment in split_segments(result, order) if len(segment) > 1]
         self.start = {index: angles for index, angles in enumerate(result) if angles is not None}
         if not self.segments:
@@ -98,7 +98,7 @@ class TrialSetup:
 
     def text(self, settings: Settings, timestep: float) -> str:
         """Write the generated MJCF, without its keyframe."""
-        return mjcf(self.scene, replace(settings, timestep=timestep, timestep_scale=1.0), keyframe=False)
+        return write_mjcf(self.scene, replace(settings, timestep=timestep, timestep_scale=1.0), keyframe=False)
 
     def motion_segment(self, segment: list[int]) -> Steady:
         """Choose how the input moves through a segment."""
@@ -115,16 +115,16 @@ class TrialSetup:
     def try_out(self, settings: Settings, build: Build | None = None) -> Trial:
         """Run through every segment of positions that assembles and read at the step nearest to each."""
         samples = [index for segment in self.segments for index in segment]
-        out, trial, first = blank(len(samples)), Trial(self.command), 0
+        out, trial, first = make_blank(len(samples)), Trial(self.command), 0
         with silence():
             for segment in self.segments:
                 before, rows = trial.steps, slice(first, first + len(segment))
-                self._run(segment, settings, build or _as_written, {name: x[rows] for name, x in out.items()}, trial)
+                self._run(segment, settings, build or _keep_text, {name: x[rows] for name, x in out.items()}, trial)
                 trial.segments += ((rows, trial.steps - before),)
                 first = rows.stop
                 if trial.broken:
                     break
-        trial.at, trial.quantities = as_made(out, self.command.branch[samples])
+        trial.at, trial.quantities = split_answer(out, self.command.branch[samples])
         return trial
 
     def _run(self, segment: list[int], settings: Settings, build: Build, out: dict[str, Array], trial: Trial) -> None:
@@ -157,7 +157,7 @@ class TrialSetup:
         """CPU seconds of a number of steps from the start of the longest segment; each call starts there again."""
         segment = max(self.segments, key=len)
         timestep = self.motion_segment(segment).run.timestep(settings)
-        loop = (build or _as_written)(self.text(settings, timestep), self.omega)
+        loop = (build or _keep_text)(self.text(settings, timestep), self.omega)
 
         def clock(steps: int) -> float:
             loop.set_state(self.start[segment[0]], self.omega)
@@ -169,5 +169,5 @@ class TrialSetup:
         return clock
 
 
-def _as_written(text: str, _: float) -> ClosedLoop:
+def _keep_text(text: str, _: float) -> ClosedLoop:
     return ClosedLoop(text)

@@ -11,17 +11,17 @@ from fourbar.errors import FAILED, HOLDS
 from fourbar.scene import Scene
 from fourbar.scene import command as command_of
 from fourbar.writing import write_text
-from fourbar_validation.advise.errors import QUANTITIES
-from fourbar_validation.advise.matters import MATTERS, influences, sentence
-from fourbar_validation.compare.rows import csv_text
+from fourbar_validation.advise.matters import MATTERS, measure_influences, write_sentence
+from fourbar_validation.advise.worst_errors import QUANTITIES
+from fourbar_validation.compare.rows import write_csv
 from fourbar_validation.engines.mujoco.trial import TrialSetup
-from fourbar_validation.lab.cost.curves import BEST
-from fourbar_validation.lab.cost.laws import ErrorLaw, laws, lines, pareto, warnings
+from fourbar_validation.lab.cost.laws import ErrorLaw, find_pareto, fit_laws, list_warnings, write_laws
+from fourbar_validation.lab.cost.series import BEST
 from fourbar_validation.lab.cost.study import COLUMNS, STEPPED, CostPoint, CostStudy
 from fourbar_validation.places import MODELS
-from fourbar_validation.report.machine import machine, versions
-from fourbar_validation.report.terminal import lined_up
-from fourbar_validation.scenes.suites import scene_files
+from fourbar_validation.report.machine import list_versions, name_machine
+from fourbar_validation.report.terminal import make_table
+from fourbar_validation.scenes.suites import read_scene_files
 
 DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
 WANTED = (1e-3, 1e-6)
@@ -43,7 +43,7 @@ def cost(scenes: tuple[Path, ...], out: Path) -> int:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    files = scene_files(scenes or DEFAULT_SCENES)
+    files = read_scene_files(scenes or DEFAULT_SCENES)
     fitted: list[ErrorLaw] = []
     rows: list[tuple[str, ...]] = []
     for index in range(len(files)):
@@ -63,19 +63,19 @@ def cost(scenes: tuple[Path, ...], out: Path) -> int:
             for curve, points in study.points():
                 curves[curve] = points
                 progress.update(task, advance=1, description=curve)
-        result = laws(curves)
-        dials = influences(scene, setup, BEST)
+        result = fit_laws(curves)
+        ranked = measure_influences(scene, setup, BEST)
         fitted += [law for law in result if law.decided]
         written = write(study, curves, result, scene.title or name)
-        click.echo(summary(name, curves, result, study.left_out))
-        click.echo(sentence(dials))
+        click.echo(write_summary(name, curves, result, study.left_out))
+        click.echo(write_sentence(ranked))
         held = sum(law.holds for law in result if law.decided)
-        most = dials[0].setting if dials[0].times >= MATTERS else "none by itself"
-        rows.append((name, *cheapest(curves), f"{held} of {sum(law.decided for law in result)}", most))
+        most = ranked[0].setting if ranked[0].times >= MATTERS else "none by itself"
+        rows.append((name, *find_cheapest(curves), f"{held} of {sum(law.decided for law in result)}", most))
         click.echo(f"written to {out / name}: {', '.join(sorted(path.name for path in written))}")
     if len(rows) > 1:
         head = ("scene", *(f"RK4 steps for {error:g}" for error in WANTED), "laws hold", "matters most")
-        Console().print(lined_up(head, rows, show_edge=False))
+        Console().print(make_table(head, rows, show_edge=False))
     if not fitted:
         click.echo("Nothing was compared: no law has points enough for a fit")
     return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
@@ -89,13 +89,13 @@ def write(
 
     folder = study.folder
     paths = [folder / "cost.csv", folder / "cost.md"]
-    write_text(paths[0], to_csv(curves))
-    pictures = draw(curves, subtitle(study.scene, title), folder)
-    write_text(paths[1], report(title, curves, found, study.left_out, pictures))
+    write_text(paths[0], write_points(curves))
+    pictures = draw(curves, write_subtitle(study.scene, title), folder)
+    write_text(paths[1], write_report(title, curves, found, study.left_out, pictures))
     return [*paths, *pictures]
 
 
-def subtitle(scene: Scene, title: str) -> str:
+def write_subtitle(scene: Scene, title: str) -> str:
     """Describe what was run, in one line under the statement of a picture."""
     acting = [type(effect).__name__.lower() for effect in scene.effects]
     acting += ["loads"] if scene.loads else []
@@ -103,46 +103,46 @@ def subtitle(scene: Scene, title: str) -> str:
     return f"{title}{omega}{', ' + ' and '.join(acting) if acting else ''}"
 
 
-def to_csv(curves: Mapping[str, Sequence[CostPoint]]) -> str:
+def write_points(curves: Mapping[str, Sequence[CostPoint]]) -> str:
     """Write one row per point, floats as repr."""
-    return csv_text(COLUMNS, (asdict(point).values() for points in curves.values() for point in points))
+    return write_csv(COLUMNS, (asdict(point).values() for points in curves.values() for point in points))
 
 
-def summary(
+def write_summary(
     name: str, curves: Mapping[str, Sequence[CostPoint]], found: Sequence[ErrorLaw], left_out: Sequence[str]
 ) -> str:
     """Summarise the study for the terminal."""
-    text = [f"{name}: what accuracy costs", "", *front_lines(curves), "", *lines(found), ""]
-    text += [f"warning: {line}" for line in warnings(curves)]
+    text = [f"{name}: what accuracy costs", "", *list_front(curves), "", *write_laws(found), ""]
+    text += [f"warning: {line}" for line in list_warnings(curves)]
     return "\n".join((*text, *(f"left out: {line}" for line in left_out)))
 
 
-def cheapest(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
+def find_cheapest(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     """Find the least work of a revolution, in RK4 steps, for each of WANTED; a dash where nothing reaches it."""
     points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
     work = ([p.rk4_steps for p in points if p.worst <= error] for error in WANTED)
     return [f"{min(steps):.0f}" if steps else "-" for steps in work]
 
 
-def front_lines(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
+def list_front(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     """List the Pareto front of everything stepped, by the worse of torque and force."""
     points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
     head = f"{'error':>8} {'RK4 steps':>10} {'ms/turn':>8} {'+-':>5}  setting"
-    front = pareto(points, "worst")
+    front = find_pareto(points, "worst")
     rows = [
-        f"{p.worst:8.0e} {p.rk4_steps:10.0f} {1e3 * p.seconds_per_revolution:8.2f} {percent(p.scatter):>5}  "
+        f"{p.worst:8.0e} {p.rk4_steps:10.0f} {1e3 * p.seconds_per_revolution:8.2f} {write_percent(p.scatter):>5}  "
         f"{p.curve}: {p.setting}"
         for p in front
     ]
     return [head, *rows]
 
 
-def percent(scatter: float) -> str:
+def write_percent(scatter: float) -> str:
     """Format the scatter of timings; a dash where there was one."""
     return "-" if math.isnan(scatter) else f"{100.0 * scatter:.0f} %"
 
 
-def report(
+def write_report(
     title: str,
     curves: Mapping[str, Sequence[CostPoint]],
     found: Sequence[ErrorLaw],
@@ -150,13 +150,13 @@ def report(
     pictures: Sequence[Path],
 ) -> str:
     """Write the study as Markdown."""
-    about = ", ".join(f"{name} {version}" for name, version in versions().items())
-    text = [f"# What accuracy costs: {title}", "", f"{machine()}; {about}. {ORDERS}", ""]
+    about = ", ".join(f"{name} {version}" for name, version in list_versions().items())
+    text = [f"# What accuracy costs: {title}", "", f"{name_machine()}; {about}. {ORDERS}", ""]
     text += [f"![{path.stem}]({path.name})" for path in pictures if path.suffix == ".svg"]
-    text += ["", "## Laws", "", *(f"- {law}" for law in lines(found))]
-    text += ["", "## Cheapest for each error", "", "```", *front_lines(curves), "```"]
+    text += ["", "## Laws", "", *(f"- {law}" for law in write_laws(found))]
+    text += ["", "## Cheapest for each error", "", "```", *list_front(curves), "```"]
     text += ["", "## Where an error jumps, and where more steps buy nothing", ""]
-    text += [f"- {line}" for line in warnings(curves) or ["none"]]
+    text += [f"- {line}" for line in list_warnings(curves) or ["none"]]
     text += [
         "",
         "## All points",
@@ -169,7 +169,7 @@ def report(
             text.append(
                 f"| {name}: {p.setting} | {' | '.join(f'{getattr(p, q):.1e}' for q in QUANTITIES)} "
                 f"| {p.steps_per_revolution:.0f} "
-                f"| {1e3 * p.seconds_per_revolution:.3g} | {percent(p.scatter)} "
+                f"| {1e3 * p.seconds_per_revolution:.3g} | {write_percent(p.scatter)} "
                 f"| {1e6 * p.seconds_per_sample:.3g} | {p.rk4_steps:.0f} |"
             )
     if left_out:

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from fourbar.mjcf import Settings
 from fourbar_validation.advise.advise import MOST_STEPS
-from fourbar_validation.advise.matters import judged
-from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, TrialSetup, dialled
-from fourbar_validation.lab.stress.timed import in_turns
+from fourbar_validation.advise.matters import judge_trial
+from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, TrialSetup, make_settings
+from fourbar_validation.lab.stress.timed import time_in_turns
 
 COARSE, FINE = 2.0, 2.0 ** (1.0 / 3.0)
 """Ratios of the ladder of steps: first by factors of two, then thirds of an octave below what serves."""
@@ -33,22 +33,22 @@ class Cheapest(NamedTuple):
     """Recommended RK4 steps per run."""
 
 
-def relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
+def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
     """Time a step by integrator and pads, relative to RK4 with pads: medians of interleaved rounds."""
     kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
-    clocks = {kind: setup.seconds_per_step(of_kind(kind, dialled(628.0, 20.0))) for kind in kinds}
-    times = in_turns({kind: partial(clock, STEPS) for kind, clock in clocks.items()}, ROUNDS)
+    clocks = {kind: setup.seconds_per_step(change_kind(kind, make_settings(628.0, 20.0))) for kind in kinds}
+    times = time_in_turns({kind: partial(clock, STEPS) for kind, clock in clocks.items()}, ROUNDS)
     reference = median(times["RK4", True])
     return {kind: median(values) / reference for kind, values in times.items()}
 
 
-def of_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
+def change_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
     """Change the integrator, and leave out the pads where requested."""
     integrator, pads = kind
     return replace(settings, integrator=integrator, pad=settings.pad if pads else None)
 
 
-def cheapest(setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]) -> Cheapest | None:
+def find_cheapest(setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]) -> Cheapest | None:
     """Try every integrator, with and without pads, over time constants and steps; None where nothing serves."""
     best: Cheapest | None = None
     for kind, ratio in costs.items():
@@ -57,17 +57,17 @@ def cheapest(setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], f
             most = MOST_STEPS if best is None else best.cost / ratio
             if not fourth_order and best is not None and not _serves(setup, kind, tc, most / FINE, error):
                 continue  # not even with as many steps as the best costs
-            steps = _least(setup, kind, tc, most, error)
+            steps = _find_least_steps(setup, kind, tc, most, error)
             if steps is not None:
                 cost = steps * ratio
                 if best is None or cost < best.cost:
-                    best = Cheapest(_settings(setup, kind, tc, steps), steps, cost)
+                    best = Cheapest(_make_settings(setup, kind, tc, steps), steps, cost)
     return best
 
 
-def _least(setup: TrialSetup, kind: tuple[str, bool], tc: float, most: float, error: float) -> int | None:
+def _find_least_steps(setup: TrialSetup, kind: tuple[str, bool], tc: float, most: float, error: float) -> int | None:
     """Find the least steps of the ladder, fewer than `most`, that serve."""
-    for n in _ladder(FEWEST_STEPS, COARSE, most):
+    for n in _climb_ladder(FEWEST_STEPS, COARSE, most):
         if _serves(setup, kind, tc, n, error):
             for finer in (n / FINE**2, n / FINE):
                 if _serves(setup, kind, tc, finer, error):
@@ -76,19 +76,19 @@ def _least(setup: TrialSetup, kind: tuple[str, bool], tc: float, most: float, er
     return None
 
 
-def _ladder(start: float, ratio: float, most: float) -> Iterator[float]:
+def _climb_ladder(start: float, ratio: float, most: float) -> Iterator[float]:
     n = start
     while n < most:
         yield n
         n *= ratio
 
 
-def _settings(setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float) -> Settings:
+def _make_settings(setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float) -> Settings:
     """Set the number of steps of the run."""
-    per_run = setup.steps(dialled(1000.0, tc)) / 1000.0
-    return of_kind(kind, dialled(steps / per_run, tc))
+    per_run = setup.steps(make_settings(1000.0, tc)) / 1000.0
+    return change_kind(kind, make_settings(steps / per_run, tc))
 
 
 def _serves(setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float, error: float) -> bool:
-    trial = setup.try_out(_settings(setup, kind, tc, steps))
-    return judged(setup.scene, trial).worst <= error
+    trial = setup.try_out(_make_settings(setup, kind, tc, steps))
+    return judge_trial(setup.scene, trial).worst <= error

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import Actions
-from fourbar.effects.actions import bodies
-from fourbar.evaluation.case import Case, changed, state_at
+from fourbar.effects.actions import list_bodies
+from fourbar.evaluation.case import Case, change_numbers, compute_state
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Wrenches
@@ -16,10 +16,10 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
-from fourbar_validation.advise.errors import WorstErrors, greatest
+from fourbar_validation.advise.worst_errors import WorstErrors, find_greatest
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.scales import scale_of
-from fourbar_validation.compare.tolerance import relative
+from fourbar_validation.compare.tolerance import divide
 from fourbar_validation.published import thirteen
 
 FIFTY_DIGITS = 167 + 30
@@ -29,35 +29,35 @@ AT_MOST = 25
 Quantities = dict[str, Any]
 
 
-def few(at: Command) -> Command:
+def choose_few(at: Command) -> Command:
     """Choose at most AT_MOST positions, evenly over the sweep."""
     rows = np.unique(np.linspace(0, len(at.theta_2) - 1, min(AT_MOST, len(at.theta_2))).round().astype(int))
     return at._replace(angle=at.theta_2[rows], branch=at.branch[rows])
 
 
-def double(scene: Scene, at: Command) -> Quantities:
+def evaluate_double(scene: Scene, at: Command) -> Quantities:
     """Evaluate by `fourbar.solve`."""
     s = solve(scene, "force", at=at)
     return {name: getattr(s, name) for name in ("torque", *PIN_FORCES)}
 
 
-def single(scene: Scene, at: Command) -> Quantities:
+def evaluate_single(scene: Scene, at: Command) -> Quantities:
     """Evaluate the formulas on float32 arrays."""
-    case = changed(Case.of(scene), float)  # NumPy's doubles would prevail
+    case = change_numbers(Case.of(scene), float)  # NumPy's doubles would prevail
     path = case.path._replace(u1=np.complex64(case.path.u1))
     with np.errstate(all="ignore"):
         theta_2 = at.theta_2.astype(np.float32)
         speed, growth = (np.float32(value) for value in (at.omega_2 or 0.0, at.alpha_2))
         position = path.position(theta_2, path.half_angle(theta_2), at.branch)
         # vectors are made of complex doubles whatever their parts are, and so is what stays parallel
-        state = case.state(path, theta_2, changed(position, _single), at.branch, speed, growth)
-        state = changed(state, _single)
-        result = case.dynamics(state, growth, rounded=_single)
+        state = case.state(path, theta_2, change_numbers(position, _round_single), at.branch, speed, growth)
+        state = change_numbers(state, _round_single)
+        result = case.dynamics(state, growth, rounded=_round_single)
     assert result.drive.dtype == np.float32
     return {"torque": result.drive, **{name: _stack(getattr(result.pins, name), len(theta_2)) for name in PIN_FORCES}}
 
 
-def _single(value: Any, *, turned: bool = False) -> Any:
+def _round_single(value: Any, *, turned: bool = False) -> Any:
     """Round to single precision, both parts of a vector too."""
     return np.asarray(value).astype(np.complex64 if np.iscomplexobj(value) else np.float32)
 
@@ -68,18 +68,18 @@ def _stack(vector: Any, n: int) -> Array:
     return np.stack([whole.real, whole.imag], axis=1)
 
 
-def thirteen_equations(scene: Scene, at: Command) -> Quantities:
+def solve_thirteen_equations(scene: Scene, at: Command) -> Quantities:
     """Solve thirteen equations per position, with kinematics by the formulas."""
     if any(effect.loaded_pins for effect in scene.effects):
         raise NotImplementedError("friction that depends on the pin forces is not linear in them")
-    x = thirteen.solve_thirteen(_bodies(scene, state_at(scene, at)), scene.drive_bar)
+    x = thirteen.solve_thirteen(_make_bodies(scene, compute_state(scene, at)), scene.drive_bar)
     columns = {name: getattr(thirteen, name) for name in PIN_FORCES}
     return {"torque": x[:, thirteen.TORQUE], **{name: x[:, k : k + 2] for name, k in columns.items()}}
 
 
-def _bodies(scene: Scene, state: State) -> thirteen.FreeBodies:
+def _make_bodies(scene: Scene, state: State) -> thirteen.FreeBodies:
     """Set up the free bodies with what acts on them, moments about the mass centres."""
-    n, parts = len(state.theta_2), bodies(scene.linkage, scene.effects)
+    n, parts = len(state.theta_2), list_bodies(scene.linkage, scene.effects)
     actions = Actions(state, parts)
     for term in (*scene.loads, *scene.effects):
         term.act(actions, state)
@@ -97,25 +97,25 @@ def _bodies(scene: Scene, state: State) -> thirteen.FreeBodies:
     return thirteen.FreeBodies(first, second, force, moment)
 
 
-def fifty_digits(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quantities:
+def evaluate_balls(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quantities:
     """Evaluate balls of the independent reference, (n,) objects."""
     from flint import arb, ctx
 
-    from fourbar_validation.engines.balls import inputs, outputs
+    from fourbar_validation.engines.balls import collect_inputs, compute_outputs
 
     before, ctx.prec = ctx.prec, bits
     try:
         result = []
         for theta_2, branch in zip(at.theta_2.tolist(), at.branch.tolist(), strict=True):
-            x = {name: arb(value) for name, value in inputs(scene, theta_2).items()}
-            result.append(outputs(scene, branch, x, scene.drive_bar) or {})
+            x = {name: arb(value) for name, value in collect_inputs(scene, theta_2).items()}
+            result.append(compute_outputs(scene, branch, x, scene.drive_bar) or {})
     finally:
         ctx.prec = before
     out: Quantities = {"torque": [y.get("torque") for y in result]}
     return out | {name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in result] for name in PIN_FORCES}
 
 
-def against_reference(scene: Scene, at: Command, quantities: Quantities, reference: Quantities) -> WorstErrors:
+def compare_with_reference(scene: Scene, at: Command, quantities: Quantities, reference: Quantities) -> WorstErrors:
     """Find the worst errors on their scales against balls of many more digits."""
     formulas = solve(scene, "force", at=at)
     worst = {}
@@ -125,12 +125,12 @@ def against_reference(scene: Scene, at: Command, quantities: Quantities, referen
         for ours, exact, size in zip(quantities[name], reference[name], sizes.tolist(), strict=True):
             pairs = ((ours, exact),) if name == "torque" else tuple(zip(ours, exact, strict=True))
             if all(y is not None for _, y in pairs):
-                result.append(float(relative(math.hypot(*(_difference(x, y) for x, y in pairs)), size)))
-        worst[name] = greatest(result)
+                result.append(float(divide(math.hypot(*(_compute_difference(x, y) for x, y in pairs)), size)))
+        worst[name] = find_greatest(result)
     return WorstErrors(**worst)
 
 
-def _difference(ours: Any, exact: Any) -> float:
+def _compute_difference(ours: Any, exact: Any) -> float:
     from flint import arb
 
     ball = ours if isinstance(ours, arb) else arb(float(ours))
@@ -138,8 +138,8 @@ def _difference(ours: Any, exact: Any) -> float:
 
 
 METHODS: dict[str, Callable[[Scene, Command], Quantities]] = {
-    "formulas, double": double,
-    "formulas, single": single,
-    "13x13": thirteen_equations,
-    "50 digits": fifty_digits,
+    "formulas, double": evaluate_double,
+    "formulas, single": evaluate_single,
+    "13x13": solve_thirteen_equations,
+    "50 digits": evaluate_balls,
 }

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fourbar_validation.advise.errors import QUANTITIES
+from fourbar_validation.advise.worst_errors import QUANTITIES
 from fourbar_validation.lab.cost.study import STEPPED, CostPoint
 
 TOO_LARGE = 0.1
@@ -32,7 +32,7 @@ EXPECTED_ORDER = {
 
 @dataclass(frozen=True, slots=True)
 class ErrorLaw:
-    """error ~ dial^exponent of one quantity over the points used."""
+    """error ~ setting_value^exponent of one quantity over the points used."""
 
     name: str
     quantity: str
@@ -62,17 +62,17 @@ class ErrorLaw:
         return f"{'holds' if self.holds else 'FAILS'}, {self.exponent:.2f} +- {self.sigma:.2f}"
 
 
-def lines(found: Sequence[ErrorLaw]) -> list[str]:
+def write_laws(found: Sequence[ErrorLaw]) -> list[str]:
     """Each law in one line, quantity by quantity."""
     shown = []
     for name in dict.fromkeys(law.name for law in found):
         each = [law for law in found if law.name == name]
-        texts = _grouped([(law.quantity, str(law)) for law in each])
+        texts = _group([(law.quantity, str(law)) for law in each])
         shown.append(f"{name}, expected {each[0].expected:g}: {'; '.join(texts)}")
     return shown
 
 
-def _grouped(pairs: Sequence[tuple[str, str]]) -> list[str]:
+def _group(pairs: Sequence[tuple[str, str]]) -> list[str]:
     """Quantities with the same text, together."""
     texts = dict.fromkeys(text for _, text in pairs)
     return [f"{', '.join(quantity for quantity, other in pairs if other == text)}: {text}" for text in texts]
@@ -86,28 +86,28 @@ def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     return float(result.slope), float(result.stderr) if len(x) > 2 else math.inf
 
 
-def floor(points: Sequence[CostPoint], quantity: str) -> float | None:
+def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
     """Find the error that more steps no longer lessen; None where it still falls at the end of the ladder."""
-    result = [getattr(point, quantity) for point in _by_steps(points)]
+    result = [getattr(point, quantity) for point in _list_by_steps(points)]
     if len(result) < 2 or not math.isfinite(result[-1]) or result[-1] < FLOORED * result[-2]:
         return None
     return float(result[-1])  # before it two sources may cancel: a dip is not a floor
 
 
-def steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint | None:
+def find_steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint | None:
     """Find the first point of a ladder beyond which more steps buy nothing."""
-    least = floor(points, quantity)
+    least = find_floor(points, quantity)
     if least is None:
         return None
-    beyond = [point for point in _by_steps(points) if getattr(point, quantity) > least / FLOORED]
-    return next(point for point in _by_steps(points) if point not in beyond)
+    beyond = [point for point in _list_by_steps(points) if getattr(point, quantity) > least / FLOORED]
+    return next(point for point in _list_by_steps(points) if point not in beyond)
 
 
-def _by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
+def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
     return sorted(points, key=lambda point: point.steps_per_revolution)
 
 
-def jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
+def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """Where an error leaps up on a ladder from coarse to fine, once the motion is the scene's."""
     result = []
     for i, point in enumerate(points[1:], 1):
@@ -118,10 +118,10 @@ def jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     return result
 
 
-def laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
+def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
     """Every law that the study was laid out for, of each quantity, as far as its curves are there."""
     result = []
-    one_state = [point for point in curves.get("one state", ()) if point.dial > 0.0]
+    one_state = [point for point in curves.get("one state", ()) if point.setting_value > 0.0]
     ladders = [
         ("softness in (1-d)", curves.get("softness d", ()), 1.0),
         ("sag at 0.1 rad/s in (1-d)", curves.get("sag d, slow", ()), 1.0),
@@ -130,34 +130,38 @@ def laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
     ]
     for integrator, order in EXPECTED_ORDER.items():
         points, name = curves.get(f"{integrator}, tc held", ()), f"order of {integrator} in the timestep"
-        result += [_law(name, quantity, points, order, by_steps=True) for quantity in QUANTITIES if points]
-    result += [_law(name, quantity, points, n) for name, points, n in ladders for quantity in QUANTITIES if points]
-    return result + [law for quantity in QUANTITIES if (law := _stiff(curves, quantity)).points > 0]
+        result += [_fit_law(name, quantity, points, order, by_steps=True) for quantity in QUANTITIES if points]
+    result += [_fit_law(name, quantity, points, n) for name, points, n in ladders for quantity in QUANTITIES if points]
+    return result + [law for quantity in QUANTITIES if (law := _fit_stiff(curves, quantity)).points > 0]
 
 
-def _law(name: str, quantity: str, points: Sequence[CostPoint], expected: float, *, by_steps: bool = False) -> ErrorLaw:
-    least = (floor(points, quantity) or 0.0) if by_steps else 0.0
-    dialled = sorted((p for p in points if p.dial > 0.0), key=lambda p: p.dial if by_steps else -p.dial)
-    leaps = tuple(_leap(p, dialled, quantity) for p in jumps(dialled, quantity))
-    used = [p for p in dialled if ABOVE_FLOOR * least < getattr(p, quantity) < TOO_LARGE]
+def _fit_law(
+    name: str, quantity: str, points: Sequence[CostPoint], expected: float, *, by_steps: bool = False
+) -> ErrorLaw:
+    least = (find_floor(points, quantity) or 0.0) if by_steps else 0.0
+    ordered = sorted(
+        (p for p in points if p.setting_value > 0.0), key=lambda p: p.setting_value if by_steps else -p.setting_value
+    )
+    leaps = tuple(_measure_leap(p, ordered, quantity) for p in find_jumps(ordered, quantity))
+    used = [p for p in ordered if ABOVE_FLOOR * least < getattr(p, quantity) < TOO_LARGE]
     if len(used) < FEWEST:
         return ErrorLaw(name, quantity, math.nan, math.inf, expected, len(used), leaps)
-    x = [1.0 / p.dial if by_steps else p.dial for p in used]
+    x = [1.0 / p.setting_value if by_steps else p.setting_value for p in used]
     slope, sigma = fit(x, [getattr(p, quantity) for p in used])
     return ErrorLaw(name, quantity, slope, sigma, expected, len(used), leaps)
 
 
-def _leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) -> str:
+def _measure_leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) -> str:
     before = getattr(ladder[ladder.index(point) - 1], quantity)
     setting = point.setting.removeprefix(f"{point.curve}, ")
     return f"jumps from {before:.1e} to {getattr(point, quantity):.1e} at {setting}"
 
 
-def _stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
+def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
     """RK4's floor at a time constant of k steps goes as k^-4, whatever the timestep."""
     floors = {}
     for tc in (3.0, 10.0, 30.0, 100.0):
-        least = floor(curves.get(f"RK4, pads, tc = {tc:g} h", ()), quantity)
+        least = find_floor(curves.get(f"RK4, pads, tc = {tc:g} h", ()), quantity)
         if least is not None:
             floors[tc] = least
     name = "floor of RK4 in tc/h"
@@ -167,20 +171,22 @@ def _stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw
     return ErrorLaw(name, quantity, slope, sigma, -FOURTH_ORDER, len(floors))
 
 
-def warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
+def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     """Where a quantity jumps towards finer steps, and where it has passed its floor."""
     result = []
     for name, points in curves.items():
-        ladder = _by_steps([p for p in points if p.kind == STEPPED and p.dial == p.dial and p.dial >= 2.0])
-        if name == "recommended" or len(ladder) < 4 or ladder[0].dial == ladder[-1].dial:
+        ladder = _list_by_steps(
+            [p for p in points if p.kind == STEPPED and p.setting_value == p.setting_value and p.setting_value >= 2.0]
+        )
+        if name == "recommended" or len(ladder) < 4 or ladder[0].setting_value == ladder[-1].setting_value:
             continue
         if len({round(p.steps_per_revolution) for p in ladder}) < 4:
             continue
-        leaps = [(q, _leap(p, ladder, q)) for q in QUANTITIES for p in jumps(ladder, q)]
-        result += [f"{name}: {line}" for line in _grouped(leaps)]
-        floored = [(q, p) for q in QUANTITIES if (p := steps_at_floor(ladder, q)) is not None]
+        leaps = [(q, _measure_leap(p, ladder, q)) for q in QUANTITIES for p in find_jumps(ladder, q)]
+        result += [f"{name}: {line}" for line in _group(leaps)]
+        floored = [(q, p) for q in QUANTITIES if (p := find_steps_at_floor(ladder, q)) is not None]
         if floored:
-            beyond = (f"{q} beyond {p.steps_per_revolution:.0f} ({floor(ladder, q):.1e})" for q, p in floored)
+            beyond = (f"{q} beyond {p.steps_per_revolution:.0f} ({find_floor(ladder, q):.1e})" for q, p in floored)
             result.append(f"{name}: more steps per revolution buy nothing: {', '.join(beyond)}")
         never = [q for q in QUANTITIES if not any(getattr(p, q) < TOO_LARGE for p in ladder)]
         if never:
@@ -188,7 +194,7 @@ def warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     return result
 
 
-def pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
+def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """Points that no other beats in both error and cost, from cheap to accurate."""
     front: list[CostPoint] = []
     for point in sorted(points, key=lambda p: (p.seconds_per_revolution, getattr(p, quantity))):

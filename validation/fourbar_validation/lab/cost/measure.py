@@ -13,12 +13,12 @@ from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar_validation.advise.advise import advise
-from fourbar_validation.advise.matters import judged
+from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.engines.mujoco.trial import TrialSetup
-from fourbar_validation.lab.cost.exhaustive import cheapest, relative_costs
-from fourbar_validation.report.machine import code
+from fourbar_validation.lab.cost.exhaustive import find_cheapest, time_relative_costs
+from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.store import Store
-from fourbar_validation.scenes.random import DrawnType, random_scene
+from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
 TYPES = (
     *(DrawnType.CRANK_ROCKER, DrawnType.DRAG_LINK),
@@ -71,9 +71,9 @@ class AdviceCase:
         return not self.cost > CHEAP * self.cheapest
 
 
-def scene_of(seed: int, index: int) -> tuple[Scene, float]:
+def draw_scene(seed: int, index: int) -> tuple[Scene, float]:
     """Draw a linkage away from its limits, at a random speed, and the error required of it."""
-    scene = random_scene(seed, index, TYPES)
+    scene = draw_random_scene(seed, index, TYPES)
     rng = np.random.default_rng([seed, index, 1])
     omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*SPEEDS))
     alpha = float(rng.choice([0.0, omega**2 * rng.uniform(-GENTLE, GENTLE)]))
@@ -87,20 +87,20 @@ def scene_of(seed: int, index: int) -> tuple[Scene, float]:
     return replace(scene, motion=motion), float(10.0 ** rng.uniform(*ERRORS))
 
 
-def denser(scene: Scene, times: int) -> Scene:
+def make_denser(scene: Scene, times: int) -> Scene:
     """Divide the same motion into more positions."""
     sweep = scene.motion.theta_2
     assert isinstance(sweep, Sweep)
     return replace(scene, motion=replace(scene.motion, theta_2=replace(sweep, steps=sweep.steps * times)))
 
 
-def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceCase:
+def measure_case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceCase:
     """Ask for advice, judge it at denser positions, and search exhaustively."""
-    scene, required = scene_of(seed, index)
+    scene, required = draw_scene(seed, index)
     advice = advise(scene, required)
-    dense, searched = denser(scene, DENSER), denser(scene, SEARCHED)
-    error = judged(dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)).worst
-    result = cheapest(TrialSetup(searched, command(searched)), required, costs)
+    dense, searched = make_denser(scene, DENSER), make_denser(scene, SEARCHED)
+    error = judge_trial(dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)).worst
+    result = find_cheapest(TrialSetup(searched, command(searched)), required, costs)
     return AdviceCase(
         index,
         scene.title.rpartition(" ")[0],
@@ -116,31 +116,31 @@ def case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceC
     )
 
 
-def wilson(successes: int, n: int) -> float:
+def compute_wilson(successes: int, n: int) -> float:
     """Compute the lower bound of the Wilson score interval of a proportion, at 95 %."""
     from scipy.stats import binomtest
 
     return float(binomtest(successes, n).proportion_ci(0.95, "wilson").low) if n else 0.0
 
 
-def enough(missed: int) -> int:
+def find_enough(missed: int) -> int:
     """Find the least number of cases whose bound is the needed one where so many are not met."""
     n = missed + 1
-    while wilson(n - missed, n) < NEEDED_MET:
+    while compute_wilson(n - missed, n) < NEEDED_MET:
         n += 1
     return n
 
 
 def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
     """Yield the cases, each kept as it comes; those that an interrupted run left are read."""
-    with Store(out, {"seed": seed, **code()}).held() as store:
-        done, first = store.done(), scene_of(seed, 0)[0]
+    with Store(out, {"seed": seed, **name_code()}).held() as store:
+        done, first = store.done(), draw_scene(seed, 0)[0]
         costs: dict[tuple[str, bool], float] = {}
         for index in range(count):
             if index not in done:
-                costs = costs or relative_costs(TrialSetup(first, command(first)))
+                costs = costs or time_relative_costs(TrialSetup(first, command(first)))
                 try:
-                    store.put(index, [asdict(case(seed, index, costs))])
+                    store.put(index, [asdict(measure_case(seed, index, costs))])
                 except LimitError as error:
                     raise LimitError(f"linkage {index} of seed {seed}: {error}") from None
             yield AdviceCase(**store.read(index)[0])
@@ -163,9 +163,9 @@ def study(count: int, seed: int, out: Path) -> int:
     met, cheap = sum(each.met for each in cases), sum(each.cheap for each in cases)
     unreachable = sum(not each.reached for each in cases)
     ratios = sorted(each.cost / each.cheapest for each in cases if each.reached and each.cheapest == each.cheapest)
-    bound = wilson(met, len(cases))
+    bound = compute_wilson(met, len(cases))
     click.echo(f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed {NEEDED_MET})")
-    if bound < NEEDED_MET and (more := enough(len(cases) - met)) > len(cases):
+    if bound < NEEDED_MET and (more := find_enough(len(cases) - met)) > len(cases):
         click.echo(f"undecided: with {len(cases) - met} not met the bound is reached from --count {more} on")
     wrongly = sum(not each.met for each in cases if not each.reached)
     click.echo(f"called unreachable: {unreachable}, of which the search reached {wrongly}")

@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fourbar_validation.advise.errors import QUANTITIES
-from fourbar_validation.lab.cost.laws import TOO_LARGE, jumps
+from fourbar_validation.advise.worst_errors import QUANTITIES
+from fourbar_validation.lab.cost.laws import TOO_LARGE, find_jumps
 from fourbar_validation.lab.cost.study import CostPoint
 
 Look = tuple[str, str, str, Any]
@@ -21,32 +21,32 @@ LARGEST = 10.0
 NAMES = {"torque": "driving torque"}
 
 
-def line_of(axes: Any, x: Sequence[float], y: Sequence[float], label: str, look: Look, **style: Any) -> None:
+def draw_line(axes: Any, x: Sequence[float], y: Sequence[float], label: str, look: Look, **style: Any) -> None:
     """Draw a curve in its colour, with its marker and line."""
     _, colour, marker, line = look
     common = {"color": colour, "ls": line, "marker": marker, "mec": "white", "mew": 0.5}
     axes.plot(x, y, label=label, **(common | style))
 
 
-def headed(figure: Any, statement: str, title: str, upper: float, lower: float) -> Any:
+def write_heading(figure: Any, statement: str, title: str, upper: float, lower: float) -> Any:
     """Write what a picture means above it, and what was run."""
     figure.text(0.02, upper, statement, fontsize=12.5, weight="bold", va="center")
     figure.text(0.02, lower, title, fontsize=9.5, color="#666666", va="center")
     return figure
 
 
-def over_the_timestep(axes: Any, curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> None:
+def draw_over_timestep(axes: Any, curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> None:
     """Draw one quantity's error over the timestep, by integrator."""
     for label, look in CURVES.items():
-        row = sorted(curves.get(look[0], ()), key=lambda point: point.dial)
-        errors = {point.dial: min(getattr(point, quantity), LARGEST) for point in row}
-        line_of(axes, [1.0 / n for n in errors], list(errors.values()), label, look, ms=4, lw=1.6)
-        leaps = [point.dial for point in jumps(row, quantity)]
+        row = sorted(curves.get(look[0], ()), key=lambda point: point.setting_value)
+        errors = {point.setting_value: min(getattr(point, quantity), LARGEST) for point in row}
+        draw_line(axes, [1.0 / n for n in errors], list(errors.values()), label, look, ms=4, lw=1.6)
+        leaps = [point.setting_value for point in find_jumps(row, quantity)]
         ring = {"ls": "none", "marker": "o", "ms": 12, "mfc": "none", "mec": "black", "mew": 1.4}
         axes.plot([1.0 / n for n in leaps], [errors[n] for n in leaps], gid=f"jump-{quantity}", **ring)
 
 
-def picture(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
+def draw_picture(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
     """Draw panels of all quantities on the same axes."""
     from matplotlib.figure import Figure
 
@@ -54,7 +54,7 @@ def picture(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
     panels = figure.subplots(1, len(QUANTITIES), sharex=True, sharey=True)
     figure.subplots_adjust(left=0.06, right=0.99, bottom=0.13, top=0.72, wspace=0.08)
     for axes, quantity in zip(panels, QUANTITIES, strict=True):
-        over_the_timestep(axes, curves, quantity)
+        draw_over_timestep(axes, curves, quantity)
         axes.set(xscale="log", yscale="log", xlabel="time step, part of a revolution", ylim=(1e-12, 2.0 * LARGEST))
         axes.set_title(NAMES.get(quantity, f"pin force {quantity}"), loc="left", fontsize=11, weight="bold")
         axes.grid(visible=True)
@@ -62,17 +62,17 @@ def picture(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
     panels[0].set_ylabel("error, relative to its scale")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.012, 0.875), fontsize=9, ncols=len(CURVES))
-    return headed(figure, statement(curves), title, 0.955, 0.905)
+    return write_heading(figure, write_statement(curves), title, 0.955, 0.905)
 
 
-def statement(curves: Mapping[str, Sequence[CostPoint]]) -> str:
+def write_statement(curves: Mapping[str, Sequence[CostPoint]]) -> str:
     """Say what the picture means."""
     leaping: dict[str, None] = {}
     never: dict[str, list[str]] = {}
     for label, (name, *_) in CURVES.items():
-        row = sorted(curves.get(name, ()), key=lambda point: point.dial)
+        row = sorted(curves.get(name, ()), key=lambda point: point.setting_value)
         for quantity in QUANTITIES:
-            if jumps(row, quantity):
+            if find_jumps(row, quantity):
                 leaping[quantity] = None
             if row and not any(getattr(point, quantity) < TOO_LARGE for point in row):
                 never.setdefault(label, []).append(quantity)

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.style import matplotlib_style, save
+from fourbar.show.plot.style import apply_style, save
 from fourbar_validation.lab.cost import orders
-from fourbar_validation.lab.cost.laws import pareto
-from fourbar_validation.lab.cost.orders import CURVES, Look, headed, line_of
+from fourbar_validation.lab.cost.laws import find_pareto
+from fourbar_validation.lab.cost.orders import CURVES, Look, draw_line, write_heading
 from fourbar_validation.lab.cost.study import EXACT, FORMULAS, STEPPED, CostPoint
 
 SHOWN: dict[str, Look] = {
@@ -45,12 +45,12 @@ PALE = "#d9d9d9"
 def draw(curves: Mapping[str, Sequence[CostPoint]], title: str, folder: Path) -> list[Path]:
     """Draw all pictures of a scene as SVG and PNG; the files written."""
     written = []
-    with matplotlib_style():
-        made = {f"work-precision-{quantity}": _work_precision(curves, quantity, title) for quantity in NAMES}
+    with apply_style():
+        made = {f"work-precision-{quantity}": _draw_work_precision(curves, quantity, title) for quantity in NAMES}
         if any(name in curves for name, *_ in CURVES.values()):
-            made["orders"] = orders.picture(curves, title)
+            made["orders"] = orders.draw_picture(curves, title)
         if "tolerance, Newton" in curves:
-            made["sources"] = _sources(curves, title)
+            made["sources"] = _draw_sources(curves, title)
         for name, figure in made.items():
             for kind in ("svg", "png"):
                 written.append(folder / f"{name}.{kind}")
@@ -58,30 +58,32 @@ def draw(curves: Mapping[str, Sequence[CostPoint]], title: str, folder: Path) ->
     return written
 
 
-def _work_precision(curves: Mapping[str, Sequence[CostPoint]], quantity: str, title: str) -> Any:
+def _draw_work_precision(curves: Mapping[str, Sequence[CostPoint]], quantity: str, title: str) -> Any:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.6, 6.4))
     axes, labels = figure.add_axes((0.085, 0.1, 0.885, 0.735)), Labels()
     points = [point for name, row in curves.items() for point in row if "slow" not in name]
-    front = pareto([p for p in points if p.kind == STEPPED], quantity)
+    front = find_pareto([p for p in points if p.kind == STEPPED], quantity)
     broad: dict[str, Any] = {"lw": 9.0, "solid_capstyle": "round", "solid_joinstyle": "round", "zorder": 1}
-    axes.plot(*_places(front, quantity), **broad, color=PALE, label="Pareto front of everything stepped")
-    labels.keep_off(axes, *zip(*_places(front, quantity), strict=True))
+    axes.plot(*_compute_places(front, quantity), **broad, color=PALE, label="Pareto front of everything stepped")
+    labels.keep_off(axes, *zip(*_compute_places(front, quantity), strict=True))
     for label, look in SHOWN.items():
         row = [p for p in curves.get(look[0], ()) if math.isfinite(getattr(p, quantity))]
         if row:
             # a cross has no face: with a white edge it would vanish
             style: dict[str, Any] = {"mec": look[1], "mew": 1.4} if look[2] == "x" else {"mew": 0.6}
             style["zorder"] = 3 if look[0] == "recommended" else 2
-            line_of(axes, *_places(row, quantity), label, look, ms=5.5, lw=1.8, **style)
-            labels.keep_off(axes, *zip(*_places(row, quantity), strict=True), width=1.8)
+            draw_line(axes, *_compute_places(row, quantity), label, look, ms=5.5, lw=1.8, **style)
+            labels.keep_off(axes, *zip(*_compute_places(row, quantity), strict=True), width=1.8)
     for point in points:  # what a new user gets
         if point.setting == DEFAULT and math.isfinite(error := getattr(point, quantity)):
-            axes.plot(*_places([point], quantity), marker="*", ms=19, color="#d55e00", mec="black", mew=0.9, zorder=5)
-            text = f"MuJoCo's defaults (Euler, 2 ms): {short(error)}"
+            axes.plot(
+                *_compute_places([point], quantity), marker="*", ms=19, color="#d55e00", mec="black", mew=0.9, zorder=5
+            )
+            text = f"MuJoCo's defaults (Euler, 2 ms): {write_short(error)}"
             _name(labels, axes, point, quantity, text, INK, 10.0)
-    _exact(labels, axes, points, quantity)
+    _mark_exact(labels, axes, points, quantity)
     for point in curves.get("recommended", ())[::2]:
         text = f"{point.steps_per_revolution:.0f} steps, tc = {point.setting.partition('tc = ')[2]}"
         _name(labels, axes, point, quantity, text, "#0072b2")
@@ -99,10 +101,10 @@ def _work_precision(curves: Mapping[str, Sequence[CostPoint]], quantity: str, ti
     axes.yaxis.label.set_fontsize(11)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8.5)
     labels.settle(figure)
-    return headed(figure, statement(curves, quantity), title, 0.965, 0.928)
+    return write_heading(figure, write_statement(curves, quantity), title, 0.965, 0.928)
 
 
-def _places(points: Sequence[CostPoint], quantity: str) -> tuple[list[float], list[float]]:
+def _compute_places(points: Sequence[CostPoint], quantity: str) -> tuple[list[float], list[float]]:
     """Compute ms per revolution, and errors; what lies below the picture at its edge."""
     errors = [max(getattr(point, quantity), LOWEST) for point in points]
     return [1e3 * point.seconds_per_revolution for point in points], errors
@@ -112,30 +114,32 @@ def _name(
     labels: Labels, axes: Any, point: CostPoint, quantity: str, text: str, colour: str = INK, size: float = 8.5
 ) -> None:
     """Write next to a point, where it covers nothing."""
-    (x,), (y,) = _places([point], quantity)
+    (x,), (y,) = _compute_places([point], quantity)
     labels.keep_off(axes, (x, y), (x, y))
     labels.add(Label(axes, text, (x, y), (0.5 * x, y), colour, size))  # to the right where that is free
 
 
-def _exact(labels: Labels, axes: Any, points: Sequence[CostPoint], quantity: str) -> None:
+def _mark_exact(labels: Labels, axes: Any, points: Sequence[CostPoint], quantity: str) -> None:
     """Mark the methods that answer each position by itself."""
     marks = {EXACT: ("h", "#009e73"), FORMULAS: ("*", "black")}
     for point in points:
-        if point.kind == STEPPED or (point.curve == "one state" and point.dial > 0.0):
+        if point.kind == STEPPED or (point.curve == "one state" and point.setting_value > 0.0):
             continue
         (marker, colour), value = marks[point.kind], getattr(point, quantity)
-        axes.plot(*_places([point], quantity), marker=marker, ms=9, color=colour, mec="white", mew=0.6, zorder=4)
-        name = point.setting if value >= LOWEST else f"{point.setting}: {short(value)}, far below"
+        axes.plot(
+            *_compute_places([point], quantity), marker=marker, ms=9, color=colour, mec="white", mew=0.6, zorder=4
+        )
+        name = point.setting if value >= LOWEST else f"{point.setting}: {write_short(value)}, far below"
         _name(labels, axes, point, quantity, name)
 
 
-def short(value: float) -> str:
+def write_short(value: float) -> str:
     """Format one digit and its power of ten."""
     mantissa, _, exponent = f"{value:.0e}".partition("e")
     return f"{mantissa}e{int(exponent)}"
 
 
-def statement(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> str:
+def write_statement(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> str:
     """Say what the picture means."""
     four = [p for p in curves.get("recommended", ()) if getattr(p, quantity) <= 1e-4]
     default = [p for row in curves.values() for p in row if p.setting == DEFAULT]
@@ -148,12 +152,12 @@ def statement(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> str:
         )
     if default and math.isfinite(error := getattr(default[0], quantity)):
         parts.append(
-            f"the defaults pay {1e3 * default[0].seconds_per_revolution:.2g} ms for an error of {short(error)}"
+            f"the defaults pay {1e3 * default[0].seconds_per_revolution:.2g} ms for an error of {write_short(error)}"
         )
     return "; ".join(parts) or f"Error of the {NAMES[quantity]} against its cost"
 
 
-def _sources(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
+def _draw_sources(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
     """Draw time step, softness and solver tolerance, each with the other two too fine to matter."""
     from matplotlib.figure import Figure
 
@@ -167,8 +171,8 @@ def _sources(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
     ):
         for name, look in rows.items():
             row = [p for p in curves.get(look[0], ()) if math.isfinite(p.worst) and p.worst < 10.0]
-            x = [1.0 / p.dial if axes is panels[0] else p.dial or NONE for p in row]
-            line_of(axes, x, [p.worst for p in row], name, look, ms=5, lw=1.8)
+            x = [1.0 / p.setting_value if axes is panels[0] else p.setting_value or NONE for p in row]
+            draw_line(axes, x, [p.worst for p in row], name, look, ms=5, lw=1.8)
         axes.set(xscale="log", yscale="log", ylim=(1e-12, 20.0), xlabel=label)
         axes.set_title(heading, loc="left", fontsize=11, weight="bold", pad=44.0)
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8.5, ncols=2 if axes is panels[0] else 1)
@@ -177,15 +181,15 @@ def _sources(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
         if axes is not panels[0]:
             axes.tick_params(labelleft=False)
     panels[2].set_xticks([NONE, 1e-15, 1e-12, 1e-9, 1e-6], ["0", "1e-15", "1e-12", "1e-9", "1e-6"])
-    _slope(panels[0], 1.0, 4e-3, 3e-3, "1")
-    _slope(panels[0], 4.0, 8e-3, 1e-8, "4")
-    _slope(panels[1], 1.0, 2e-3, 2e-5, "1")
+    _draw_slope(panels[0], 1.0, 4e-3, 3e-3, "1")
+    _draw_slope(panels[0], 4.0, 8e-3, 1e-8, "4")
+    _draw_slope(panels[1], 1.0, 2e-3, 2e-5, "1")
     panels[0].set_ylabel("worst error of torque and pin forces")
     sentence = "Three sources, one at a time: time step by its order, softness in proportion, the solver unless at 0"
-    return headed(figure, sentence, title, 0.955, 0.912)
+    return write_heading(figure, sentence, title, 0.955, 0.912)
 
 
-def _slope(axes: Any, exponent: float, x: float, y: float, name: str) -> None:
+def _draw_slope(axes: Any, exponent: float, x: float, y: float, name: str) -> None:
     """Draw a slope with its exponent next to it."""
     axes.plot([x, 4.0 * x], [y, y * 4.0**exponent], color=INK, lw=1.0)
     axes.annotate(

@@ -14,14 +14,14 @@ from fourbar.files import dump
 from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.advise.advise import advise
-from fourbar_validation.advise.errors import NO_ANSWER, WorstErrors, errors
+from fourbar_validation.advise.worst_errors import NO_ANSWER, WorstErrors, compute_errors
 from fourbar_validation.compare.answer import Engine
 from fourbar_validation.engines.loop import Trial
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.lab.cost import formulas
-from fourbar_validation.lab.cost.curves import BEST, SLOW, Curve, Spot, curves
-from fourbar_validation.lab.stress.timed import in_turns, seconds
-from fourbar_validation.report.machine import versions
+from fourbar_validation.lab.cost.series import BEST, SLOW, Curve, Spot, design_curves
+from fourbar_validation.lab.stress.timed import time_call, time_in_turns
+from fourbar_validation.report.machine import list_versions
 from fourbar_validation.run.store import Store
 
 ROUNDS, ANSWERS = 7, 3
@@ -46,8 +46,8 @@ class CostPoint:
     kind: str
     """ "stepped" through time, "exact" at each position, or "formulas"."""
     setting: str
-    dial: float
-    """What the curve's dial stands at: steps per revolution, 1-d, tc in steps, tolerance, ..."""
+    setting_value: float
+    """The value of the curve's setting: steps per revolution, 1-d, tc in steps, tolerance, ..."""
     steps: int
     """Of one run through the scene; positions, where nothing is stepped."""
     steps_per_revolution: float
@@ -88,19 +88,22 @@ class CostStudy:
         self.command = command(scene)
         self.left_out: list[str] = []
         self._rigs: dict[tuple[bool, bool, bool], TrialSetup] = {}
-        self.units: dict[str, Callable[[], list[CostPoint]]] = {"formulas": self._formulas, "inverse": self._inverse}
-        self.units["one state"] = self._one_state
-        self.units["Pinocchio forward"] = self._pinocchio_forward
-        self.units["recommended"] = self._recommended
-        for curve in curves(scene):
-            self.units[curve.name] = lambda curve=curve: self._curve(curve)  # type: ignore[misc]
+        self.units: dict[str, Callable[[], list[CostPoint]]] = {
+            "formulas": self._time_formulas,
+            "inverse": self._time_inverse,
+        }
+        self.units["one state"] = self._time_one_state
+        self.units["Pinocchio forward"] = self._time_pinocchio_forward
+        self.units["recommended"] = self._try_recommended
+        for curve in design_curves(scene):
+            self.units[curve.name] = lambda curve=curve: self._try_curve(curve)  # type: ignore[misc]
 
     def __len__(self) -> int:
         return len(self.units)
 
     def points(self) -> Iterator[tuple[str, list[CostPoint]]]:
         """Yield curve after curve; what is on disk is not done again."""
-        identity = {"scene": dump(self.scene), "versions": versions(), "study": VERSION}
+        identity = {"scene": dump(self.scene), "versions": list_versions(), "study": VERSION}
         with Store(self.folder, identity).held() as store:
             done = store.done()
             for number, (name, unit) in enumerate(self.units.items()):
@@ -135,25 +138,27 @@ class CostStudy:
             self._rigs[slow, bare, settled] = TrialSetup(scene, at)
         return self._rigs[slow, bare, settled]
 
-    def _curve(self, curve: Curve) -> list[CostPoint]:
+    def _try_curve(self, curve: Curve) -> list[CostPoint]:
         settled = curve.settled and turns_fully(self.scene.linkage) and self.scene.motion.alpha_2 == 0.0
         setup = self.setup(curve.slow, curve.bare, settled)
-        return self._stepped(curve.name, curve.spots, setup, settled)
+        return self._try_spots(curve.name, curve.spots, setup, settled)
 
-    def _stepped(self, name: str, spots: tuple[Spot, ...], setup: TrialSetup, settled: bool = False) -> list[CostPoint]:
+    def _try_spots(
+        self, name: str, spots: tuple[Spot, ...], setup: TrialSetup, settled: bool = False
+    ) -> list[CostPoint]:
         """Try each spot: errors, and the CPU time of its steps next to that of the recommended model, interleaved."""
         trials = [setup.try_out(spot.settings, spot.build) for spot in spots]
         if settled:
             for trial in trials:
                 _leave_out_first(trial)
         clocks = [setup.seconds_per_step(spot.settings, spot.build) for spot in spots]
-        per_step, reference = _interleaved(
+        per_step, reference = _time_interleaved(
             clocks, setup.seconds_per_step(BEST), [min(t.steps, TIMED_STEPS) or 1 for t in trials]
         )
         points = []
         for spot, trial, (cost, scatter) in zip(spots, trials, per_step, strict=True):
             # the laws are those of the steps themselves: between them the advice judges
-            result = NO_ANSWER if trial.broken else errors(setup.scene, trial.at, trial.quantities)
+            result = NO_ANSWER if trial.broken else compute_errors(setup.scene, trial.at, trial.quantities)
             n = trial.steps_per_revolution or spot.settings.steps_per_revolution
             samples = max(len(trial.at.theta_2), 1)
             points.append(
@@ -164,7 +169,7 @@ class CostStudy:
             )
         return points
 
-    def _recommended(self) -> list[CostPoint]:
+    def _try_recommended(self) -> list[CostPoint]:
         """Try what the advice gives for each required error, where it is reached."""
         setup, spots = self.setup(), []
         for required in REQUIRED:
@@ -180,9 +185,9 @@ class CostStudy:
                 )
             else:
                 self.left_out.append(f"recommended: {advice.reason}")
-        return self._stepped("recommended", tuple(spots), setup)
+        return self._try_spots("recommended", tuple(spots), setup)
 
-    def _at_positions(
+    def _make_point(
         self,
         name: str,
         kind: str,
@@ -190,49 +195,49 @@ class CostStudy:
         found: WorstErrors,
         times: Sequence[float],
         n: int,
-        dial: float = math.nan,
+        setting_value: float = math.nan,
     ) -> CostPoint:
         """Make a point of a method that answers each position by itself."""
-        per_revolution = self._positions_per_revolution()
-        reference, (seconds, scatter) = self._rk4_step(), clocked(times)
+        per_revolution = self._count_positions_per_revolution()
+        reference, (seconds, scatter) = self._time_rk4_step(), summarise_timings(times)
         cost = seconds / n * per_revolution
         return CostPoint(
-            name, kind, label, dial, n, per_revolution, *found, cost, seconds / n, cost / reference, scatter
+            name, kind, label, setting_value, n, per_revolution, *found, cost, seconds / n, cost / reference, scatter
         )
 
-    def _positions_per_revolution(self) -> float:
+    def _count_positions_per_revolution(self) -> float:
         span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
         return 2.0 * math.pi / span * max(len(self.command.theta_2) - 1, 1)
 
-    def _rk4_step(self) -> float:
+    def _time_rk4_step(self) -> float:
         try:
             clock = self.setup().seconds_per_step(BEST)
         except LimitError:
             return math.nan
         return median(clock(TIMED_STEPS) / TIMED_STEPS for _ in range(ROUNDS))
 
-    def _formulas(self) -> list[CostPoint]:
-        few = formulas.few(self.command)
-        exact = formulas.fifty_digits(self.scene, few, 2 * formulas.FIFTY_DIGITS)
+    def _time_formulas(self) -> list[CostPoint]:
+        few = formulas.choose_few(self.command)
+        exact = formulas.evaluate_balls(self.scene, few, 2 * formulas.FIFTY_DIGITS)
         points = []
         for label, method in formulas.METHODS.items():
             try:
-                result = formulas.against_reference(self.scene, few, method(self.scene, few), exact)
+                result = formulas.compare_with_reference(self.scene, few, method(self.scene, few), exact)
             except (NotImplementedError, AssertionError) as error:
                 self.left_out.append(f"{label}: {error}")
                 continue
             at = few if label == "50 digits" else self.command
-            times = [seconds(partial(method, self.scene, at)) for _ in range(ROUNDS)]
-            points.append(self._at_positions("formulas", FORMULAS, label, result, times, len(at.theta_2)))
+            times = [time_call(partial(method, self.scene, at)) for _ in range(ROUNDS)]
+            points.append(self._make_point("formulas", FORMULAS, label, result, times, len(at.theta_2)))
         return points
 
-    def _inverse(self) -> list[CostPoint]:
+    def _time_inverse(self) -> list[CostPoint]:
         from fourbar_validation.engines.mujoco.inverse import MujocoInverse
         from fourbar_validation.engines.pinocchio import PinocchioInverse
 
-        return [self._answered("inverse", engine) for engine in (PinocchioInverse(), MujocoInverse())]
+        return [self._time_answer("inverse", engine) for engine in (PinocchioInverse(), MujocoInverse())]
 
-    def _answered(self, curve: str, engine: Engine, label: str = "", dial: float = math.nan) -> CostPoint:
+    def _time_answer(self, curve: str, engine: Engine, label: str = "", setting_value: float = math.nan) -> CostPoint:
         """Time an engine that answers each position."""
         import time
 
@@ -246,26 +251,28 @@ class CostStudy:
         assert answer.assembled is not None
         rows = np.flatnonzero(answer.assembled)
         at = self.command._replace(angle=self.command.theta_2[rows], branch=self.command.branch[rows])
-        result = errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
-        return self._at_positions(curve, EXACT, label or engine.name, result, times, len(self.command.theta_2), dial)
+        result = compute_errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
+        return self._make_point(
+            curve, EXACT, label or engine.name, result, times, len(self.command.theta_2), setting_value
+        )
 
-    def _one_state(self) -> list[CostPoint]:
+    def _time_one_state(self) -> list[CostPoint]:
         from fourbar_validation.engines.mujoco.one_state import MujocoOneState
 
         points = [
-            self._answered("one state", MujocoOneState((d,)), f"MuJoCo at one state, d = {d:g}", (1.0 - d) / d)
+            self._time_answer("one state", MujocoOneState((d,)), f"MuJoCo at one state, d = {d:g}", (1.0 - d) / d)
             for d in ONE_STATE
         ]
-        return [*points, self._answered("one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0)]
+        return [*points, self._time_answer("one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0)]
 
-    def _pinocchio_forward(self) -> list[CostPoint]:
+    def _time_pinocchio_forward(self) -> list[CostPoint]:
         from fourbar_validation.engines.pinocchio_forward import PinocchioForward
 
         points = []
-        reference = self._rk4_step()
+        reference = self._time_rk4_step()
         for n in FORWARD_STEPS:
             ran = PinocchioForward(self.scene, self.command, n, FORWARD_TIME_CONSTANT * n).forward()
-            result = errors(self.scene, ran.at, ran.quantities)
+            result = compute_errors(self.scene, ran.at, ran.quantities)
             cost = ran.stepping / ran.steps * ran.steps_per_revolution
             points.append(
                 CostPoint(
@@ -283,13 +290,13 @@ def _leave_out_first(trial: Trial) -> None:
     trial.quantities = {name: values[1:] for name, values in trial.quantities.items()}
 
 
-def clocked(times: Sequence[float]) -> tuple[float, float]:
+def summarise_timings(times: Sequence[float]) -> tuple[float, float]:
     """Compute the median of timings, and half of what their middle half spans, over it."""
     low, middle, high = np.percentile(times, (25, 50, 75)).tolist()
     return middle, 0.5 * (high - low) / middle
 
 
-def _interleaved(
+def _time_interleaved(
     clocks: list[Callable[[int], float]], reference: Callable[[int], float], steps: list[int]
 ) -> tuple[list[tuple[float, float]], float]:
     """Time the steps, and their scatter over rounds; all take turns, so that a slow spell hits all of them."""
@@ -298,5 +305,5 @@ def _interleaved(
         return clock(n) / n
 
     every = zip((reference, *clocks), (TIMED_STEPS, *steps), strict=True)
-    base, *times = in_turns(dict(enumerate(partial(per_step, *each) for each in every)), ROUNDS).values()
-    return [clocked(kept) for kept in times], median(base)
+    base, *times = time_in_turns(dict(enumerate(partial(per_step, *each) for each in every)), ROUNDS).values()
+    return [summarise_timings(kept) for kept in times], median(base)

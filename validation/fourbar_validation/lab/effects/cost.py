@@ -7,17 +7,17 @@ import click
 from fourbar.errors import DependencyError, InputError
 from fourbar.mjcf.effects import NO_MJCF
 from fourbar.writing import write_text
-from fourbar_validation.engines.witnesses import not_installed
-from fourbar_validation.lab.effects.work import DEFAULT_FLAGS, EFFECTS, ENGINES, flags
+from fourbar_validation.engines.witnesses import find_missing
+from fourbar_validation.lab.effects.work import DEFAULT_FLAGS, EFFECTS, ENGINES, list_flags
 
 NO_COUNTERPART = {("mujoco-simulated", name) for name in (*NO_MJCF, "load over theta_2")}
 
 
-def pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple[str, str]]:
+def list_pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple[str, str]]:
     """Pair each engine with each effect that it has, the simulation with each flag that the bare scene switches off."""
     chosen = [(engine, effect) for engine in engines for effect in effects if (engine, effect) not in NO_COUNTERPART]
     if "mujoco-simulated" in engines:
-        chosen += [("mujoco-simulated", name) for name in (DEFAULT_FLAGS, *flags())]
+        chosen += [("mujoco-simulated", name) for name in (DEFAULT_FLAGS, *list_flags())]
     return chosen
 
 
@@ -34,15 +34,15 @@ def command(engines: str, effects: str | None, out: Path | None) -> int:
             if name not in allowed:
                 raise InputError(option, name, "must be among " + ", ".join(allowed))
     for name in wanted:
-        if reason := not_installed(name.partition("-")[0]) if name != "formulas" else None:
+        if reason := find_missing(name.partition("-")[0]) if name != "formulas" else None:
             raise DependencyError(f"{name}: {reason}")
     from rich.progress import track
 
-    from fourbar_validation.lab.effects.table import markdown, measure, show
+    from fourbar_validation.lab.effects.table import measure, show, write_markdown
 
-    costs = [measure(*pair) for pair in track(pairs(wanted, chosen), description="timing", transient=True)]
+    costs = [measure(*pair) for pair in track(list_pairs(wanted, chosen), description="timing", transient=True)]
     show(costs)
     if out is not None:
-        write_text(out, markdown(costs))
+        write_text(out, write_markdown(costs))
         click.echo(f"written to {out}")
     return 0

@@ -9,8 +9,8 @@ import numpy as np
 
 from fourbar_validation.lab.effects.work import EFFECTS, ENGINES, POSITIONS
 from fourbar_validation.places import PROGRAM
-from fourbar_validation.report.machine import machine, versions
-from fourbar_validation.report.terminal import lined_up
+from fourbar_validation.report.machine import list_versions, name_machine
+from fourbar_validation.report.terminal import make_table
 
 ROUNDS = 31
 """Pairs of runs, first one ahead and then the other."""
@@ -36,7 +36,7 @@ class EffectCost(NamedTuple):
     """The middle half of the pairs lies between low and high."""
 
 
-def rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[str]]]:
+def list_rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[str]]]:
     """List the engines, and for each effect its name and a cell for each engine."""
     by_name = {(one.engine, one.effect): one for one in costs}
     engines = list(dict.fromkeys(engine for engine, _ in by_name))
@@ -60,17 +60,21 @@ def show(costs: Iterable[EffectCost]) -> None:
     """Print the table."""
     from rich.console import Console
 
-    engines, table = rows(costs)
-    Console().print(lined_up(["effect", *engines], table, caption=ABOUT))
+    engines, table = list_rows(costs)
+    Console().print(make_table(["effect", *engines], table, caption=ABOUT))
 
 
-def markdown(costs: Iterable[EffectCost]) -> str:
+def write_markdown(costs: Iterable[EffectCost]) -> str:
     """Write the table as Markdown, with the command, the versions and the machine."""
-    engines, table = rows(costs)
+    engines, table = list_rows(costs)
     lines = ["# What effects cost", "", f"`{COMMAND}`. {ABOUT}", ""]
     lines += ["| " + " | ".join(["", *engines]) + " |", "|---|" + "---:|" * len(engines)]
     lines += ["| " + " | ".join(cells) + " |" for cells in table]
-    lines += ["", ", ".join(f"{name} {version}" for name, version in versions().items()) + f"; {machine()}.", ""]
+    lines += [
+        "",
+        ", ".join(f"{name} {version}" for name, version in list_versions().items()) + f"; {name_machine()}.",
+        "",
+    ]
     return "\n".join(lines)
 
 

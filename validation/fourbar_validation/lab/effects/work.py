@@ -60,23 +60,23 @@ def formulas(effect: str) -> Callable[[int], Any]:
 
 def simulated(effect: str) -> Callable[[int], Any]:
     """Prepare a given number of steps of the generated MJCF."""
-    from fourbar.mjcf import mjcf
-    from fourbar_validation.engines.mujoco.stepping import steps
+    from fourbar.mjcf import write_mjcf
+    from fourbar_validation.engines.mujoco.stepping import make_stepper
 
-    text = mjcf(scene(effect if effect in EFFECTS else "none", 91))
+    text = write_mjcf(scene(effect if effect in EFFECTS else "none", 91))
     if effect == DEFAULT_FLAGS:
         text = re.sub(r"<flag [^>]*/>", "", text)
     elif effect not in EFFECTS:
-        text = text.replace(f' {flags()[effect]}="disable"', "")
-    return steps(text)
+        text = text.replace(f' {list_flags()[effect]}="disable"', "")
+    return make_stepper(text)
 
 
 @cache
-def flags() -> dict[str, str]:
+def list_flags() -> dict[str, str]:
     """List the flags that the MJCF of a bare scene switches off, by the name of the workload that leaves one on."""
-    from fourbar.mjcf import mjcf
+    from fourbar.mjcf import write_mjcf
 
-    result = re.findall(r'(\w+)="disable"', mjcf(scene("none", 91)))
+    result = re.findall(r'(\w+)="disable"', write_mjcf(scene("none", 91)))
     return {LEFT_ON.format(flag): flag for flag in result}
 
 

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.quantities import ANGLES, UNKNOWNS
-from fourbar_validation.places import checkout
-from fourbar_validation.run.elsewhere import ended
+from fourbar_validation.places import find_checkout
+from fourbar_validation.run.elsewhere import run_to_end
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -30,13 +30,13 @@ class Ratio(NamedTuple):
     most: float
 
 
-def against(revision: str, positions: int, rounds: int, tree: Path | None = None) -> dict[str, Ratio]:
+def time_against(revision: str, positions: int, rounds: int, tree: Path | None = None) -> dict[str, Ratio]:
     """Divide each timing of a tree by that of a revision of its repository.
 
     Raises InputError where the revision does not exist or is none of this package's, FourBarError where it has not
     what is timed, DependencyError where git is not installed.
     """
-    tree = checkout("bench --against") if tree is None else tree
+    tree = find_checkout("bench --against") if tree is None else tree
     with tempfile.TemporaryDirectory(prefix="fourbar-") as folder:
         unpack(revision, tree, Path(folder))
         pairs = []
@@ -44,7 +44,7 @@ def against(revision: str, positions: int, rounds: int, tree: Path | None = None
             turn = [(tree, "this tree"), (Path(folder), revision)]
             if number % 2:  # who goes second finds a warmer machine
                 turn.reverse()
-            times = {name: timings(where, name, positions) for where, name in turn}
+            times = {name: time_actions(where, name, positions) for where, name in turn}
             pairs.append((times["this tree"], times[revision]))
     rows = {}
     for name in pairs[0][0]:
@@ -59,26 +59,26 @@ def unpack(revision: str, tree: Path, folder: Path) -> None:
     if shutil.which("git") is None:
         raise DependencyError("bench --against needs git, which is not installed")
     arguments_of_git = ["rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}"]
-    commit = _git(tree, arguments_of_git).decode().strip()
-    archive = _git(tree, ["archive", "--format=tar", commit, "fourbar"]) if commit else b""
+    commit = _run_git(tree, arguments_of_git).decode().strip()
+    archive = _run_git(tree, ["archive", "--format=tar", commit, "fourbar"]) if commit else b""
     if not archive:
         raise InputError("--against", revision, f"must be a revision of the git repository of {tree} that has fourbar")
     with tarfile.open(fileobj=io.BytesIO(archive)) as packed:
         packed.extractall(folder, filter="data")
 
 
-def _git(tree: Path, arguments: list[str]) -> bytes:
+def _run_git(tree: Path, arguments: list[str]) -> bytes:
     """Return what git prints; nothing where it fails."""
     done = subprocess.run(["git", "-C", str(tree), *arguments], capture_output=True, check=False)
     return done.stdout if done.returncode == 0 else b""
 
 
-def timings(tree: Path, name: str, positions: int) -> dict[str, float]:
+def time_actions(tree: Path, name: str, positions: int) -> dict[str, float]:
     """Time each action, in CPU seconds, in a fresh interpreter that imports the package from a tree."""
     script = str(Path(__file__).with_name("timed.py"))
     line = [sys.executable, "-P", script, str(positions), *(" ".join(names) for names in (UNKNOWNS, ANGLES))]
     path = os.pathsep.join(filter(None, (str(tree), os.environ.get("PYTHONPATH"))))
-    done = ended(line, variables=dict.fromkeys(ONE_THREAD, "1") | {"PYTHONPATH": path})
+    done = run_to_end(line, variables=dict.fromkeys(ONE_THREAD, "1") | {"PYTHONPATH": path})
     if done.why:
         raise FourBarError(f"{name} cannot be timed: {done.why}")
     result = json.loads(done.out)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fourbar.effects import Gravity
 from fourbar.errors import BROKEN, FAILED, HOLDS
 from fourbar.evaluation.case import BLOCK
-from fourbar.formulas.mobility import default_range
+from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS
 from fourbar.scene import Command, Scene
@@ -25,22 +25,22 @@ from fourbar.show.plot.style import format_of
 from fourbar.solve import solve
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.lab.stress.against import ONE_THREAD
-from fourbar_validation.lab.stress.against import against as against_revision
+from fourbar_validation.lab.stress.against import time_against as against_revision
 from fourbar_validation.lab.stress.bench_picture import Times, draw_bench
 from fourbar_validation.lab.stress.contenders import (
     POSITIONS,
     STUDY,
-    interleaved,
-    loops,
-    over_linkages,
-    over_positions,
+    collect_loops,
+    time_interleaved,
+    time_linkages,
+    time_positions,
 )
-from fourbar_validation.lab.stress.limits import JUDGED_BY_SYSTEMS, LIMITS
-from fourbar_validation.lab.stress.timed import LINKAGE, command, example, preallocated, seconds
+from fourbar_validation.lab.stress.speed_limits import JUDGED_BY_SYSTEMS, LIMITS
+from fourbar_validation.lab.stress.timed import LINKAGE, allocate, make_command, make_example, time_call
 from fourbar_validation.published.thirteen import FreeBodies, solve_thirteen
-from fourbar_validation.report.machine import machine
-from fourbar_validation.report.terminal import lined_up
-from fourbar_validation.run.judge import judged
+from fourbar_validation.report.machine import name_machine
+from fourbar_validation.report.terminal import make_table
+from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 
@@ -73,7 +73,7 @@ class Measured(NamedTuple):
     not_run: dict[str, str]
 
 
-def bodies_of(scene: Scene, at: Command) -> FreeBodies:
+def make_bodies(scene: Scene, at: Command) -> FreeBodies:
     """Make the right-hand sides of the 13x13 system from the kinematics; not part of what is timed."""
     s = solve(scene, "acceleration", at=at)
     gravity = np.array(next((effect.vector for effect in scene.effects if isinstance(effect, Gravity)), (0.0, 0.0)))
@@ -100,18 +100,18 @@ def import_cost() -> float:
     return median(float(run.stdout) for run in runs)
 
 
-def memory(n: int) -> float:
+def measure_memory(n: int) -> float:
     """Measure the MB allocated at the peak beyond arguments and results."""
-    at = command(n)
-    out = preallocated(UNKNOWNS, at)
+    at = make_command(n)
+    out = allocate(UNKNOWNS, at)
     tracemalloc.start()
-    solve(example(), at=at, out=out, compiled=False)
+    solve(make_example(), at=at, out=out, compiled=False)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return peak / 1e6
 
 
-def floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
+def make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
     """Make what no formula for two angles does without: a tangent, a square root and two arctangents, by blocks."""
 
     def action() -> None:
@@ -138,7 +138,7 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
     if picture is not None:
         format_of(picture)
     if against is not None:
-        return compared_with(against, positions, rounds)
+        return print_comparison(against, positions, rounds)
     from rich.box import HEAVY_HEAD
     from rich.console import Console
 
@@ -161,10 +161,10 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
         rows.append((what, f"{measured:.2f}", f"{limit.sign} {limit.bound:g}", "holds" if holds else "fails"))
         broken += [] if holds else [f"{what}: {limit.reason}"]
     console = Console()
-    title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {machine()}"
-    console.print(lined_up(("what", "measured", "needed", ""), rows, title=title, box=HEAVY_HEAD))
+    title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {name_machine()}"
+    console.print(make_table(("what", "measured", "needed", ""), rows, title=title, box=HEAVY_HEAD))
     for title, times in ((OVER_POSITIONS, result.over_positions), (OVER_LINKAGES, result.over_linkages)):
-        console.print(_by_count(title, times))
+        console.print(_make_table(title, times))
     for who, reason in result.not_run.items():
         click.echo(f"not run: {who}: {reason}")
     if picture is not None:
@@ -174,16 +174,16 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
     return FAILED if broken else HOLDS
 
 
-def _by_count(title: str, times: Times) -> "Table":
+def _make_table(title: str, times: Times) -> "Table":
     """Lay out one row for each contender, one column for each count."""
     from rich.box import HEAVY_HEAD
 
     counts = sorted({n for own in times.values() for n in own})
     rows = [[who, *(f"{own[n]:.4g}" if n in own else "" for n in counts)] for who, own in times.items()]
-    return lined_up(["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)], rows, title=title, box=HEAVY_HEAD)
+    return make_table(["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)], rows, title=title, box=HEAVY_HEAD)
 
 
-def compared_with(revision: str, positions: int, rounds: int) -> int:
+def print_comparison(revision: str, positions: int, rounds: int) -> int:
     """Print this tree's times over those of a revision; a measurement without limits."""
     from rich.box import HEAVY_HEAD
     from rich.console import Console
@@ -194,28 +194,28 @@ def compared_with(revision: str, positions: int, rounds: int) -> int:
         times = (f"{1e3 * each:.4g}" for each in (row.ours, row.theirs))
         rows.append((what, *times, *(f"{each:.3f}" for each in (row.ratio, row.least, row.most))))
     title = f"CPU ms of a call in this tree and at {escape(revision)}, and their ratio; "
-    title += f"{positions} positions, one core, medians of {rounds} pairs in turns; {machine()}"
+    title += f"{positions} positions, one core, medians of {rounds} pairs in turns; {name_machine()}"
     head = ("what", "ours", "theirs", "ratio", "least", "most")
-    Console().print(lined_up(head, rows, title=title, box=HEAVY_HEAD))
+    Console().print(make_table(head, rows, title=title, box=HEAVY_HEAD))
     return HOLDS
 
 
 def measure(positions: int, rounds: int, largest: int) -> Measured:
     """Measure the ratios of LIMITS and ns per position, and the times by how many."""
-    scene, at = example(), command(positions)
-    limits, swing = example(WITH_LIMITS), command(positions, *default_range(WITH_LIMITS))
-    everything, angles = preallocated(UNKNOWNS, at), preallocated(ANGLES, at)
-    batch, solved = min(positions, THIRTEEN_BATCH), command(min(positions, SOLVED))
-    bodies = bodies_of(scene, command(batch))
-    alone, rng = example(theta_2=1.0), np.random.default_rng(0)
+    scene, at = make_example(), make_command(positions)
+    limits, swing = make_example(WITH_LIMITS), make_command(positions, *choose_range(WITH_LIMITS))
+    everything, angles = allocate(UNKNOWNS, at), allocate(ANGLES, at)
+    batch, solved = min(positions, THIRTEEN_BATCH), make_command(min(positions, SOLVED))
+    bodies = make_bodies(scene, make_command(batch))
+    alone, rng = make_example(theta_2=1.0), np.random.default_rng(0)
     systems, right = rng.random((1000, 13, 13)), rng.random((1000, 13, 1))
-    peers = loops()
+    peers = collect_loops()
     actions: dict[str, Callable[[], object]] = {
         "formulas, all 11 unknowns": lambda: solve(scene, at=at, out=everything, compiled=False),
         "the same compiled": lambda: solve(scene, at=at, out=everything, compiled=True),
         "positions only": lambda: solve(scene, at=at, out=angles),
         "13x13 assembled and solved": lambda: solve_thirteen(bodies, 2),
-        "floor: tangent, root, two arctan": floor(at.theta_2, angles),
+        "floor: tangent, root, two arctan": make_floor(at.theta_2, angles),
         "input between limits: all": lambda: solve(limits, at=swing, out=everything, compiled=False),
         "input between limits: positions only": lambda: solve(limits, at=swing, out=angles),
         "solve to forces, points too": lambda: solve(scene, "force", at=solved, compiled=False),
@@ -231,7 +231,7 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         actions["C, all"] = partial(peers.here["C"], at.theta_2, out)
     if "compiled" in peers.not_run:
         actions = {name: action for name, action in actions.items() if "compiled" not in name}
-    times = interleaved(actions, rounds)
+    times = time_interleaved(actions, rounds)
     counts = {"13x13 assembled and solved": batch}
     to_stages = ["solve to forces, points too", "solve with error bars"]
     to_stages += ["compiled to forces, points too", "compiled with error bars"]
@@ -239,8 +239,8 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     counts |= {"13x13 solved, 1000 at once": len(systems)}
     counts |= dict.fromkeys(("one position to forces", "one position with error bars"), ALONE)
     rows = {name: 1e9 * value / counts.get(name, positions) for name, value in times.items()}
-    by_positions = over_positions(peers.here, largest, rounds)
-    by_linkages = over_linkages(positions, rounds, compiled="compiled" in peers.here)
+    by_positions = time_positions(peers.here, largest, rounds)
+    by_linkages = time_linkages(positions, rounds, compiled="compiled" in peers.here)
     cost, most = by_positions["NumPy"], max(by_linkages[STUDY])
     everything_ns, forces = rows["formulas, all 11 unknowns"], rows["solve to forces, points too"]
     if "compiled" in peers.here:
@@ -250,7 +250,7 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
             rows["compiled / C"] = rows["the same compiled"] / rows["C, all"]
     exact = [witness for witness in WITNESSES if not witness.through_time]
     if not any(witness.missing() for witness in exact):
-        rows[JUDGED] = judging(exact, max(1, positions // PER_SCENE))
+        rows[JUDGED] = time_judging(exact, max(1, positions // PER_SCENE))
         rows[JUDGED_BY_SYSTEMS] = rows[JUDGED] * 1e6 / rows["13x13 assembled and solved"]
     rows |= {
         "13x13 / formulas": rows["13x13 assembled and solved"] / everything_ns,
@@ -263,15 +263,15 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         / rows["one position to forces"],
         "study of linkages / positions": by_linkages[STUDY][most] / by_linkages[POSITIONS][most],
         "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
-        "memory beyond the result, MB": memory(min(positions, 1_000_000)),
+        "memory beyond the result, MB": measure_memory(min(positions, 1_000_000)),
         "import fourbar / import numpy": import_cost(),
     }
     return Measured(rows, by_positions, by_linkages, peers.not_run)
 
 
-def judging(witnesses: list[Witness], scenes: int) -> float:
+def time_judging(witnesses: list[Witness], scenes: int) -> float:
     """Time the check of a random scene as `run` does it, nothing drawn: median CPU time in ms."""
     suite = Random(scenes + 1, 0, tuple(DrawnType))
-    each = (partial(judged, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
-    times = [seconds(action) for action in each]
+    each = (partial(judge_for_report, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
+    times = [time_call(action) for action in each]
     return 1e3 * median(times[1:])  # the first one imports the engines

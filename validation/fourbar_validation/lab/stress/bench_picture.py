@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fourbar.show.plot.style import format_of, matplotlib_style, save
-from fourbar_validation.report.machine import machine
+from fourbar.show.plot.style import apply_style, format_of, save
+from fourbar_validation.report.machine import name_machine
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,18 +20,18 @@ Times = dict[str, dict[int, float]]
 def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
     """Draw both growths on logarithmic axes into a file."""
     kind = format_of(path)
-    with matplotlib_style():
+    with apply_style():
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(8.4, 4.0), layout="constrained")
         left, right = figure.subplots(1, 2)
-        _panel(left, over_positions, "ns per position, every unknown", "positions")
-        _panel(right, over_linkages, "ns per linkage, every force at one position", "linkages")
-        figure.supxlabel(f"One core: {machine()}", size=6.8, x=0.012, ha="left", parse_math=False)
+        _draw_panel(left, over_positions, "ns per position, every unknown", "positions")
+        _draw_panel(right, over_linkages, "ns per linkage, every force at one position", "linkages")
+        figure.supxlabel(f"One core: {name_machine()}", size=6.8, x=0.012, ha="left", parse_math=False)
         save(figure, path, kind)
 
 
-def _panel(axes: "Axes", times: Times, title: str, over: str) -> None:
+def _draw_panel(axes: "Axes", times: Times, title: str, over: str) -> None:
     for (who, own), (colour, mark) in zip(times.items(), LOOKS, strict=False):
         axes.loglog(list(own), list(own.values()), color=colour, marker=mark, ms=3.5, lw=1.1, label=who)
     axes.set_title(title)

@@ -18,7 +18,7 @@ SOURCE = Path(__file__).with_name("bench_loop.c")
 FLAGS = ("-O3", "-march=native")
 
 
-def c_loop() -> Loop | str:
+def compile_loop() -> Loop | str:
     """Compile the loop; the reason where that fails."""
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     if compiler is None:

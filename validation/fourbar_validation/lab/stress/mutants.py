@@ -10,8 +10,8 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.files import loads
 from fourbar.scene import command
-from fourbar.solve import last_stage, solve
-from fourbar_validation.scenes.suites import model_files
+from fourbar.solve import find_last_stage, solve
+from fourbar_validation.scenes.suites import list_model_files
 
 HANG = 5.0
 """Seconds; a scene file takes milliseconds."""
@@ -35,17 +35,17 @@ class FileFailure:
     text: str
 
 
-def mutants(seed: int, indices: Sequence[int], originals: Sequence[str]) -> Iterator[tuple[int, str]]:
+def mutate_files(seed: int, indices: Sequence[int], originals: Sequence[str]) -> Iterator[tuple[int, str]]:
     """Mutate scene files; each depends on (seed, index) alone."""
     for index in indices:
         rng = np.random.default_rng([seed, index])
         text = originals[int(rng.integers(len(originals)))]
         for _ in range(int(rng.integers(1, 6))):
-            text = _mutated(text, rng, originals)
+            text = _mutate(text, rng, originals)
         yield index, text
 
 
-def _mutated(text: str, rng: np.random.Generator, originals: Sequence[str]) -> str:
+def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> str:
     if not text:
         return PIECES[int(rng.integers(len(PIECES)))]
     at, length = int(rng.integers(len(text))), int(rng.geometric(0.1))
@@ -80,7 +80,7 @@ def try_out(index: int, text: str) -> FileFailure | None:
         if scene.motion.free is None:
             at = command(scene)
             if len(at.theta_2) <= MOST_POSITIONS:
-                solve(scene, last_stage(scene), at=at)
+                solve(scene, find_last_stage(scene), at=at)
     except FourBarError as error:
         if "\n" in str(error):
             return FileFailure(index, f"more than one line: {error}", text)
@@ -100,9 +100,9 @@ def fuzz_files(count: int, seed: int) -> int:
     """Read mutated scene files; any traceback or hang is printed with its text, and fails."""
     from rich.progress import track
 
-    originals = [file.read_text(encoding="utf-8") for file in model_files()]
+    originals = [file.read_text(encoding="utf-8") for file in list_model_files()]
     failed = 0
-    for index, text in track(mutants(seed, range(count), originals), total=count, description="mutants"):
+    for index, text in track(mutate_files(seed, range(count), originals), total=count, description="mutants"):
         trouble = try_out(index, text)
         if trouble is not None:
             failed += 1

@@ -21,23 +21,23 @@ PER_CALL = {"one position to forces": 5_000, "one position with error bars": 20_
 """Positions in the time of one call, roughly: what is quick is called as often as lets the clock see it."""
 
 
-def example(linkage: FourBar = LINKAGE, theta_2: float | None = 0.0) -> Scene:
+def make_example(linkage: FourBar = LINKAGE, theta_2: float | None = 0.0) -> Scene:
     """Build the scene that is timed: crank at 10 rad/s, gravity, drive on the input; theta_2 None: its full range."""
     return Scene(linkage, Motion(theta_2, 10.0), 2, (), (Gravity(),))
 
 
-def command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
+def make_command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
     """Command n positions, over a revolution unless specified otherwise."""
     return Command(np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
 
 
-def preallocated(names: Iterable[str], at: Command) -> dict[str, Array]:
+def allocate(names: Iterable[str], at: Command) -> dict[str, Array]:
     """Allocate arrays as `solve` lays them out, touched so that no page is faulted in while the clock runs."""
-    first = solve(example(), at=at)
+    first = solve(make_example(), at=at)
     return {name: getattr(first, name) for name in names}
 
 
-def seconds(action: Callable[[], object], calls: int = 1) -> float:
+def time_call(action: Callable[[], object], calls: int = 1) -> float:
     """Time one call in this process, in CPU seconds."""
     start = time.process_time()
     for _ in range(calls):
@@ -45,7 +45,7 @@ def seconds(action: Callable[[], object], calls: int = 1) -> float:
     return (time.process_time() - start) / calls
 
 
-def in_turns(clocks: Mapping[Any, Callable[[], float]], rounds: int) -> dict[Any, list[float]]:
+def time_in_turns(clocks: Mapping[Any, Callable[[], float]], rounds: int) -> dict[Any, list[float]]:
     """Read the clocks in turns, so that a slow spell hits all of them."""
     times: dict[Any, list[float]] = {name: [] for name in clocks}
     for _ in range(rounds):
@@ -56,8 +56,13 @@ def in_turns(clocks: Mapping[Any, Callable[[], float]], rounds: int) -> dict[Any
 
 def main(positions: int, unknowns: list[str], angles: list[str]) -> dict[str, float]:
     """Time each action, in CPU seconds, by name."""
-    scene, whole, at, one = example(), example(theta_2=None), command(positions), command(1, 1.0, 1.0)
-    everything, alone = preallocated(unknowns, at), preallocated(angles, at)
+    scene, whole, at, one = (
+        make_example(),
+        make_example(theta_2=None),
+        make_command(positions),
+        make_command(1, 1.0, 1.0),
+    )
+    everything, alone = allocate(unknowns, at), allocate(angles, at)
     actions: dict[str, Callable[[], object]] = {
         "formulas, all unknowns": lambda: solve(scene, at=at, out=everything),
         "angles alone": lambda: solve(scene, at=at, out=alone),
@@ -68,7 +73,7 @@ def main(positions: int, unknowns: list[str], angles: list[str]) -> dict[str, fl
     times = {}
     for name, action in actions.items():
         action()  # imports and first pages are not what is timed
-        times[name] = seconds(action, max(2, positions // PER_CALL.get(name, positions)))
+        times[name] = time_call(action, max(2, positions // PER_CALL.get(name, positions)))
     return times
 
 

@@ -11,9 +11,9 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.rows import REFUSES, Row
 from fourbar_validation.compare.tolerance import ErrorBound
-from fourbar_validation.engines.description import driving
+from fourbar_validation.engines.description import name_driving
 from fourbar_validation.run.question import NotAskedError, Question
-from fourbar_validation.run.shipped.variants import at_free_bodies, moved, row_of
+from fourbar_validation.run.shipped.variants import ask_free_bodies, make_row, move_numbers
 
 GIVEN = 1e-4
 """Of a length: the tolerance that the run gives it."""
@@ -38,7 +38,7 @@ def extremes(question: Question) -> list[Row]:
     """Judge the proven extremes of the torque: with tolerances, the scene's own or some that the run gives it."""
     scene = replace(question.scene, points=(), title="", source="", pictures=())
     _require_conditioned(scene)
-    drive = driving(scene)
+    drive = name_driving(scene)
     if not scene.tolerances:
         lengths = {name: getattr(scene.linkage, name).length for name in ("input", "coupler")}
         scene = replace(
@@ -58,7 +58,9 @@ def extremes(question: Question) -> list[Row]:
     corners = [dict(zip(reach, signs, strict=True)) for signs in product((-INSIDE, INSIDE), repeat=len(reach))]
     values = np.array(
         [
-            at_free_bodies(moved(bare, {key: sign * reach[key] for key, sign in corner.items()})).quantities[drive]
+            ask_free_bodies(move_numbers(bare, {key: sign * reach[key] for key, sign in corner.items()})).quantities[
+                drive
+            ]
             for corner in ({}, *corners)
         ]
     )
@@ -74,13 +76,13 @@ def extremes(question: Question) -> list[Row]:
                 beyond[at] = max(beyond[at], reached - float((sign * own[:, at]).max()))
             error = np.maximum(error, beyond / size)
     reason = f"{len(values)} linkages at {len(theta_2)} positions"
-    return [row_of(question, "extremes", drive, error, BOUNDS, theta_2, reason)]
+    return [make_row(question, "extremes", drive, error, BOUNDS, theta_2, reason)]
 
 
 def _require_conditioned(scene: Scene) -> None:
     """NotAskedError where bars 3 and 4 come near to one line within the interval, not at its ends."""
     around = np.linspace(0.0, 2.0 * np.pi, POSITIONS)
-    answer = at_free_bodies(replace(scene, motion=Motion(around, None, branch=scene.motion.branch), tolerances=()))
+    answer = ask_free_bodies(replace(scene, motion=Motion(around, None, branch=scene.motion.branch), tolerances=()))
     assert answer.assembled is not None
     inside = answer.assembled & np.roll(answer.assembled, 1) & np.roll(answer.assembled, -1)
     sine = np.abs(answer.quantities["sin_mu"][inside])

@@ -8,7 +8,7 @@ import numpy as np
 import fourbar
 from fourbar.effects import Load
 from fourbar.effects.load import Table
-from fourbar.errors import installing
+from fourbar.errors import say_install
 from fourbar.scene import Scene
 from fourbar.scene.point import Point
 from fourbar.studies.keys import command_key
@@ -16,14 +16,14 @@ from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import (
-    at_free_bodies,
+    ask_free_bodies,
     at_places,
-    held_to,
-    member,
-    moved,
-    sampled,
-    stated,
-    worst_rows,
+    find_stated,
+    hold_to,
+    keep_worst,
+    move_numbers,
+    take_few,
+    take_member,
 )
 
 MEMBERS = 5
@@ -37,15 +37,15 @@ CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
 def compiled(question: Question) -> list[Row]:
     """Judge the compiled formulas at every position, with points and a load over a table if the scene has none."""
     if not find_spec("numba"):
-        raise NotAskedError(f"numba is not installed: {installing('fast')}")
-    scene = furnished(question.scene, question)
+        raise NotAskedError(f"numba is not installed: {say_install('fast')}")
+    scene = furnish(question.scene, question)
     with np.errstate(all="ignore"):
         result = fourbar.solve(scene, at=question.at, compiled=True)
-        answer = at_free_bodies(scene, question.at)
-    return held_to(question, "compiled", scene, result, answer)
+        answer = ask_free_bodies(scene, question.at)
+    return hold_to(question, "compiled", scene, result, answer)
 
 
-def furnished(scene: Scene, question: Question) -> Scene:
+def furnish(scene: Scene, question: Question) -> Scene:
     """Give the scene a point on each bar and a load over a table, as large as its forces, where it has none."""
     coupler, first = scene.linkage.coupler, float(question.solution.theta_2[0])
     if not scene.points:
@@ -63,20 +63,21 @@ def furnished(scene: Scene, question: Question) -> Scene:
 
 def study(question: Question) -> list[Row]:
     """Judge a square study in which every number varies, member by member."""
-    scene = furnished(sampled(question), question)
+    scene = furnish(take_few(question), question)
     places, key = np.asarray(scene.motion.angle), command_key(scene)
-    of = stated(scene, fourbar.sensitivity(scene).keys)
+    of = find_stated(scene, fourbar.sensitivity(scene).keys)
     del of[key]
     values = {key: np.array([x + number * APART * step for number in range(MEMBERS)]) for key, (x, step) in of.items()}
     # the places of each member lie within those of the scene: nothing says that a table reaches further
     each = np.array([places + APART * number * (places.mean() - places) for number in range(MEMBERS)])
     members = [
-        moved(at_places(scene, own), {k: number * APART * of[k].step for k in of}) for number, own in enumerate(each)
+        move_numbers(at_places(scene, own), {k: number * APART * of[k].step for k in of})
+        for number, own in enumerate(each)
     ]
     rows = []
     with np.errstate(all="ignore"):
         for how in (False, True) if find_spec("numba") else (False,):
             result = fourbar.solve(fourbar.vary(scene, values | {key: each}), compiled=how)
             for number, one in enumerate(members):
-                rows += held_to(question, "study", one, member(result, number), at_free_bodies(one))
-    return worst_rows(rows)
+                rows += hold_to(question, "study", one, take_member(result, number), ask_free_bodies(one))
+    return keep_worst(rows)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fourbar
-from fourbar.formulas.mobility import change_points, intervals, turns_fully
+from fourbar.formulas.mobility import change_points, find_intervals, turns_fully
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.studies.equilibrium import Equilibrium
@@ -20,7 +20,7 @@ from fourbar_validation.compare.rows import AGREES, FAILS, Row
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.run.question import NotAskedError, Question
-from fourbar_validation.run.shipped.variants import row_of
+from fourbar_validation.run.shipped.variants import make_row
 
 SAMPLES = 720
 """Of a turn of the input: between two of them the torque changes its sign at an odd number of equilibria."""
@@ -61,7 +61,7 @@ def equilibria(question: Question) -> Iterator[Row]:
     if errors:
         where = np.array([each.place.theta_2 for each in result.found if _decided(each)])
         for name, error in zip(("torque", "slope", "inertia", "frequency"), np.array(errors).T, strict=True):
-            yield row_of(question, "equilibria", name, error, REST, where, f"{len(error)} equilibria")
+            yield make_row(question, "equilibria", name, error, REST, where, f"{len(error)} equilibria")
 
 
 def _at_rest(scene: Scene) -> Scene:
@@ -82,7 +82,9 @@ def _around(question: Question) -> Array:
     if isinstance(motion.angle, Sweep) or motion.law is not None:
         low, high = float(swept.min()), min(float(swept.max()), float(swept.min()) + turn)
     else:
-        low, high = next(own for own in intervals(question.scene.linkage) if (first - own[0]) % turn <= own[1] - own[0])
+        low, high = next(
+            own for own in find_intervals(question.scene.linkage) if (first - own[0]) % turn <= own[1] - own[0]
+        )
     return np.arange(low + OFF_GRID * turn / SAMPLES, high, turn / SAMPLES)
 
 

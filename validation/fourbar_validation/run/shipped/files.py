@@ -13,14 +13,14 @@ import numpy as np
 from fourbar.effects import Effect, Friction, Gravity, Viscous
 from fourbar.errors import InputError, LimitError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
-from fourbar.mjcf.sdf import sdf as sdf_text
-from fourbar.mjcf.usd import usd as usd_text
+from fourbar.mjcf.sdf import write_sdf as sdf_text
+from fourbar.mjcf.usd import write_usd as usd_text
 from fourbar.scene import Scene
 from fourbar.solve import solve
 from fourbar_validation.compare.rows import REFUSES, Row
 from fourbar_validation.compare.tolerance import EPS, K
 from fourbar_validation.run.question import Question
-from fourbar_validation.run.shipped.variants import at_free_bodies, held_to, sampled, worst_rows
+from fourbar_validation.run.shipped.variants import ask_free_bodies, hold_to, keep_worst, take_few
 
 NUMBER = r"[-+.\deE]+"
 BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
@@ -52,34 +52,34 @@ class Contents(NamedTuple):
 
 def sdf(question: Question) -> list[Row]:
     """Judge the SDF for Gazebo."""
-    return _file(question, "sdf", lambda scene: _of_sdf(sdf_text(scene)))
+    return _judge_file(question, "sdf", lambda scene: _read_sdf(sdf_text(scene)))
 
 
 def usd(question: Question) -> list[Row]:
     """Judge the USD."""
-    return _file(question, "usd", lambda scene: _of_usd(usd_text(scene)))
+    return _judge_file(question, "usd", lambda scene: _read_usd(usd_text(scene)))
 
 
-def _file(question: Question, engine: str, read: Callable[[Scene], Contents]) -> list[Row]:
+def _judge_file(question: Question, engine: str, read: Callable[[Scene], Contents]) -> list[Row]:
     """Compare a file at its own position and at some more; loads are what a simulator adds."""
-    scene = replace(sampled(question), loads=(), points=())
+    scene = replace(take_few(question), loads=(), points=())
     theta_2 = np.asarray(scene.motion.theta_2)
     opened = replace(scene, motion=replace(scene.motion, theta_2=theta_2[:1]))
     try:
         held = read(opened)
     except (LimitError, InputError) as limit:
         return [Row.unmeasured(question.name, engine, "exact", "all", REFUSES, str(limit))]
-    theirs, rows = assembled(held, opened), []
+    theirs, rows = build_scene(held, opened), []
     with np.errstate(all="ignore"):
         for turns in held.turns:
-            answer = at_free_bodies(replace(theirs, motion=replace(scene.motion, theta_2=np.array([turns["input"]]))))
+            answer = ask_free_bodies(replace(theirs, motion=replace(scene.motion, theta_2=np.array([turns["input"]]))))
             answer.quantities |= {f"theta_{BARS[bar]}": np.array([turns[bar]]) for bar in ("coupler", "output")}
-            rows += held_to(question, engine, opened, solve(opened), answer)
-        more = at_free_bodies(replace(theirs, motion=scene.motion))
-        return worst_rows([*rows, *held_to(question, engine, scene, solve(scene), more)])
+            rows += hold_to(question, engine, opened, solve(opened), answer)
+        more = ask_free_bodies(replace(theirs, motion=scene.motion))
+        return keep_worst([*rows, *hold_to(question, engine, scene, solve(scene), more)])
 
 
-def assembled(held: Contents, scene: Scene) -> Scene:
+def build_scene(held: Contents, scene: Scene) -> Scene:
     """Build the scene that a file describes, in the motion and with the drive of another."""
     bodies, pins = held.bodies, held.pins
     span = pins["O4"] - pins["O2"]
@@ -96,7 +96,7 @@ def assembled(held: Contents, scene: Scene) -> Scene:
     return replace(scene, linkage=FourBar(abs(span), two, three, four, cmath.phase(span)), effects=effects)
 
 
-def _of_sdf(text: str) -> Contents:
+def _read_sdf(text: str) -> Contents:
     root = ET.fromstring(text)
 
     def numbers(of: ET.Element, path: str) -> list[float]:
@@ -118,10 +118,10 @@ def _of_sdf(text: str) -> Contents:
             if joint.find(f"axis/dynamics/{name}") is not None:
                 at_pins[pin] = numbers(joint, f"axis/dynamics/{name}")[0]
     gravity = complex(*numbers(next(root.iter("world")), "gravity")[:2])
-    return Contents(bodies, pins, [_turns(bodies), _noted(text)], gravity, **dynamics)
+    return Contents(bodies, pins, [_read_turns(bodies), _read_noted(text)], gravity, **dynamics)
 
 
-def _of_usd(text: str) -> Contents:
+def _read_usd(text: str) -> Contents:
     def numbers(of: str, key: str) -> list[float]:
         result = re.search(rf"{re.escape(key)} = (.*)", of)
         return [float(number) for number in re.findall(NUMBER, result[1])] if result else [math.nan] * 4
@@ -156,14 +156,14 @@ def _of_usd(text: str) -> Contents:
     closing = at_joints | {"coupler": at_joints["coupler at B"]}
     (pull,), direction = numbers(blocks["physics"], "physics:gravityMagnitude"), "physics:gravityDirection"
     gravity = pull * complex(*numbers(blocks["physics"], direction)[:2])
-    return Contents(bodies, pins, [_turns(bodies), at_joints, closing, _noted(text)], gravity, {}, {})
+    return Contents(bodies, pins, [_read_turns(bodies), at_joints, closing, _read_noted(text)], gravity, {}, {})
 
 
-def _turns(bodies: dict[str, FileBody]) -> dict[str, float]:
+def _read_turns(bodies: dict[str, FileBody]) -> dict[str, float]:
     return {bar: body.turn for bar, body in bodies.items()}
 
 
-def _noted(text: str) -> dict[str, float]:
+def _read_noted(text: str) -> dict[str, float]:
     """Read the angles that the file states in words."""
     return {
         bar: float(result[1])

@@ -16,13 +16,13 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED, Comparison
-from fourbar_validation.compare.reversals import reversing
+from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.compare.rows import AGREES, FAILS, VERDICTS, Row
-from fourbar_validation.compare.scales import reference_of
-from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, ErrorBound, magnitude, used
+from fourbar_validation.compare.scales import make_reference
+from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, ErrorBound, find_used, magnitude
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.witnesses import predicting_from
-from fourbar_validation.run.printed import points
+from fourbar_validation.engines.witnesses import make_prediction
+from fourbar_validation.run.printed import compare_points
 from fourbar_validation.run.question import FREE_BODY, NotAskedError, Question, ask_at
 
 SAMPLE = 5
@@ -34,7 +34,7 @@ NOT_AT_REST = 1e-3
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
-def sampled(question: Question) -> Scene:
+def take_few(question: Question) -> Scene:
     """Take the scene at a few of its positions, such that small changes of its numbers change its quantities little.
 
     Raises NotAskedError where there are none.
@@ -50,7 +50,7 @@ def sampled(question: Question) -> Scene:
         & np.isfinite(reference.F12).all(axis=1)
     )
     fit &= (reference.drive_condition >= WELL_CONDITIONED) & (at.branch == scene.motion.branch)
-    fit &= ~reversing(scene, solution, NOT_AT_REST) & (np.asarray(at.speed) != 0.0)
+    fit &= ~mark_reversing(scene, solution, NOT_AT_REST) & (np.asarray(at.speed) != 0.0)
     for load in scene.loads:
         for corner in () if load.table is None else load.table.theta_2:
             fit &= np.abs(np.angle(np.exp(1j * (solution.theta_2 - corner)))) > FROM_A_CORNER
@@ -74,7 +74,7 @@ class FileNumber(NamedTuple):
     step: float
 
 
-def stated(scene: Scene, keys: Iterable[str]) -> dict[str, FileNumber]:
+def find_stated(scene: Scene, keys: Iterable[str]) -> dict[str, FileNumber]:
     """Find those of the keys whose numbers the scene's file states; of motion.theta_2 the first.
 
     What it leaves out (the inertia of a uniform bar, its centre) follows the lengths.
@@ -90,7 +90,7 @@ def stated(scene: Scene, keys: Iterable[str]) -> dict[str, FileNumber]:
     return result
 
 
-def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
+def move_numbers(scene: Scene, changes: Mapping[str, float]) -> Scene:
     """Change some numbers of a scene by so much, through the text of its file: keys as there.
 
     motion.theta_2 moves every position.
@@ -99,8 +99,10 @@ def moved(scene: Scene, changes: Mapping[str, float]) -> Scene:
     for key, change in changes.items():
         table, last = _place(document, key)
         old = table[last]
-        table[last] = [_changed(each, change) for each in old] if isinstance(old, list) else _changed(old, change)
-    return loads("\n".join(f"{json.dumps(key)} = {_toml(value)}" for key, value in document.items()))
+        table[last] = (
+            [_change_entry(each, change) for each in old] if isinstance(old, list) else _change_entry(old, change)
+        )
+    return loads("\n".join(f"{json.dumps(key)} = {_write_toml(value)}" for key, value in document.items()))
 
 
 def _place(document: Any, key: str) -> tuple[Any, Any]:
@@ -113,41 +115,41 @@ def _place(document: Any, key: str) -> tuple[Any, Any]:
     return document, last
 
 
-def _changed(quantity: str | float, change: float) -> str | float:
+def _change_entry(quantity: str | float, change: float) -> str | float:
     number, _, unit = str(quantity).partition(" ")
     return f"{float(number) + change!r} {unit}" if unit else float(number) + change
 
 
-def _toml(value: Any) -> str:
+def _write_toml(value: Any) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(key)} = {_toml(each)}" for key, each in value.items()) + "}"
-    return "[" + ",\n".join(map(_toml, value)) + "]" if isinstance(value, list) else json.dumps(value)
+        return "{" + ", ".join(f"{json.dumps(key)} = {_write_toml(each)}" for key, each in value.items()) + "}"
+    return "[" + ",\n".join(map(_write_toml, value)) + "]" if isinstance(value, list) else json.dumps(value)
 
 
-def at_free_bodies(scene: Scene, at: Command | None = None) -> Answer:
+def ask_free_bodies(scene: Scene, at: Command | None = None) -> Answer:
     """Ask the free bodies at the scene's own positions, or others."""
     with np.errstate(all="ignore"):
         return ask_at(FreeBody(), scene, command(scene) if at is None else at)
 
 
-def held_to(question: Question, engine: str, scene: Scene, solution: Solution, answer: Answer) -> list[Row]:
+def hold_to(question: Question, engine: str, scene: Scene, solution: Solution, answer: Answer) -> list[Row]:
     """Compare a solution that a public call gave for a scene with the answer of the free bodies."""
     answer = replace(answer, engine=engine)
     assert answer.at is not None
-    predicted = predicting_from(FREE_BODY, scene, answer.at, answer)
-    reference = reference_of(scene, answer)
+    predicted = make_prediction(FREE_BODY, scene, answer.at, answer)
+    reference = make_reference(scene, answer)
     rows = Comparison(question.name, scene, answer, solution, EQUIVALENCE, COMPARED, predicted, reference).rows()
     if scene.points and reference is not None:
-        rows.append(replace(points(question, scene, solution, reference, WELL_CONDITIONED), engine=engine))
+        rows.append(replace(compare_points(question, scene, solution, reference, WELL_CONDITIONED), engine=engine))
     return rows
 
 
-def worst_rows(rows: Iterable[Row]) -> list[Row]:
+def keep_worst(rows: Iterable[Row]) -> list[Row]:
     """Keep the worst of several rows of a quantity."""
     result: dict[tuple[str, str], Row] = {}
 
     def badness(row: Row) -> tuple[int, float]:
-        return VERDICTS.index(row.verdict), float(used(row.error, row.allowed))
+        return VERDICTS.index(row.verdict), float(find_used(row.error, row.allowed))
 
     for row in rows:
         key = row.setting, row.quantity
@@ -156,17 +158,17 @@ def worst_rows(rows: Iterable[Row]) -> list[Row]:
     return list(result.values())
 
 
-def row_of(
+def make_row(
     question: Question, engine: str, quantity: str, error: Array, tolerance: ErrorBound, theta_2: Array, reason: str
 ) -> Row:
     """Make the row of a quantity whose errors at some positions are held to one tolerance."""
-    index = int(np.argmax(used(error, tolerance.factor)))
-    verdict = AGREES if used(error[index], tolerance.factor) <= 1.0 else FAILS
+    index = int(np.argmax(find_used(error, tolerance.factor)))
+    verdict = AGREES if find_used(error[index], tolerance.factor) <= 1.0 else FAILS
     numbers = float(error[index]), tolerance.factor, verdict, f"{tolerance.name}: {reason}", float(theta_2[index]), 1.0
     return Row(question.name, engine, "exact", quantity, *numbers)
 
 
-def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
+def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
     """Take one linkage of a solved study, or some positions of one linkage."""
 
     def own(value: Any) -> Any:
@@ -180,7 +182,7 @@ def member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
     return one
 
 
-def parts(answer: Answer) -> dict[str, Array]:
+def split_parts(answer: Answer) -> dict[str, Array]:
     """Split the unknowns of a position: vectors as components, pin forces also as their magnitudes."""
     result = {}
     for name in (name for name in (*UNKNOWNS, LINE.value) if name in answer.quantities):

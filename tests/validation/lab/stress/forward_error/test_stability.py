@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.show.tables import heading
+from fourbar.show.tables import write_heading
 from fourbar_validation.lab.stress.forward_error.families import FAMILIES
 from fourbar_validation.lab.stress.forward_error.stability import run
-from fourbar_validation.lab.stress.forward_error.tally import CHANCE, TOO_SMALL, USELESS, Tally, by_chance
+from fourbar_validation.lab.stress.forward_error.tally import CHANCE, TOO_SMALL, USELESS, Tally, is_by_chance
 from tests.fourbar.studies.test_function import LIBRARIES
 
 SAMPLES = 40
@@ -107,7 +107,7 @@ def test_kites_that_stand_still_beside_no_exact_directions() -> None:
 def test_error_bars_are_neither_too_small_nor_useless(tallies: dict[str, Tally]) -> None:
     for bar in ("torque_error", "force_error"):
         assert max(tally.too_small[bar] for tally in tallies.values()) <= TOO_SMALL
-        assert by_chance(sum(tally.too_large[bar] for tally in tallies.values()), SAMPLES * len(tallies))
+        assert is_by_chance(sum(tally.too_large[bar] for tally in tallies.values()), SAMPLES * len(tallies))
 
 
 def test_a_share_is_one_that_chance_explains() -> None:
@@ -121,8 +121,8 @@ def test_a_share_is_one_that_chance_explains() -> None:
 
     for samples in (1, 60, 500):
         k = least_unexplained(samples)
-        assert by_chance(k - 1, samples) and (k > samples or not by_chance(k, samples))
-    assert by_chance(100, 10_000) and not by_chance(160, 10_000)
+        assert is_by_chance(k - 1, samples) and (k > samples or not is_by_chance(k, samples))
+    assert is_by_chance(100, 10_000) and not is_by_chance(160, 10_000)
 
 
 @pytest.mark.parametrize(("family", "seed", "number"), [(f, *sample) for f, bad in ONCE_BAD.items() for sample in bad])
@@ -162,11 +162,11 @@ def test_the_command_line_says_how_few_digits_are_left() -> None:
     dead = float(np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35)))  # bars 2, 3 in line
     for angle, warned in ((dead + 1e-11, True), (dead + 0.5, False)):
         scene = fourbar.Scene(linkage, fourbar.Motion(angle, 10.0), drive_bar=4)
-        lines = heading(scene, fourbar.solve(scene, "error"))
+        lines = write_heading(scene, fourbar.solve(scene, "error"))
         assert any("digits left of T4" in line and "bars 2 and 3" in line for line in lines) is warned
     nothing = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
     scene = fourbar.Scene(nothing, fourbar.Motion(1.0, 5.0))
-    assert not any("digits" in line for line in heading(scene, fourbar.solve(scene, "error")))
+    assert not any("digits" in line for line in write_heading(scene, fourbar.solve(scene, "error")))
 
 
 def test_error_bars_grow_towards_a_dead_centre() -> None:

@@ -18,9 +18,9 @@ from fourbar.studies.sloped import Sloped
 from fourbar_validation.lab.stress.fuzz import fuzz as examine
 from fourbar_validation.lab.stress.fuzz import outside
 from fourbar_validation.lab.stress.fuzz.fuzz import run
-from fourbar_validation.lab.stress.fuzz.scenes import scene_of
-from fourbar_validation.lab.stress.fuzz.shrink import KEPT, keep, shrunk
-from fourbar_validation.report.machine import code
+from fourbar_validation.lab.stress.fuzz.scenes import draw_fuzz_scene
+from fourbar_validation.lab.stress.fuzz.shrink import KEPT, keep, shrink_scene
+from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.store import Store
 from tests.fourbar.studies.test_enclosure import meeting
 from tests.support.here import judge_here
@@ -31,7 +31,7 @@ SEED = 0
 
 @pytest.mark.parametrize("path", sorted(KEPT.glob("*.toml")), ids=lambda path: path.stem)
 def test_a_kept_counterexample_holds(path: Path) -> None:
-    findings = (outside if path.stem.startswith("bounds") else examine).findings
+    findings = (outside if path.stem.startswith("bounds") else examine).list_findings
     assert findings(loads(path.read_text(encoding="utf-8"))) == []
 
 
@@ -40,12 +40,16 @@ def test_a_stretch_of_scenes_holds() -> None:
 
 
 def test_a_scene_depends_on_its_number_alone() -> None:
-    assert fourbar.dump(scene_of(3, 17)) == fourbar.dump(scene_of(3, 17)) != fourbar.dump(scene_of(3, 19))
+    assert (
+        fourbar.dump(draw_fuzz_scene(3, 17))
+        == fourbar.dump(draw_fuzz_scene(3, 17))
+        != fourbar.dump(draw_fuzz_scene(3, 19))
+    )
 
 
 def test_half_are_adversarial() -> None:
     """Odd scenes reach where even ones never go: bars in a ratio beyond 100, or positions that barely close."""
-    spread = [max(s.linkage.lengths) / min(s.linkage.lengths) for s in (scene_of(SEED, i) for i in range(200))]
+    spread = [max(s.linkage.lengths) / min(s.linkage.lengths) for s in (draw_fuzz_scene(SEED, i) for i in range(200))]
     assert max(spread[0::2]) < 20.0
     assert max(spread[1::2]) > 1e3
 
@@ -63,23 +67,23 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch: pytest.MonkeyP
     solving = import_module("fourbar.evaluation.case")
     monkeypatch.setattr(solving, "pin_forces", small_error(solving.pin_forces))
     scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
-    assert examine.findings(scene)
-    small = shrunk(scene, lambda candidate: bool(examine.findings(candidate)))
-    assert len(small.loads) + len(small.effects) < 3 and examine.findings(small)
+    assert examine.list_findings(scene)
+    small = shrink_scene(scene, lambda candidate: bool(examine.list_findings(candidate)))
+    assert len(small.loads) + len(small.effects) < 3 and examine.list_findings(small)
     kept = keep(small, "billionth", tmp_path)
-    assert examine.findings(loads(kept.read_text(encoding="utf-8")))
+    assert examine.list_findings(loads(kept.read_text(encoding="utf-8")))
 
 
 def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
-    assert examine.findings(scene) == []
+    assert examine.list_findings(scene) == []
     true = fourbar.formulas.mobility.limit_positions
     monkeypatch.setattr(
         fourbar.formulas.mobility,
         "limit_positions",
         lambda *of: tuple(limit._replace(theta_4=limit.theta_4 + 1e-9) for limit in true(*of)),
     )
-    found = {finding.split(":")[0] for finding in examine.findings(scene)}
+    found = {finding.split(":")[0] for finding in examine.list_findings(scene)}
     assert found == {"pinocchio-inverse range", "pinocchio-inverse limit_positions"}
 
 
@@ -105,8 +109,8 @@ def test_a_traceback_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise ZeroDivisionError("oops")
 
-    monkeypatch.setattr(examine, "_file", broken)
-    assert examine.findings(crank_rocker()) == ["ZeroDivisionError: oops"]
+    monkeypatch.setattr(examine, "_check_file", broken)
+    assert examine.list_findings(crank_rocker()) == ["ZeroDivisionError: oops"]
 
 
 def test_a_position_that_does_not_close_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,9 +123,9 @@ def test_a_position_that_does_not_close_is_a_finding(monkeypatch: pytest.MonkeyP
         solution.status_code[:] = 0
         return solution
 
-    assert examine.findings(scene) == []
+    assert examine.list_findings(scene) == []
     monkeypatch.setattr("fourbar_validation.run.question.solve", pretend)
-    assert any(line.startswith("assembled") for line in examine.findings(scene))
+    assert any(line.startswith("assembled") for line in examine.list_findings(scene))
 
 
 def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,7 +133,7 @@ def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     first = run(12, 1, tmp_path, 1)
     next(first)
     first.close()
-    with Store(tmp_path, {"seed": 1, "bounds": False, **code()}).held() as store:
+    with Store(tmp_path, {"seed": 1, "bounds": False, **name_code()}).held() as store:
         assert store.done() >= {4}
         store.put(4, [{"0": ["left by the run before"]}])
     found = list(run(12, 1, tmp_path, 1))
@@ -177,7 +181,7 @@ def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatc
         return found._replace(least=within(found.least, 1e-6), greatest=within(found.greatest, -1e-6))
 
     watched(monkeypatch, narrower)
-    found = outside.findings(outside.scene_of(SEED, 45))
+    found = outside.list_findings(outside.draw_scene(SEED, 45))
     assert [line.split(":")[0] for line in found if "beyond" in line] == ["extremes torque"] * 2 + [
         "extremes |F12|"
     ] * 2
@@ -192,17 +196,17 @@ def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) 
             distance.values += np.array([float(ball.contains(0)) for ball in distance.values], dtype=object)
         return of.stiffness + of.slack / distance
 
-    assert outside.findings(meeting(0.1005)) == []
-    monkeypatch.setattr(spring, "_per_distance", silent)
-    assert any("beyond" in line for line in outside.findings(meeting(0.1005)))
+    assert outside.list_findings(meeting(0.1005)) == []
+    monkeypatch.setattr(spring, "_divide_by_distance", silent)
+    assert any("beyond" in line for line in outside.list_findings(meeting(0.1005)))
 
 
 def test_a_scene_with_a_value_outside_is_kept_as_it_is(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    scene = fourbar.dump(outside.scene_of(3, 1))
+    scene = fourbar.dump(outside.draw_scene(3, 1))
     judge_here(monkeypatch)
-    monkeypatch.setattr(outside, "findings", lambda of: ["outside"] if fourbar.dump(of) == scene else [])
+    monkeypatch.setattr(outside, "list_findings", lambda of: ["outside"] if fourbar.dump(of) == scene else [])
     monkeypatch.setattr(examine, "keep", lambda of, name: keep(of, name, tmp_path))
     assert examine.fuzz.callback(2, True, 3, 1, tmp_path / "out") == 1
     assert capsys.readouterr().out == "1 of 2 scenes fail (seed 3)\n"

@@ -11,27 +11,35 @@ from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.point import Point
 from fourbar.solve import solve
-from fourbar_validation.scenes.random import Ranges, decades, drawn, product, sometimes, uneven_lengths, uniform
+from fourbar_validation.scenes.random import (
+    Ranges,
+    draw_chance,
+    draw_decades,
+    draw_product,
+    draw_scene,
+    draw_uneven_lengths,
+    draw_uniform,
+)
 
 
-def ranges_of(spread: float) -> Ranges:
+def spread_masses(spread: float) -> Ranges:
     """Spread masses over decades to either side, one bar of ten without any; centres anywhere about the bar."""
     return Ranges(
-        mass=sometimes(0.9, product(decades(-spread, spread), uniform(0.2, 5.0))),
-        inertia=uniform(0.0, 0.5),
-        centre=uniform(-0.5, 1.5),
-        centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
-        ground_angle=sometimes(0.5, uniform(-3.0, 3.0)),
+        mass=draw_chance(0.9, draw_product(draw_decades(-spread, spread), draw_uniform(0.2, 5.0))),
+        inertia=draw_uniform(0.0, 0.5),
+        centre=draw_uniform(-0.5, 1.5),
+        centre_angle=draw_chance(0.5, draw_uniform(-3.0, 3.0)),
+        ground_angle=draw_chance(0.5, draw_uniform(-3.0, 3.0)),
         viscous=0.3,
         friction=0.2,
         by_length=False,
     )
 
 
-EVEN, UNEVEN = ranges_of(0.0), ranges_of(3.0)
+EVEN, UNEVEN = spread_masses(0.0), spread_masses(3.0)
 
 
-def at_angle(scene: Scene, theta_2: float) -> Scene:
+def put_at_angle(scene: Scene, theta_2: float) -> Scene:
     """Put the scene at theta_2 (rad from theta_1 on)."""
     angle = scene.linkage.ground_angle + theta_2
     return replace(scene, motion=replace(scene.motion, theta_2=angle))
@@ -45,7 +53,7 @@ def random(rng: np.random.Generator) -> Scene:
         diagonal = abs(d - a * complex(math.cos(angle), math.sin(angle)))
         b, c = rng.uniform(0.1, 1.0, 2)
         if abs(b - c) < diagonal < b + c:
-            return at_angle(drawn(rng, (d, a, b, c), EVEN), angle)
+            return put_at_angle(draw_scene(rng, (d, a, b, c), EVEN), angle)
 
 
 def limit(rng: np.random.Generator) -> Scene:
@@ -57,7 +65,7 @@ def limit(rng: np.random.Generator) -> Scene:
         if abs(cosine) < 0.999:
             offset = 10.0 ** rng.uniform(-12, -2) * (1.0 if folded else -1.0)
             angle = float(rng.choice([-1.0, 1.0])) * (math.acos(cosine) + offset)
-            return at_angle(drawn(rng, (d, a, b, c), EVEN), angle)
+            return put_at_angle(draw_scene(rng, (d, a, b, c), EVEN), angle)
 
 
 def change_point(rng: np.random.Generator) -> Scene:
@@ -81,13 +89,13 @@ def change_point(rng: np.random.Generator) -> Scene:
     if rng.random() < 0.3:
         k = int(rng.integers(0, 4))
         lengths = tuple(v * (1.0 + 0.1 * distance**2) if i == k else v for i, v in enumerate(lengths))
-    return at_angle(drawn(rng, lengths, EVEN), straight + distance)
+    return put_at_angle(draw_scene(rng, lengths, EVEN), straight + distance)
 
 
 def ratios(rng: np.random.Generator) -> Scene:
     """Draw crank to ground, coupler to diagonal, and masses, each in ratios from 1e-6 to 1e6."""
-    lengths, angle = uneven_lengths(rng, decades(-6.0, 6.0), decades(-1.0, 1.0))
-    return at_angle(drawn(rng, lengths, UNEVEN), angle)
+    lengths, angle = draw_uneven_lengths(rng, draw_decades(-6.0, 6.0), draw_decades(-1.0, 1.0))
+    return put_at_angle(draw_scene(rng, lengths, UNEVEN), angle)
 
 
 def scales(rng: np.random.Generator) -> Scene:
@@ -112,7 +120,7 @@ def speeds(rng: np.random.Generator) -> Scene:
     return replace(scene, motion=replace(scene.motion, omega_2=omega, alpha_2=alpha))
 
 
-def off(rng: np.random.Generator) -> float:
+def draw_deviation(rng: np.random.Generator) -> float:
     """Draw a relative deviation of 1e-5 to 3e-2, to either side."""
     return float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-5.0, math.log10(3e-2)))
 
@@ -135,7 +143,9 @@ def springs(rng: np.random.Generator) -> Scene:
     stiffness, preload = float(rng.uniform(10.0, 1000.0)), 0.0
     if rng.random() < 0.5:
         preload = float(rng.uniform(-0.5, 2.0)) * stiffness * distance
-    spring = Spring(start, end, stiffness, max(distance * (1.0 + off(rng)) + preload / stiffness, 0.0), preload)
+    spring = Spring(
+        start, end, stiffness, max(distance * (1.0 + draw_deviation(rng)) + preload / stiffness, 0.0), preload
+    )
     return replace(scene, effects=(Springs((spring,)),))
 
 
@@ -154,7 +164,7 @@ def torsion(rng: np.random.Generator) -> Scene:
     if rng.random() < 0.5:
         preload = float(rng.uniform(-2.0, 2.0)) * stiffness
     turns = math.tau * float(rng.choice([0, 0, int(rng.integers(-100, 100))]))
-    rest = float(theta[second - 1] - theta[first - 1]) * (1.0 + off(rng)) + preload / stiffness + turns
+    rest = float(theta[second - 1] - theta[first - 1]) * (1.0 + draw_deviation(rng)) + preload / stiffness + turns
     return replace(scene, effects=(Torsion.at(**{pin: (stiffness, rest, preload)}),))
 
 
@@ -168,7 +178,7 @@ def tables(rng: np.random.Generator) -> Scene:
     angle = float(np.asarray(scene.motion.theta_2)) - linkage.ground_angle
     before, after = 10.0 ** rng.uniform(-3.0, 0.3, 2)
     rise = float(rng.uniform(-2.0, 2.0))
-    first = -rise * before * ((1.0 + off(rng)) if rng.random() < 0.5 else float(rng.uniform(-2.0, 2.0)))
+    first = -rise * before * ((1.0 + draw_deviation(rng)) if rng.random() < 0.5 else float(rng.uniform(-2.0, 2.0)))
     table = Table((angle - before, angle + after), (first, first + rise * (before + after)))
     turns = int(rng.choice([0, 1, -1, int(10.0 ** rng.uniform(0.0, 9.0))]))
     size, arm = float(rng.uniform(0.1, 10.0)), float(rng.uniform(0.0, 1.0))

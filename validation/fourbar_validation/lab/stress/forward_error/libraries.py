@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import Friction, Gravity, Load, Table, Viscous
-from fourbar.errors import DependencyError, installing
+from fourbar.errors import DependencyError, say_install
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import OF_LINE, STAGE_OF
 from fourbar.scene import Scene
 from fourbar.studies.function import NEVER, function
-from fourbar.studies.keys import at_place, command_key, entries, left_out, placed, with_numbers
+from fourbar.studies.keys import command_key, is_left_out, list_entries, read_place, replace_numbers, replace_place
 from fourbar_validation.engines.description import PINS
 
 LIBRARIES = ("jax", "torch")
 QUANTITIES = tuple(name for name in STAGE_OF if name not in {*NEVER, *OF_LINE})
 
 
-def loaded(library: str) -> tuple[Any, Any]:
+def load_library(library: str) -> tuple[Any, Any]:
     """Return the functions for arrays of a library, and the context in which they are doubles."""
     try:
         import array_api_compat  # noqa: F401
@@ -34,11 +34,11 @@ def loaded(library: str) -> tuple[Any, Any]:
             return torch, nullcontext()
         import jax
     except ModuleNotFoundError as error:
-        raise DependencyError(f"{error.name} is not installed: {installing(library)}") from None
+        raise DependencyError(f"{error.name} is not installed: {say_install(library)}") from None
     return jax.numpy, jax.enable_x64(True)
 
 
-def alike(scene: Scene) -> Scene:
+def make_alike(scene: Scene) -> Scene:
     """Give a drawn scene gravity, damping and dry friction of size 0 where it has none, so that programs are shared.
 
     A table goes on to a whole turn, beyond the piece that the position is in.
@@ -50,10 +50,10 @@ def alike(scene: Scene) -> Scene:
         friction.update(own.get(Friction, Friction(())).torques)
         gravity = own.get(Gravity, Gravity(0.0))
         scene = replace(scene, effects=(gravity, Viscous.at(**viscous), Friction.at(**friction)))
-    return replace(scene, loads=tuple(replace(load, table=_closed(load.table)) for load in scene.loads))
+    return replace(scene, loads=tuple(replace(load, table=_close_table(load.table)) for load in scene.loads))
 
 
-def with_every_load(scene: Scene) -> Scene:
+def add_every_load(scene: Scene) -> Scene:
     """Give a scene two loads on every bar in each frame, of size 0 where it has none, so that programs are shared."""
     if any(load.table or load.force is None for load in scene.loads):
         return scene
@@ -67,35 +67,41 @@ def with_every_load(scene: Scene) -> Scene:
     return replace(scene, loads=tuple(loads))
 
 
-def _closed(table: Table | None) -> Table | None:
+def _close_table(table: Table | None) -> Table | None:
     if table is None or table.covers_a_turn:
         return table
     return Table((*table.theta_2, table.theta_2[0] + math.tau), (*table.factor, table.factor[0]))
 
 
-def numbers_of(scene: Scene) -> dict[str, float]:
+def list_numbers(scene: Scene) -> dict[str, float]:
     """List every number that a scene of one position states, its angle too, by key."""
-    found = {key: at_place(scene, entry.place) for key, entry in entries(scene).items() if not left_out(scene, entry)}
+    found = {
+        key: read_place(scene, entry.place)
+        for key, entry in list_entries(scene).items()
+        if not is_left_out(scene, entry)
+    }
     return {**found, command_key(scene): float(np.asarray(scene.motion.angle))}
 
 
-def evaluated(scene: Scene, library: str) -> dict[str, Any]:
+def evaluate(scene: Scene, library: str) -> dict[str, Any]:
     """Evaluate every quantity of a scene of one position in doubles."""
-    scene = alike(scene)
+    scene = make_alike(scene)
     if scene.loads or len(scene.effects) > 1:
-        scene = with_every_load(scene)
-    numbers, scene = numbers_of(scene), placed(scene, ("motion", scene.motion.names[0]), 0.0)
-    xp, doubles = loaded(library)
+        scene = add_every_load(scene)
+    numbers, scene = list_numbers(scene), replace_place(scene, ("motion", scene.motion.names[0]), 0.0)
+    xp, doubles = load_library(library)
     with doubles:
-        program = _program(with_numbers(scene, dict.fromkeys(entries(scene).keys() & numbers, 1.0)), library)
+        program = _make_program(
+            replace_numbers(scene, dict.fromkeys(list_entries(scene).keys() & numbers, 1.0)), library
+        )
         found = program(*(xp.asarray(number, dtype=xp.float64) for number in numbers.values()))
         return {name: np.asarray(value) for name, value in found.items()}
 
 
 @cache
-def _program(scene: Scene, library: str) -> Callable[..., Any]:
+def _make_program(scene: Scene, library: str) -> Callable[..., Any]:
     """Make the function of every number of a scene; of a table, which is none, there would be too many programs."""
-    f = function(scene, list(numbers_of(scene)), QUANTITIES)
+    f = function(scene, list(list_numbers(scene)), QUANTITIES)
     if library == "torch" or any(load.table for load in scene.loads):
         return f
     import jax

@@ -15,19 +15,19 @@ from fourbar.quantities import OK, STATUS_NAMES
 from fourbar.scene import Scene
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.function import function
-from fourbar.studies.keys import command_key, with_numbers
-from fourbar_validation.engines.balls import STEP_BITS, Values, outputs, stored
-from fourbar_validation.lab.stress.forward_error.libraries import QUANTITIES, alike, loaded, numbers_of
-from fourbar_validation.lab.stress.forward_error.tally import Tally, components, ratio, untold
+from fourbar.studies.keys import command_key, replace_numbers
+from fourbar_validation.engines.balls import STEP_BITS, Values, compute_outputs, make_balls
+from fourbar_validation.lab.stress.forward_error.libraries import QUANTITIES, list_numbers, load_library, make_alike
+from fourbar_validation.lab.stress.forward_error.tally import Tally, compute_ratio, is_untold, list_components
 
 Slopes = dict[str, dict[str, tuple[Any, float]]]
 """By output and key: a derivative as a ball, and sum |x_j ds/dx_j|."""
 
 
-def exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
+def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
     """Return every output, and its derivatives and theirs by every number, by differences in balls."""
-    numbers, angle = numbers_of(scene), command_key(scene)
-    stored(scene, numbers[angle])  # sets the precision
+    numbers, angle = list_numbers(scene), command_key(scene)
+    make_balls(scene, numbers[angle])  # sets the precision
     steps = {key: arb(abs(number) or 1.0) * arb(2) ** -STEP_BITS for key, number in numbers.items()}
 
     def moved(*keys: str) -> Values:
@@ -35,8 +35,8 @@ def exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
         for key in keys:
             changed[key] = changed[key] + steps[key]
         stated = changed.pop(angle)
-        other = with_numbers(scene, {key: changed[key] for key in set(keys) - {angle}})
-        found = outputs(other, scene.motion.branch, stored(other, stated), scene.drive_bar)
+        other = replace_numbers(scene, {key: changed[key] for key in set(keys) - {angle}})
+        found = compute_outputs(other, scene.motion.branch, make_balls(other, stated), scene.drive_bar)
         assert found is not None
         return found
 
@@ -56,14 +56,14 @@ def exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
     return base, {name: {key: (by[name][key], rates[name][key]) for key in numbers} for name in base}
 
 
-def slopes(scene: Scene, library: str) -> dict[str, Any]:
+def differentiate(scene: Scene, library: str) -> dict[str, Any]:
     """Differentiate by every number: by `sensitivity`, forwards in JAX, backwards in PyTorch; a row for each number."""
-    numbers = numbers_of(scene)
+    numbers = list_numbers(scene)
     if library == "numpy":
         found = sensitivity(scene)
         rows = [list(found.keys).index(key) for key in numbers]
         return {name: of[rows, 0] for name, of in found.by.items()}
-    f, (xp, doubles) = function(scene, list(numbers), QUANTITIES), loaded(library)
+    f, (xp, doubles) = function(scene, list(numbers), QUANTITIES), load_library(library)
     if library == "jax":
         from jax import jacfwd as jacobian
     else:
@@ -76,24 +76,24 @@ def slopes(scene: Scene, library: str) -> dict[str, Any]:
 def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
     """Compare the derivatives at one position with those of the reference."""
     tally.samples += 1
-    scene = alike(scene)
+    scene = make_alike(scene)
     if sensitivity(scene).status != [STATUS_NAMES[OK]]:
         tally.no_torque += 1
         return
-    (values, exact), found, numbers = exact_slopes(scene), slopes(scene, library), numbers_of(scene)
+    (values, exact), found, numbers = compute_exact_slopes(scene), differentiate(scene, library), list_numbers(scene)
     moves = {name: _moves(by, numbers) for name, by in exact.items()}
-    if library != "numpy" and np.isnan(found["sin_mu"]).any() and untold(values["sin_mu"], moves["sin_mu"]):
+    if library != "numpy" and np.isnan(found["sin_mu"]).any() and is_untold(values["sin_mu"], moves["sin_mu"]):
         tally.untold += 1
         return
     for name, rows in found.items():
-        together = max(moves.get(component, 0.0) for component, _ in components(name))
-        for component, index in components(name):
+        together = max(moves.get(component, 0.0) for component, _ in list_components(name))
+        for component, index in list_components(name):
             if component not in exact:
                 continue
             for (key, number), row in zip(numbers.items(), rows, strict=True):
                 value, rate = exact[component][key]
                 rate += together / (abs(number) or 1.0)
-                tally.note(component, ratio("", np.ravel(row)[index], value, rate)[0], f"{sample} by {key}")
+                tally.note(component, compute_ratio("", np.ravel(row)[index], value, rate)[0], f"{sample} by {key}")
 
 
 def _moves(slopes: dict[str, tuple[Any, float]], numbers: dict[str, float]) -> float:

@@ -17,22 +17,22 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.compare.tolerance import used
-from fourbar_validation.engines.balls import reference
-from fourbar_validation.engines.workers import each
+from fourbar_validation.compare.tolerance import find_used
+from fourbar_validation.engines.balls import compute_reference
+from fourbar_validation.engines.workers import apply_each
 from fourbar_validation.lab.stress.forward_error.families import FAMILIES
-from fourbar_validation.lab.stress.forward_error.libraries import LIBRARIES, evaluated
+from fourbar_validation.lab.stress.forward_error.libraries import LIBRARIES, evaluate
 from fourbar_validation.lab.stress.forward_error.slopes import judge_slopes
 from fourbar_validation.lab.stress.forward_error.tally import (
     HALF_A_DIGIT,
     TOO_LARGE,
     Tally,
-    allowed,
-    components,
-    ratio,
-    untold,
+    compute_allowed,
+    compute_ratio,
+    is_untold,
+    list_components,
 )
-from fourbar_validation.report.terminal import lined_up
+from fourbar_validation.report.terminal import make_table
 
 FULL = 10_000
 """Samples per family of the full set."""
@@ -40,7 +40,7 @@ CHUNK = 250
 """Samples per task: about a second."""
 
 
-def solved(scene: Scene, angle: float) -> dict[str, Any]:
+def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
     """Solve one position with error bars; `solve` evaluates one in plain numbers, two in arrays."""
     motion, times = scene.motion, 1 + hash(angle) % 2  # as good as random, and the same on every run
     branch = np.full(times, motion.branch, np.int8)
@@ -55,27 +55,27 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
     motion, angle = scene.motion, float(np.asarray(scene.motion.angle))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = solved(scene, angle) if library == "numpy" else evaluated(scene, library)
+        found = solve_position(scene, angle) if library == "numpy" else evaluate(scene, library)
     tally.warned += [f"{sample}: {warning.message}" for warning in caught]
-    exact = reference(scene, motion.branch, angle)
+    exact = compute_reference(scene, motion.branch, angle)
     if exact is None:
         tally.not_assembled += 1
         if math.isfinite(found["torque"]):
             tally.worst["assembled"] = (math.inf, sample)
         return
     values, sensitivity = exact
-    if library != "numpy" and math.isnan(found["sin_mu"]) and untold(values["sin_mu"], sensitivity["sin_mu"]):
+    if library != "numpy" and math.isnan(found["sin_mu"]) and is_untold(values["sin_mu"], sensitivity["sin_mu"]):
         tally.untold += 1
         return
     errors: dict[str, float] = {}
     for name in found:
-        for component, index in components(name):
+        for component, index in list_components(name):
             if component not in values or name == motion.names[0] or name.endswith("_error"):
                 continue
             own, rate = np.ravel(found[name])[index], sensitivity[component]
             if library != "numpy":  # whose lengths are no constants: no bar rests or stays parallel exactly
-                rate += max(allowed(0.0, sensitivity[other]) for other, _ in components(name))
-            part, errors[component] = ratio(name, own, values[component], rate)
+                rate += max(compute_allowed(0.0, sensitivity[other]) for other, _ in list_components(name))
+            part, errors[component] = compute_ratio(name, own, values[component], rate)
             tally.note(component, part, sample)
     if "torque" not in values:
         tally.no_torque += 1
@@ -89,7 +89,7 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
         ("force_error", force, strongest),
     ):
         bar = float(found[name])
-        tally.too_small[name] = max(tally.too_small.get(name, 0.0), float(used(error, bar)))
+        tally.too_small[name] = max(tally.too_small.get(name, 0.0), float(find_used(error, bar)))
         tally.too_large[name] = tally.too_large.get(name, 0) + (bar > TOO_LARGE * max(error, HALF_A_DIGIT * size))
 
 
@@ -113,25 +113,25 @@ def run(
     tally = Tally()
     for number in samples:
         rng = np.random.default_rng([seed, list(FAMILIES).index(family), number])
-        scene = fed_back(FAMILIES[family](rng), bar)
+        scene = feed_back(FAMILIES[family](rng), bar)
         if scene is not None:
             (judge_slopes if derivatives else judge)(scene, tally, f"{family} {number}", library)
     return tally
 
 
-def fed_back(scene: Scene, bar: int) -> Scene | None:
+def feed_back(scene: Scene, bar: int) -> Scene | None:
     """Command bar 2, 3 or 4 to move as it does under the scene's own command; None where that has no motion."""
     if bar == 2:
         return scene
     found = solve(scene, "acceleration")
-    theta, omega, alpha, sine = commanded(found, bar)
+    theta, omega, alpha, sine = read_commanded(found, bar)
     if found.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
         return None
     numbers = {f"theta_{bar}": theta, f"omega_{bar}": omega, f"alpha_{bar}": alpha}
     return replace(scene, motion=Motion(branch=1 if sine > 0.0 else -1, **numbers))  # type: ignore[arg-type]
 
 
-def commanded(found: Solution, bar: int) -> tuple[float, float, float, float]:
+def read_commanded(found: Solution, bar: int) -> tuple[float, float, float, float]:
     """Return angle, speed and acceleration of a bar at the first position, and the sine whose sign its branch is."""
     theta, omega, alpha = (float(getattr(found, f"{name}_{bar}")[0]) for name in ("theta", "omega", "alpha"))
     first, second = {2: (3, 4), 3: (2, 4), 4: (2, 3)}[bar]
@@ -143,7 +143,7 @@ def _run(seed: int, bar: int, library: str, derivatives: bool, task: tuple[str, 
     return run(*task, seed, bar, library, derivatives=derivatives)
 
 
-def chunks(samples: int) -> Iterator[range]:
+def make_chunks(samples: int) -> Iterator[range]:
     """Divide the sample numbers into tasks."""
     for start in range(0, samples, CHUNK):
         yield range(start, min(start + CHUNK, samples))
@@ -172,8 +172,8 @@ def stability(
     from rich.progress import track
 
     chosen = families or tuple(FAMILIES)
-    tasks = [(family, part) for family in chosen for part in chunks(samples)]
-    results = each(partial(_run, seed, bar, library, derivatives), tasks, jobs, seconds=None)
+    tasks = [(family, part) for family in chosen for part in make_chunks(samples)]
+    results = apply_each(partial(_run, seed, bar, library, derivatives), tasks, jobs, seconds=None)
     tallies = {family: Tally() for family in chosen}
     for (family, _), tally in track(zip(tasks, results, strict=True), "samples", total=len(tasks)):
         tallies[family].add(tally)
@@ -192,7 +192,7 @@ def stability(
     console = Console()
     of = ", of derivatives by every number" if derivatives else ""
     title = f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}, {library}{of}"
-    console.print(lined_up(("output", *chosen), rows, title=title, box=HEAVY_HEAD))
+    console.print(make_table(("output", *chosen), rows, title=title, box=HEAVY_HEAD))
     for family, tally in tallies.items():
         for name, (part, sample) in tally.worst.items():
             if part > 1.0:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fourbar.quantities import VECTORS
-from fourbar_validation.compare.tolerance import used
+from fourbar_validation.compare.tolerance import find_used
 
 EPS = 2.0**-52
 FACTOR = 8.0
@@ -65,38 +65,38 @@ class Tally:
     def holds(self) -> bool:
         """Whether anything was compared, and error and error bars are as promised."""
         bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
-        useful = all(by_chance(count, self.samples) for count in self.too_large.values())
+        useful = all(is_by_chance(count, self.samples) for count in self.too_large.values())
         errors = bool(self.worst) and all(ratio <= 1.0 for ratio, _ in self.worst.values())
         return errors and bars and useful and not self.warned
 
 
-def by_chance(count: int, samples: int) -> bool:
+def is_by_chance(count: int, samples: int) -> bool:
     """Whether a share of USELESS explains that so many samples or more are counted (binomial)."""
     from scipy.stats import binom
 
     return bool(binom.sf(count - 1, samples, USELESS) >= CHANCE)
 
 
-def components(name: str) -> list[tuple[str, Any]]:
+def list_components(name: str) -> list[tuple[str, Any]]:
     """List the names that an output has in the reference, and their index in its array."""
     return [(f"{name}_x", 0), (f"{name}_y", 1)] if name in VECTORS else [(name, 0)]
 
 
-def ratio(name: str, ours: float, value: Any, sensitivity: float) -> tuple[float, float]:
+def compute_ratio(name: str, ours: float, value: Any, sensitivity: float) -> tuple[float, float]:
     """Compute an error over what is allowed, and the error: 0 where the balls cannot tell it from the truth."""
     error = value - float(ours) if math.isfinite(ours) else math.inf
     size = abs(float(value.mid()))
     if name.startswith("theta"):
         error, size = math.remainder(float(error), 2.0 * math.pi) if math.isfinite(ours) else error, 1.0
     wrong = abs(float(error)) if value.rad() < abs(error) else 0.0
-    return float(used(wrong, allowed(size, sensitivity))), wrong
+    return float(find_used(wrong, compute_allowed(size, sensitivity))), wrong
 
 
-def untold(sine: Any, sensitivity: float) -> bool:
+def is_untold(sine: Any, sensitivity: float) -> bool:
     """Whether so few digits of sin mu are told that a library without many digits may say that there is no value."""
-    return allowed(size := abs(float(sine.mid())), sensitivity) > UNTOLD * size
+    return compute_allowed(size := abs(float(sine.mid())), sensitivity) > UNTOLD * size
 
 
-def allowed(size: float, sensitivity: float) -> float:
+def compute_allowed(size: float, sensitivity: float) -> float:
     """8 eps (|y| + sum |x_i dy/dx_i|)."""
     return FACTOR * EPS * (size + sensitivity)

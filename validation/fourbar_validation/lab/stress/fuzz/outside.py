@@ -19,7 +19,7 @@ from fourbar.scene.tolerance import Tolerance
 from fourbar.solution import Array, Solution
 from fourbar.solve import solve
 from fourbar.studies.enclosure import Extremes, extremes
-from fourbar.studies.keys import at_place, entries, left_out, with_numbers
+from fourbar.studies.keys import is_left_out, list_entries, read_place, replace_numbers
 from fourbar.studies.study import vary
 
 QUANTITIES = {2: ("torque", "|F12|"), 3: ("torque", "|F43|"), 4: ("torque", "transmission")}
@@ -30,14 +30,14 @@ WITHIN = 1.0 - 1e-12
 """Of a tolerance: no number rounds to one beyond it."""
 
 
-def scene_of(seed: int, index: int) -> Scene:
+def draw_scene(seed: int, index: int) -> Scene:
     """Draw lengths, some near the limit of assembly, up to two tolerances, and springs whose ends nearly meet."""
     rng = np.random.default_rng([seed, index])
     while True:
         d, a, b, c = rng.uniform(0.1, 1.0, 4)
         if rng.random() < 0.3:
             c = abs((d + a if rng.random() < 0.5 else abs(d - a)) - b) + 10.0 ** rng.uniform(-6, -1)
-        two, three, four = (Bar(x, rng.uniform(0.0, 2.0), *_own(rng, x)) for x in (a, b, c))
+        two, three, four = (Bar(x, rng.uniform(0.0, 2.0), *_draw_own(rng, x)) for x in (a, b, c))
         try:
             linkage = FourBar(d, two, three, four, float(rng.choice([0.0, rng.uniform(-3.0, 3.0)])))
         except InputError:
@@ -51,25 +51,25 @@ def scene_of(seed: int, index: int) -> Scene:
             break
     effects: list[Any] = []
     if rng.random() < 0.7:
-        effects.append(Springs((_nearly_meeting(rng, scene, at),)))
+        effects.append(Springs((_draw_nearly_meeting(rng, scene, at),)))
     if rng.random() < 0.5:
         effects.append(Gravity())
     if rng.random() < 0.3:
         effects.append(Viscous.at(A=rng.uniform(0.0, 1.0)))
     scene = replace(scene, effects=tuple(effects))
-    known = entries(scene)
-    stated = [key for key, entry in known.items() if not left_out(scene, entry) and not key.startswith("motion")]
+    known = list_entries(scene)
+    stated = [key for key, entry in known.items() if not is_left_out(scene, entry) and not key.startswith("motion")]
     keys = rng.choice(stated, rng.choice([0, 0, 1, 2]), replace=False).tolist()
-    widths = {key: abs(float(at_place(scene, known[key].place))) * 10.0 ** rng.uniform(-10, -2.5) for key in keys}
+    widths = {key: abs(float(read_place(scene, known[key].place))) * 10.0 ** rng.uniform(-10, -2.5) for key in keys}
     return replace(scene, tolerances=tuple(Tolerance(key, width) for key, width in widths.items() if width > 0.0))
 
 
-def _own(rng: np.random.Generator, length: float) -> tuple[Any, ...]:
+def _draw_own(rng: np.random.Generator, length: float) -> tuple[Any, ...]:
     """Inertia and centre of a bar, or none: then they follow its length."""
     return (0.1 * length * length, (0.5 * length, rng.uniform(-1.0, 1.0))) if rng.random() < 0.7 else ()
 
 
-def _nearly_meeting(rng: np.random.Generator, scene: Scene, at: Solution) -> Spring:
+def _draw_nearly_meeting(rng: np.random.Generator, scene: Scene, at: Solution) -> Spring:
     """Draw a spring whose ends are a millionth to a tenth of the linkage apart where the motion begins."""
     assert at.theta_3 is not None and at.theta_4 is not None
     link, bars = scene.linkage, rng.choice(4, 2, replace=False) + 1
@@ -82,49 +82,49 @@ def _nearly_meeting(rng: np.random.Generator, scene: Scene, at: Solution) -> Spr
     return Spring(start, end, 10.0 ** rng.uniform(0, 4), rng.uniform(0.0, 0.5), rng.uniform(-5.0, 5.0))
 
 
-def findings(scene: Scene) -> list[str]:
+def list_findings(scene: Scene) -> list[str]:
     """Each value found outside what is proven, in one line; nothing where nothing is proven."""
     try:
         proven = extremes(scene, QUANTITIES[scene.drive_bar])
-        return [line for name in proven.least for sign in (1, -1) for line in _outside(scene, proven, name, sign)]
+        return [line for name in proven.least for sign in (1, -1) for line in _list_outside(scene, proven, name, sign)]
     except (InputError, LimitError):
         return []
     except Exception as error:  # a traceback is found, too
         return [f"extremes {type(error).__name__}: {error}".splitlines()[0]]
 
 
-def _outside(scene: Scene, proven: Extremes, name: str, sign: int) -> list[str]:
+def _list_outside(scene: Scene, proven: Extremes, name: str, sign: int) -> list[str]:
     """List what lies beyond the bound at the point reached by climbing, and what the stated place does not reach."""
     extreme = (proven.greatest if sign > 0 else proven.least)[name]
     outer, inner = (extreme.high, extreme.low) if sign > 0 else (extreme.low, extreme.high)
-    parts, theta_2 = _climbed(scene, proven.parts, name, sign)
-    value, result = _value(scene, name, parts, theta_2), []
+    parts, theta_2 = _climb(scene, proven.parts, name, sign)
+    value, result = _evaluate_ball(scene, name, parts, theta_2), []
     if not sign * (value - outer) <= 0:
         result.append(f"extremes {name}: {value} at theta_2 = {theta_2!r}, {parts.tolist()} lies beyond {outer!r}")
     if not scene.tolerances:
-        value = _value(scene, name, parts, extreme.theta_2)
+        value = _evaluate_ball(scene, name, parts, extreme.theta_2)
         if not sign * (value - inner) >= 0:
             result.append(f"extremes {name}: {value} at theta_2 = {extreme.theta_2!r} does not reach {inner!r}")
     return result
 
 
-def _numbers(scene: Scene, parts: Array) -> dict[str, Any]:
+def _move_numbers(scene: Scene, parts: Array) -> dict[str, Any]:
     """Move the toleranced numbers by parts of their tolerances, (k,) or (k, n)."""
-    known = entries(scene)
+    known = list_entries(scene)
     return {
-        tolerance.key: at_place(scene, known[tolerance.key].place) + WITHIN * tolerance.reach * part
+        tolerance.key: read_place(scene, known[tolerance.key].place) + WITHIN * tolerance.reach * part
         for tolerance, part in zip(scene.tolerances, parts, strict=True)
     }
 
 
-def _climbed(scene: Scene, intervals: tuple[tuple[float, float], ...], name: str, sign: int) -> tuple[Array, float]:
+def _climb(scene: Scene, intervals: tuple[tuple[float, float], ...], name: str, sign: int) -> tuple[Array, float]:
     """Parts of the tolerances and theta_2 of the greatest (+1) or least (-1) value found."""
     rng, k = np.random.default_rng(0), len(scene.tolerances)
     low, high = np.array(intervals).T
     own = rng.integers(0, len(low), DRAWN)
     theta_2 = np.clip(rng.uniform(low[own] - 0.05, high[own] + 0.05), low[own], high[own])  # some at the ends
     parts = np.clip(rng.uniform(-2.0, 2.0, (k, DRAWN)), -1.0, 1.0)
-    values = _sampled(scene, name, sign, parts, theta_2)
+    values = _evaluate_samples(scene, name, sign, parts, theta_2)
     reach = 0.1
     for _ in range(ROUNDS):
         best = np.argsort(values)[-BEST:]
@@ -134,14 +134,14 @@ def _climbed(scene: Scene, intervals: tuple[tuple[float, float], ...], name: str
         own, reach = own[around], reach * NARROWED
         theta_2 = np.clip(theta_2[around] + noise[0], low[own], high[own])
         parts = np.clip(parts[:, around] + 10.0 * noise[1:], -1.0, 1.0)
-        values = _sampled(scene, name, sign, parts, theta_2)
+        values = _evaluate_samples(scene, name, sign, parts, theta_2)
     at = int(np.argmax(values))
     return parts[:, at], float(theta_2[at])
 
 
-def _sampled(scene: Scene, name: str, sign: int, parts: Array, theta_2: Array) -> Array:
+def _evaluate_samples(scene: Scene, name: str, sign: int, parts: Array, theta_2: Array) -> Array:
     """Evaluate in doubles, times the sign, (n,); -inf where there is no value."""
-    members = vary(replace(scene, tolerances=()), _numbers(scene, parts) | {"motion.theta_2": theta_2[:, None]})
+    members = vary(replace(scene, tolerances=()), _move_numbers(scene, parts) | {"motion.theta_2": theta_2[:, None]})
     solution = solve(members, "force")
     if name == "transmission":
         values = np.arctan2(np.abs(solution.sin_mu), np.abs(np.cos(solution.theta_4 - solution.theta_3)))
@@ -151,21 +151,21 @@ def _sampled(scene: Scene, name: str, sign: int, parts: Array, theta_2: Array) -
     return np.asarray(np.nan_to_num(sign * values[:, 0], nan=-math.inf))
 
 
-def _value(scene: Scene, name: str, parts: Array, theta_2: float) -> Any:
+def _evaluate_ball(scene: Scene, name: str, parts: Array, theta_2: float) -> Any:
     """Evaluate a ball by the thirteen equations of the free bodies; NaN where there is no value."""
     from flint import acb, arb
 
-    from fourbar_validation.engines.balls import closure, outputs, stored, wedge
+    from fourbar_validation.engines.balls import closure, compute_outputs, make_balls, wedge
 
-    member = with_numbers(scene, _numbers(scene, parts))
-    x, branch = stored(member, theta_2), scene.motion.branch
+    member = replace_numbers(scene, _move_numbers(scene, parts))
+    x, branch = make_balls(member, theta_2), scene.motion.branch
     for k, length in zip(MOVING_BARS, "abc", strict=True):
         if member.linkage.bar(k).inertia is None:  # m L^2/12, which a double rounds
             x[f"I{k}"] = x[f"m{k}"] * x[length] ** 2 / 12
     if name == "transmission":
         closed = closure(x, branch)
         return closed and acb(abs((closed[1].conjugate() * closed[2]).real), abs(wedge(*closed[1:]))).arg()
-    y = outputs(member, branch, x, scene.drive_bar) or {}
+    y = compute_outputs(member, branch, x, scene.drive_bar) or {}
     if name == "torque":
         return y.get(name, arb("nan"))
     x_and_y = [y.get(f"{name.strip('|')}_{axis}", arb("nan")) for axis in "xy"]

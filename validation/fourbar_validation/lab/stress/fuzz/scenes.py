@@ -8,19 +8,19 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.scene import Scene
-from fourbar_validation.scenes.random import Ranges, decades, drawn, product, sometimes, uniform
+from fourbar_validation.scenes.random import Ranges, draw_chance, draw_decades, draw_product, draw_scene, draw_uniform
 
 POSITIONS = 2
-SIZES = {False: decades(-0.7, 0.7), True: decades(-6.0, 6.0)}
+SIZES = {False: draw_decades(-0.7, 0.7), True: draw_decades(-6.0, 6.0)}
 """Lengths, masses, speeds and loads: ordinary, adversarial."""
 ORDINARY = Ranges(
     mass=SIZES[False],
-    inertia=uniform(0.02, 0.4),
-    centre=uniform(-1.0, 2.0),
-    centre_angle=sometimes(0.5, uniform(-3.0, 3.0)),
-    load=uniform(-1.0, 1.0),
+    inertia=draw_uniform(0.02, 0.4),
+    centre=draw_uniform(-1.0, 2.0),
+    centre_angle=draw_chance(0.5, draw_uniform(-3.0, 3.0)),
+    load=draw_uniform(-1.0, 1.0),
     without_force=0.2,
-    speed=sometimes(0.95, SIZES[False]),
+    speed=draw_chance(0.95, SIZES[False]),
     viscous=0.2,
     friction=0.1,
 )
@@ -28,18 +28,18 @@ RANGES = {
     False: ORDINARY,
     True: replace(
         ORDINARY,
-        mass=sometimes(0.85, SIZES[True]),
-        inertia=sometimes(0.85, ORDINARY.inertia),
-        centre=product(ORDINARY.centre, sometimes(0.2, decades(0.0, 3.0), 1.0)),
+        mass=draw_chance(0.85, SIZES[True]),
+        inertia=draw_chance(0.85, ORDINARY.inertia),
+        centre=draw_product(ORDINARY.centre, draw_chance(0.2, draw_decades(0.0, 3.0), 1.0)),
         ground_angle=lambda rng: float(rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)])),
-        load=product(ORDINARY.load, SIZES[True]),
-        speed=sometimes(0.95, SIZES[True]),
+        load=draw_product(ORDINARY.load, SIZES[True]),
+        speed=draw_chance(0.95, SIZES[True]),
     ),
 }
 """What the scenes are drawn from: ordinary, adversarial."""
 
 
-def scene_of(seed: int, index: int) -> Scene:
+def draw_fuzz_scene(seed: int, index: int) -> Scene:
     """Draw a scene, anew until its lengths can close at all."""
     rng = np.random.default_rng([seed, index])
     while True:
@@ -51,15 +51,15 @@ def scene_of(seed: int, index: int) -> Scene:
 
 def _draw(rng: np.random.Generator, hard: bool) -> Scene:
     size = SIZES[hard](rng)
-    lengths = tuple(float(x * size) for x in _lengths(rng, hard))
-    scene = drawn(rng, lengths, RANGES[hard])
-    psi = _angles(rng, hard, lengths)
+    lengths = tuple(float(x * size) for x in _draw_lengths(rng, hard))
+    scene = draw_scene(rng, lengths, RANGES[hard])
+    psi = _draw_angles(rng, hard, lengths)
     alpha = float(rng.uniform(-10.0, 10.0)) if rng.random() < 1.0 / 3.0 else scene.motion.alpha_2
     motion = replace(scene.motion, theta_2=scene.linkage.ground_angle + psi, alpha_2=alpha)
     return replace(scene, motion=motion)
 
 
-def _lengths(rng: np.random.Generator, hard: bool) -> Any:
+def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
     """(ground, input, coupler, output), some of them equal, in extreme ratios, or near s + l = p + q."""
     choice = rng.random() if hard else 1.0
     x = rng.uniform(0.1, 1.0, 4)
@@ -83,7 +83,7 @@ def _lengths(rng: np.random.Generator, hard: bool) -> Any:
     return x
 
 
-def _angles(rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]) -> Any:
+def _draw_angles(rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]) -> Any:
     """theta_2 - theta_1: anywhere, or near a limit position, a change point, or many turns away."""
     psi = rng.uniform(-3.2, 3.2, POSITIONS)
     if not hard:

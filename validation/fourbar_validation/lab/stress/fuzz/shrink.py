@@ -19,13 +19,13 @@ NEEDED = ("[motion]", "theta_2", "omega_2")
 """A scene without them has no torque, and fails for another reason."""
 
 
-def shrunk(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
+def shrink_scene(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
     """Simplify a scene by one change of its file at a time while it fails."""
     lines = dump(scene).splitlines()
     for _ in range(ROUNDS):
         before = lines
         for number in reversed(range(len(lines))):  # what a change takes away lies behind
-            for simpler in _simpler(lines, number):
+            for simpler in _list_simpler(lines, number):
                 try:
                     other = loads("\n".join(simpler))
                     if fails(other):
@@ -38,7 +38,7 @@ def shrunk(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
     return scene
 
 
-def _simpler(lines: list[str], number: int) -> Iterator[list[str]]:
+def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
     """Leave out one line, or the table that it begins, or put a simpler entry in the line."""
     line, until = lines[number], number + 1
     if line.startswith("["):

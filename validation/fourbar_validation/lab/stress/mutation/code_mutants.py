@@ -34,7 +34,7 @@ class Mutant(NamedTuple):
             self.function.__code__ = original
 
 
-def mutants(module: ModuleType) -> Iterator[Mutant]:
+def compile_mutants(module: ModuleType) -> Iterator[Mutant]:
     """Compile every mutant of the functions and methods of a module."""
     tree = ast.parse(inspect.getsource(module))
     classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
@@ -44,17 +44,17 @@ def mutants(module: ModuleType) -> Iterator[Mutant]:
                 continue
             qualified = prefix + definition.name
             for node in (inner for statement in definition.body for inner in ast.walk(statement)):
-                for field, changed in _changes(node):
+                for field, changed in _list_changes(node):
                     original, before = getattr(node, field), ast.unparse(node)
                     setattr(node, field, changed)
-                    code = _code(compile(tree, inspect.getfile(module), "exec"), qualified)
+                    code = _find_code(compile(tree, inspect.getfile(module), "exec"), qualified)
                     name = f"{module.__name__}.{qualified}, line {node.lineno}: {before} -> {ast.unparse(node)}"  # type: ignore[attr-defined]
                     setattr(node, field, original)
                     assert code is not None
-                    yield Mutant(name, _function(module, qualified), code)
+                    yield Mutant(name, _find_function(module, qualified), code)
 
 
-def _changes(node: ast.AST) -> Iterator[tuple[str, Any]]:
+def _list_changes(node: ast.AST) -> Iterator[tuple[str, Any]]:
     """Name a field of a node and what may stand in it instead."""
     if isinstance(node, ast.Constant) and isinstance(node.value, bool):
         yield "value", not node.value
@@ -68,18 +68,18 @@ def _changes(node: ast.AST) -> Iterator[tuple[str, Any]]:
             yield "ops", [*ops[:i], OTHER[type(each)](), *ops[i + 1 :]]
 
 
-def _code(within: CodeType, qualified: str) -> CodeType | None:
+def _find_code(within: CodeType, qualified: str) -> CodeType | None:
     """Find the code of a function in that of its module."""
     for each in within.co_consts:
         if isinstance(each, CodeType):
             if each.co_qualname == qualified:
                 return each
-            if (inner := _code(each, qualified)) is not None:
+            if (inner := _find_code(each, qualified)) is not None:
                 return inner
     return None
 
 
-def _function(module: ModuleType, qualified: str) -> FunctionType:
+def _find_function(module: ModuleType, qualified: str) -> FunctionType:
     """Find the function itself, below its decorators."""
     owner, _, name = qualified.rpartition(".")
     result = inspect.getattr_static(getattr(module, owner) if owner else module, name)

@@ -15,7 +15,7 @@ import numpy as np
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas import mobility, transmission
-from fourbar.formulas.path import state as state_of
+from fourbar.formulas.path import compute_state as state_of
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import UNITS
 from fourbar.scene import Command, Scene
@@ -24,12 +24,12 @@ from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS
-from fourbar_validation.compare.scales import reference_of
+from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.engines.free_body import NAME as FREE_BODY
-from fourbar_validation.engines.witnesses import WITNESSES, Witness, predicting_from
-from fourbar_validation.lab.stress.mutation.code_mutants import Mutant, mutants
-from fourbar_validation.run.answers import statements
-from fourbar_validation.run.formulas import check_identities, compare_status
+from fourbar_validation.engines.witnesses import WITNESSES, Witness, make_prediction
+from fourbar_validation.lab.stress.mutation.code_mutants import Mutant, compile_mutants
+from fourbar_validation.run.answers import check_statements
+from fourbar_validation.run.identities import check_identities, compare_status
 from fourbar_validation.run.question import Question
 
 CHANGES = 1e-9
@@ -46,45 +46,47 @@ class HangError(Exception):
     """A mutant did not come back."""
 
 
-def scenes() -> list[Scene]:
+def choose_scenes() -> list[Scene]:
     """Choose random linkages of every type, drive and branch, and a parallelogram near its change point."""
-    from fourbar_validation.scenes.hard_families import change_point, sweep_of
-    from fourbar_validation.scenes.hard_linkages import dressed
-    from fourbar_validation.scenes.random import DrawnType, random_scene
+    from fourbar_validation.scenes.hard_families import approach_change_point, sweep_turn
+    from fourbar_validation.scenes.hard_linkages import dress
+    from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
-    chosen = [random_scene(0, index, tuple(DrawnType)) for index in range(SCENES)]
-    chosen.append(sweep_of(dressed((0.3, 0.1, 0.25, 0.22)), 12))
-    chosen += [scene for name, scene in change_point(distances=(1e-2, 1e-4)) if name.startswith(("par", "kite a = d"))]
+    chosen = [draw_random_scene(0, index, tuple(DrawnType)) for index in range(SCENES)]
+    chosen.append(sweep_turn(dress((0.3, 0.1, 0.25, 0.22)), 12))
+    chosen += [
+        scene for name, scene in approach_change_point(distances=(1e-2, 1e-4)) if name.startswith(("par", "kite a = d"))
+    ]
     return chosen
 
 
-def numbers(scene: Scene, at: Command) -> dict[str, Any]:
+def compute_numbers(scene: Scene, at: Command) -> dict[str, Any]:
     """Compute every number that the formulas state of a scene and of its linkage."""
     solution = solve(scene, "force", at=at)
     result = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
     result["status"] = solution.status_code.astype(float)
-    return result | stated(scene.linkage) | stated_of_motion(scene, at)
+    return result | collect_stated(scene.linkage) | collect_stated_of_motion(scene, at)
 
 
-def stated(linkage: FourBar) -> dict[str, Any]:
+def collect_stated(linkage: FourBar) -> dict[str, Any]:
     """Collect what the formulas state of a linkage whatever its motion."""
     result: dict[str, Any] = {
-        "default_range": mobility.default_range(linkage),
+        "default_range": mobility.choose_range(linkage),
         "change_points": mobility.change_points(linkage),
         "time_ratio": mobility.time_ratio(linkage) or math.nan,
         "extremes": [*transmission.transmission_extremes(linkage), transmission.transmission_extremes(linkage).worst],
     }
     for bar in MOVING_BARS:
         result[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
-        result[f"intervals_{bar}"] = mobility.intervals(linkage, bar)
+        result[f"intervals_{bar}"] = mobility.find_intervals(linkage, bar)
         result[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
         result[f"swing_{bar}"] = mobility.swing(linkage, bar)
     sweep = linkage.ground_angle + np.array([-0.5, 0.5, 4.0, 2.0])  # through both change points, and back
-    result["through"] = mobility.on_smooth_path(linkage, sweep, 1)
+    result["through"] = mobility.follow_smooth_path(linkage, sweep, 1)
     return {name: np.array(value, dtype=float) for name, value in result.items()}
 
 
-def stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
+def collect_stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
     """Compute how well the positions of a motion transmit."""
     state = state_of(scene.linkage, at.theta_2, at.branch)
     branch = at.branch.astype(float)
@@ -96,7 +98,7 @@ def stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
     }
 
 
-def changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
+def is_changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
     """Compare numbers: whether any differs by more than 1e-9 of its scale."""
     for name, old in before.items():
         new = after.get(name)
@@ -108,17 +110,17 @@ def changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
     return False
 
 
-def caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> bool:
+def is_caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> bool:
     """Check a scene: whether any comparison or identity fails."""
     question = Question("", scene, at)
     solution, rows = question.solution, list(check_identities(question))
     for witness, answer in answers:
-        predicted = predicting_from(witness, scene, at, answer)
+        predicted = make_prediction(witness, scene, at, answer)
         rows += Comparison("", scene, answer, solution, witness.tolerance, witness.expected, predicted).rows()
-        if witness.name == FREE_BODY and (reference := reference_of(scene, answer)) is not None:
+        if witness.name == FREE_BODY and (reference := make_reference(scene, answer)) is not None:
             rows.append(compare_status(question, reference))
     if not any(row.verdict == FAILS for row in rows):
-        rows += [row for witness, answer in answers for row in statements("", scene, witness.engine(), answer)]
+        rows += [row for witness, answer in answers for row in check_statements("", scene, witness.engine(), answer)]
     return any(row.verdict == FAILS for row in rows)
 
 
@@ -131,28 +133,28 @@ class Baseline(NamedTuple):
     before: dict[str, Any]
 
 
-def baselines() -> list[Baseline]:
+def make_baselines() -> list[Baseline]:
     """Solve the scenes; RuntimeError where the harness fails on one of them."""
     made = []
-    for scene in scenes():
+    for scene in choose_scenes():
         at = command_of(scene)
         answers = [(w, w.engine().answer(scene, at)) for w in WITNESSES if w.name in EXACT]
-        if caught(scene, at, answers):
+        if is_caught(scene, at, answers):
             raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
-        made.append(Baseline(scene, at, answers, numbers(scene, at)))
+        made.append(Baseline(scene, at, answers, compute_numbers(scene, at)))
     return made
 
 
-def verdict(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
+def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
     """Return whether a mutant is caught, or None where it changes nothing."""
     differs = False
     signal.alarm(SECONDS)
     try:
         with np.errstate(all="ignore"), mutant.active():
             for scene, at, answers, before in tried:
-                if changed(before, numbers(scene, at)):
+                if is_changed(before, compute_numbers(scene, at)):
                     differs = True
-                    if caught(scene, at, answers):
+                    if is_caught(scene, at, answers):
                         return True
     except Exception:  # a mutant that raises or hangs ends the run: that is noticed
         return True
@@ -176,13 +178,13 @@ def command(module: str | None, most: int) -> int:
         raise HangError
 
     before = signal.signal(signal.SIGALRM, alarm)
-    tried, shown = baselines(), Console(stderr=True)
+    tried, shown = make_baselines(), Console(stderr=True)
     changing, missed = 0, list[str]()
     for name in [module] if module else MODULES:
-        chosen = list(mutants(import_module(f"fourbar.formulas.{name}")))
+        chosen = list(compile_mutants(import_module(f"fourbar.formulas.{name}")))
         if most and len(chosen) > most:
             chosen = [chosen[i] for i in np.random.default_rng(0).choice(len(chosen), most, replace=False)]
-        verdicts = [verdict(mutant, tried) for mutant in track(chosen, name, console=shown)]
+        verdicts = [judge_mutant(mutant, tried) for mutant in track(chosen, name, console=shown)]
         own = [mutant.name for mutant, each in zip(chosen, verdicts, strict=True) if each is False]
         count = sum(each is not None for each in verdicts)
         click.echo(f"{name}: {count - len(own)} of {count} caught, of {len(chosen)} mutants tried")

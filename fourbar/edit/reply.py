@@ -1,0 +1,60 @@
+"""What the page is told of a scene: JSON, and its columns as doubles, for their text takes longer than to solve.
+
+The frame: four bytes with the length of the JSON (little-endian), the JSON padded to a multiple of eight bytes, then
+the columns one after the other, as the JSON lists them.
+"""
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+
+from fourbar.edit.dragging import list_handles
+from fourbar.errors import NotAssembledError
+from fourbar.scene import Scene
+from fourbar.show.page_data import collect_live_data
+from fourbar.show.tables import write_heading
+from fourbar.show.words import write_type
+from fourbar.solution import DEGREES, Conversion, Solution
+from fourbar.solve import find_last_stage, solve
+
+
+def evaluate_scene(scene: Scene, plain: dict[str, Any], units: Conversion, *, settled: bool = False) -> dict[str, Any]:
+    """Evaluate a scene for the page; `settled`: with error bars and summary, which cost more than the rest.
+
+    Raises NotAssembledError where no position assembles, InputError as `solve` does.
+    """
+    stage = find_last_stage(scene) if settled else None
+    own = solve(scene, stage)
+    if not own.assembled.any():
+        raise NotAssembledError("motion.theta_2: the linkage assembles at none of the positions requested")
+    data = collect_live_data(scene, units, stage=stage) | {"tolerances": None, "pictures": {}, "toml": None}
+    data["handles"] = [handle.drawn() for handle in list_handles(scene, plain)]
+    if settled:
+        data["summary"] = write_summary(scene, own, units)
+    return data
+
+
+def write_summary(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
+    """Write what `analyze` says above its table and `classify` of the linkage."""
+    shown = units if "rad" in units else {**units, **DEGREES}
+    return [*write_heading(scene, solution, shown), *write_type(scene.linkage)]
+
+
+def pack_frame(about: dict[str, Any]) -> bytes:
+    """Pack an answer: arrays in `about["data"]["branches"]` become columns."""
+    columns: list[tuple[str, str, int, int]] = []
+    arrays: list[bytes] = []
+    if "data" in about:
+        branches: dict[str, dict[str, Any]] = {}
+        for sign, table in about["data"]["branches"].items():
+            branches[sign] = {name: each for name, each in table.items() if not isinstance(each, np.ndarray)}
+            for name, each in table.items():
+                if isinstance(each, np.ndarray):
+                    columns.append((sign, name, len(each), each.ndim))
+                    arrays.append(np.ascontiguousarray(each, dtype="<f8").tobytes())
+        about = about | {"data": about["data"] | {"branches": branches}, "columns": columns}
+    text = json.dumps(about, allow_nan=False, separators=(",", ":")).encode()
+    text += b" " * (-(len(text) + 4) % 8)
+    return b"".join((struct.pack("<I", len(text)), text, *arrays))

@@ -1,0 +1,498 @@
+"""Somebody's own MJCF: what differs is named, what it costs is measured, and the file is data."""
+
+import math
+import os
+import re
+import signal
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import fourbar
+from fourbar.effects import Friction, SpringEnd
+from fourbar.errors import InputError
+from fourbar.mjcf import write_mjcf
+from fourbar.quantities import UNKNOWNS
+from fourbar.scene import Scene
+from fourbar.solve import solve
+from fourbar_validation.check import mjcf
+from fourbar_validation.check.causes import order_causes
+from fourbar_validation.check.differences import find_differences
+from fourbar_validation.check.screen import DEEPEST, LARGEST_MJCF, read_mjcf
+from fourbar_validation.cli import status
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.compare import Comparison
+from fourbar_validation.compare.rows import FAILS
+from fourbar_validation.compare.tolerance import SIMULATED
+from fourbar_validation.engines.memory import WORKER_MEMORY
+from fourbar_validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine, examine_corrected
+
+CRANK_ROCKER = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
+GENERATED = write_mjcf(CRANK_ROCKER)
+MINE = {"input": "crank", "coupler": "rod", "output": "rocker"}
+BARE = Scene(CRANK_ROCKER.linkage, CRANK_ROCKER.motion, effects=CRANK_ROCKER.effects, title="no loads")
+STIFF = 'solref="0.02 1" solimp="0.9999 0.9999 0.001 0.5 2"'
+STIFF_ENOUGH = 1e-4
+"""One state at d = 0.9999 without pads: 1.5e-5 of the torque, 5e-5 of the forces, as measured."""
+
+
+@cache
+def generated(scene: Scene) -> Examined:
+    return examine(scene, None, {})
+
+
+def keys(scene: Scene, theirs: Examined) -> set[str]:
+    return {d.key for d in find_differences(generated(scene).described, theirs.described)}
+
+
+def errors(scene: Scene, examined: Examined, how: str) -> dict[str, float]:
+    (answer,) = (answer for answer in examined.answers if answer.engine == how)
+    assert answer.refusal is None, answer.refusal
+    return {
+        row.quantity: row.error
+        for row in Comparison("", scene, answer, solve(scene, at=answer.at), SIMULATED, UNKNOWNS).rows()
+        if row.quantity != "assembled"
+    }
+
+
+def test_the_generated_file_differs_in_nothing_and_agrees() -> None:
+    found = examine(CRANK_ROCKER, GENERATED, {})
+    assert keys(CRANK_ROCKER, found) == set()
+    for how in (ONE_STATE, THROUGH_TIME):
+        assert max(errors(CRANK_ROCKER, found, how).values()) <= SIMULATED.factor
+
+
+def test_the_description_is_that_of_the_scene() -> None:
+    found, linkage = generated(CRANK_ROCKER).described, CRANK_ROCKER.linkage
+    for number, name in ((2, "input"), (3, "coupler"), (4, "output")):
+        bar = linkage.bar(number)
+        expected = (bar.length, bar.mass, bar.moment_of_inertia, *bar.mass_centre)
+        parts = ("mass", "inertia", "centre.distance", "centre.angle")
+        described = (found[f"lengths.{name}"], *(found[f"bars.{name}.{part}"] for part in parts))
+        assert described == pytest.approx(expected, rel=1e-14)
+
+
+def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
+    """Two masses m at distance s of each other: G in the middle, inertia 2 I + m s^2/2."""
+    half = '<body pos="{} 0 0"><inertial pos="0 0 0" mass="0.2" diaginertia="1e-3 1e-3 1e-3"/></body>'
+    text = re.sub(
+        '(name="rocker"[^>]*><joint/>)<inertial[^>]*>', r"\1" + half.format(0.05) + half.format(0.15), other_plane()
+    )
+    found = examine(BARE, text, MINE).described
+    described = [found[f"bars.output.{part}"] for part in ("mass", "centre.distance", "centre.angle", "inertia")]
+    assert described == pytest.approx([0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0], rel=1e-12, abs=1e-14)
+
+
+STOP = 'range="0 1" solreflimit="0.1 1"'
+EDITS = [
+    ("coupler's mass", 'mass="0.5"', 'mass="5"', "bars.coupler.mass", "10^1 times: units?"),
+    ("inertia about the pin", "0.0016133333333333336", "0.0073733333333333336", "bars.output.inertia", ""),
+    ("mass centre", 'pos="0.05 0 0" mass="0.2"', 'pos="0.06 0 0" mass="0.2"', "bars.input.centre.distance", ""),
+    ("length", '"B4" pos="0.22 0 0"', '"B4" pos="0.23 0 0"', "lengths.output", "another linkage"),
+    ("gravity left out", "-9.81", "0.0", "gravity.y", "weight"),
+    ("damping", 'name="A" type="hinge"', 'name="A" type="hinge" damping="0.1"', "pins.A.damping", "couple"),
+    ("timestep", 'timestep="0.00100', 'timestep="0.00200', "option.timestep", "integration"),
+    ("integrator", '"RK4"', '"Euler"', "option.integrator", "RK4 four"),
+    ("impedance", "0.9999 0.9999", "0.95 0.95", "closure.softness", "at every timestep"),
+    ("tolerance", 'tolerance="0"', 'tolerance="1e-8"', "option.tolerance", "only 0 is tight"),
+    ("range", 'name="O4" type="hinge"', 'name="O4" type="hinge" range="0 1"', "pins.O4.range", "stop"),
+    ("load missing", '<general gaintype="fixed" gainprm="0" biastype="affine" name="load_2"', "",
+     "actuators.load_2", "missing"),
+    ("load turned", "3.061616997868383e-17 -0.5", "-0.5 0.0", "actuators.load_2.gear", "the load"),
+    ("load elsewhere", 'name="load_2" pos="0.15', 'name="load_2" pos="0.16', "actuators.load_2.site", "along the bar"),
+    ("stop's softness", 'name="O4" type="hinge"', f'name="O4" type="hinge" {STOP}', "pins.O4.solreflimit", ""),
+    ("weightless", 'name="coupler" pos', 'name="coupler" gravcomp="1" pos', "bars.coupler.gravcomp", "weight away"),
+    ("line search", 'iterations="10"', 'iterations="10" ls_iterations="1"', "option.ls_iterations", "line search"),
+    ("wind", 'iterations="10"', 'iterations="10" density="1.2" wind="1 0 0"', "option.wind", "drag"),
+    ("no gain in Euler", 'island="disable"', 'island="disable" eulerdamp="disable"', "option.switched off", "flags"),
+    ("bounded by a joint", 'name="O4" type="hinge"', 'name="O4" type="hinge" actuatorfrcrange="-1 1"',
+     "pins.O4.actuatorfrcrange", "cuts off"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "old", "new", "key", "word"), EDITS, ids=[edit[0] for edit in EDITS])
+def test_a_planted_difference_is_named(what: str, old: str, new: str, key: str, word: str) -> None:
+    assert old in GENERATED
+    text = GENERATED.replace(old, new) if new else re.sub(old + "[^>]*>", "", GENERATED)
+    if "range" in new:
+        text = text.replace('limit="disable"', "")
+    text = text.replace('damper="disable"', "")
+    found = {d.key: d.remark for d in find_differences(generated(CRANK_ROCKER).described, described(text))}
+    assert key in found
+    assert word in found[key]
+
+
+DRY = replace(CRANK_ROCKER, effects=(*CRANK_ROCKER.effects, Friction((("A", 0.05), ("O4", 0.05)))))
+
+
+def test_how_softly_dry_friction_slips_is_named_and_costs() -> None:
+    """By default its couple rises over 0.02 s of slip."""
+    text = re.sub(' sol(ref|imp)friction="[^"]*"', "", write_mjcf(DRY))
+    found = examine(DRY, text.replace('joint name="A"', 'joint name="rod"').replace('joint="A"', 'joint="rod"'), {})
+    by_key = {d.key: d for d in find_differences(generated(DRY).described, found.described, found.called)}
+    fields = {f"pins.{pin}.{field}" for pin in ("A", "O4") for field in ("solreffriction", "solimpfriction")}
+    assert by_key.keys() == fields
+    assert by_key["pins.A.solreffriction"].written == 'joint "rod" solreffriction'
+    assert by_key["pins.A.solreffriction"].theirs == (0.02, 1.0)
+    assert errors(DRY, found, ONE_STATE)["F12"] > 100.0 * SIMULATED.factor
+
+
+def test_a_cause_is_named_without_what_hangs_on_it() -> None:
+    """Solver parameters of friction and of a stop that a file does not have, and what MuJoCo derives from a mass."""
+    soft = GENERATED.replace('type="hinge"', 'type="hinge" solreffriction="0.1 1" solreflimit="0.1 1" margin="0.1"')
+    assert {d.key for d in find_differences(generated(CRANK_ROCKER).described, described(soft))} == set()
+    heavy = {
+        d.key for d in find_differences(generated(CRANK_ROCKER).described, described(GENERATED.replace('"0.5"', '"1"')))
+    }
+    assert heavy == {"bars.coupler.mass", "closure.softness"}
+
+
+def test_loads_under_other_names_and_in_another_order_are_the_same_loads() -> None:
+    text = GENERATED.replace("load_1", "couple").replace("load_2", "push")
+    first, second = re.findall("    <general [^>]*(?:couple|push)[^>]*/>\n", text)
+    found = examine(CRANK_ROCKER, text.replace(first + second, second + first), {})
+    assert keys(CRANK_ROCKER, found) == set()
+    assert max(errors(CRANK_ROCKER, found, ONE_STATE).values()) <= SIMULATED.factor
+
+
+def described(text: str) -> Mapping[str, float | str]:
+    from fourbar_validation.engines.mujoco.describe import describe_model as describe
+    from fourbar_validation.engines.mujoco.theirs import compile_text
+    from fourbar_validation.engines.mujoco.topology import Topology
+
+    return describe(Topology(compile_text(text), {}))
+
+
+@pytest.mark.parametrize(("old", "new"), [("-9.81", "-9.80"), ('mass="0.5"', 'mass="0.501"')])
+def test_what_a_difference_costs_is_seen(old: str, new: str) -> None:
+    found = examine(CRANK_ROCKER, GENERATED.replace(old, new), {})
+    assert errors(CRANK_ROCKER, found, ONE_STATE)["F12"] > SIMULATED.factor
+    assert errors(CRANK_ROCKER, found, THROUGH_TIME)["F12"] > SIMULATED.factor
+
+
+def other_plane(closure: str = 'site1="r" site2="q"', axis: str = "0 -1 0", option: str = "") -> str:
+    """The crank-rocker by another hand: x-z plane, away from the origin, other names, default closure."""
+    linkage = BARE.linkage
+
+    def inertial(number: int) -> str:
+        bar = linkage.bar(number)
+        r, phi = bar.mass_centre or (0.0, 0.0)
+        x, z = r * math.cos(phi), r * math.sin(phi)
+        moments = " ".join([repr(bar.moment_of_inertia)] * 3)
+        return f'<inertial pos="{x!r} 0 {z!r}" mass="{bar.mass!r}" diaginertia="{moments}"/>'
+
+    return f"""<mujoco><option gravity="0 0 -9.81" {option}/><default><joint axis="{axis}"/></default><worldbody>
+    <body name="crank" pos="1 2 3"><joint/>{inertial(2)}
+      <body name="rod" pos="0.1 0 0"><joint/>{inertial(3)}<site name="r" pos="0.25 0 0"/></body></body>
+    <body name="rocker" pos="1.3 2 3"><joint/>{inertial(4)}<site name="q" pos="0.22 0 0"/></body></worldbody>
+    <equality>{f"<connect {closure}/>" if closure else ""}</equality></mujoco>"""
+
+
+@pytest.mark.parametrize("closure", ['site1="r" site2="q"', ""])
+def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_lengths(closure: str) -> None:
+    """The rocker is as good a crank by its hinges alone; without a connect the sites of pin B are looked for too."""
+    text = other_plane(closure)
+    rocker = re.search(' *<body name="rocker".*?</body>', text)
+    assert rocker is not None  # it comes first in the file
+    text = text.replace(rocker[0], "").replace("<worldbody>", "<worldbody>" + rocker[0])
+    found = examine(BARE, text, {})
+    assert found.names.items() >= MINE.items()
+    assert ({"B3": "r", "B4": "q"}.items() <= found.names.items()) == (not closure)
+    assert "guessed" in found.notes[0] and "input=crank, coupler=rod, output=rocker" in found.notes[0]
+    assert errors(BARE, found, ONE_STATE)["theta_4"] < STIFF_ENOUGH
+
+
+CORRECTED = [
+    ("bars.coupler.mass", 'mass="0.5"', 'mass="0.6"'),
+    ("bars.output.centre.angle", "0.11883216824898844 0 -0.0167", "0.11883216824898844 0 0.0167"),
+    ("lengths.coupler", 'name="r" pos="0.25', 'name="r" pos="0.26'),
+    ("lengths.input", 'name="rod" pos="0.1', 'name="rod" pos="0.11'),
+    ("gravity.y", "0 0 -9.81", "0 0 9.81"),
+    ("pins.A.damping", 'name="rod" pos="0.1 0 0"><joint', 'name="rod" pos="0.1 0 0"><joint damping="0.1"'),
+    ("closure.softness", STIFF, ""),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("key", "old", "new"), CORRECTED, ids=[each[0] for each in CORRECTED])
+def test_the_one_thing_that_is_wrong_has_all_of_the_error(key: str, old: str, new: str) -> None:
+    """Corrected alone, the file is as good as it was before it was spoilt: by far the greatest share."""
+    text = other_plane(f'site1="r" site2="q" {STIFF}')
+    assert old in text
+    found = examine(BARE, spoilt := text.replace(old, new), {})
+    wanted = {d.key: d.generated for d in find_differences(generated(BARE).described, found.described)}
+    entries = [(key, wanted[key]), ("option.tolerance", wanted["option.tolerance"])]
+    before, *after = (
+        [row for row in Comparison("", BARE, answers[0], solve(BARE, at=answers[0].at), SIMULATED, UNKNOWNS).rows()]
+        for answers in (found.answers, *(each or [] for each in examine_corrected(BARE, spoilt, found.names, entries)))
+    )
+    chosen = [d for d in find_differences(generated(BARE).described, found.described) if d.key in dict(entries)]
+    first, second = order_causes(sorted(chosen, key=lambda d: d.key != key), before, after)
+    assert first.difference.key == key and first.share is not None and first.share > 0.8
+    assert second.share is not None and second.share < 0.01
+
+
+@pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
+def test_another_plane_and_a_reversed_axis_change_no_number(axis: str) -> None:
+    found = examine(BARE, other_plane(f'site1="r" site2="q" {STIFF}', axis), MINE)
+    assert max(errors(BARE, found, ONE_STATE).values()) < STIFF_ENOUGH
+    assert {"plane"} <= keys(BARE, found)
+    assert ("pins.A.positive" in keys(BARE, found)) == (axis == "0 1 0")
+
+
+def test_the_default_softness_costs_a_percent_or_so() -> None:
+    soft = examine(BARE, other_plane(), MINE)
+    assert "closure.softness" in keys(BARE, soft)
+    assert 1e-3 < errors(BARE, soft, ONE_STATE)["torque"] < 1e-1
+
+
+def test_body_anchors_on_an_open_rest_state_build_another_linkage() -> None:
+    found = examine(BARE, other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'), MINE)
+    (remark,) = (
+        d.remark for d in find_differences(generated(BARE).described, found.described) if d.key == "lengths.output"
+    )
+    assert "in the pose of the file" in remark
+    assert found.described["lengths.output"] == pytest.approx(0.05)
+
+
+def test_cut_at_another_pin_it_is_the_same_linkage() -> None:
+    """The rocker hangs on the coupler, and the loop closes at O4."""
+    text = other_plane().replace('<site name="r" pos="0.25 0 0"/></body></body>', "<ROCKER/></body></body>")
+    rocker = re.search('    <body name="rocker".*?</body>', text)
+    assert rocker is not None
+    hanging = rocker[0].replace('pos="1.3 2 3"', 'pos="0.25 0 0"')
+    # its own line runs from O4 to B: turned round, B is its origin
+    hanging = re.sub(
+        r'<inertial pos="(\S+) 0 (\S+)"', lambda m: f'<inertial pos="{float(m[1]) - 0.22!r} 0 {m[2]}"', hanging
+    ).replace('<site name="q" pos="0.22 0 0"/>', '<site name="q" pos="-0.22 0 0"/>')
+    text = text.replace(rocker[0], '<site name="r" pos="1.3 2 3"/>').replace("<ROCKER/>", hanging)
+    found = examine(BARE, text.replace('site1="r" site2="q"', f'site1="r" site2="q" {STIFF}'), MINE)
+    assert found.described["closure.pin"] == "O4"
+    assert not {key for key in keys(BARE, found) if key.startswith(("bars.", "lengths."))}
+    assert max(errors(BARE, found, ONE_STATE).values()) < STIFF_ENOUGH
+
+
+def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
+    text = GENERATED.replace("</actuator>", '<velocity name="servo" joint="O2" kv="10"/></actuator>')
+    text = text.replace("</equality>", '<joint joint1="O2" joint2="O4"/></equality>')
+    found = examine(CRANK_ROCKER, text, {})
+    assert any("servo" in note for note in found.notes)
+    assert any("switched off" in note for note in found.notes)
+    assert max(errors(CRANK_ROCKER, found, ONE_STATE).values()) <= SIMULATED.factor
+
+
+def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
+    drive = fourbar.LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7))
+    scene = replace(CRANK_ROCKER, drive_bar=None, drive=drive)
+    text, driven = write_mjcf(scene), '<general name="cylinder" tendon="cylinder" />'
+    servo = '<position name="ram" tendon="cylinder" kp="400" kv="3" gear="2" ctrlrange="-1 1" forcerange="-1 1"/>'
+    for mine in (text, text.replace(driven, servo)):
+        examined = examine(scene, mine, {})
+        assert any("gives the cylinder's force" in note for note in examined.notes)
+        for how, most in ((ONE_STATE, 1e-9), (THROUGH_TIME, 1e-6)):
+            found = errors(scene, examined, how)
+            assert "torque" not in found and max(found[name] for name in ("drive_force", "F12", "F43", "F14")) < most
+    at = 'name="cylinder_end" pos="'
+    moved = text.replace(at + "0.0", at + "0.1")
+    assert moved != text and errors(scene, examine(scene, moved, {}), ONE_STATE)["drive_force"] > 1e-2
+    assert any(key.startswith("tendons.") for key in keys(scene, examine(scene, moved, {})))
+    with pytest.raises(InputError, match="0 actuators with a control on tendons"):
+        examine(scene, text.replace(driven, ""), {})
+
+
+def test_a_loop_that_nothing_closes_is_seen_in_the_numbers() -> None:
+    text = other_plane("").replace('site name="r"', 'site name="B3"').replace('site name="q"', 'site name="B4"')
+    found = examine(BARE, text, MINE)
+    assert found.described["closure.by"] == "nothing"
+    assert np.isnan(errors(BARE, found, ONE_STATE)["F43"])
+    assert errors(BARE, found, ONE_STATE)["torque"] > 0.01
+
+
+def test_colliding_bars_are_seen() -> None:
+    text = GENERATED.replace('contype="0" conaffinity="0"', "").replace('contact="disable"', "")
+    found = examine(CRANK_ROCKER, text, {})
+    assert "contacts" in keys(CRANK_ROCKER, found)
+
+
+HOSTILE = [
+    ("include", "<mujoco><include file='/etc/passwd'/></mujoco>", "<include>"),
+    ("mesh file", "<mujoco><asset><mesh file='../m.stl'/></asset></mujoco>", "no other file"),
+    ("texture side", "<mujoco><asset><texture fileup='u.png'/></asset></mujoco>", "no other file"),
+    ("directory", "<mujoco><compiler meshdir='/'/></mujoco>", "no other file"),
+    ("plugin", "<mujoco><extension><plugin plugin='x'/></extension></mujoco>", "<extension>"),
+    ("thousand", "<mujoco><worldbody><replicate count='1000000'/></worldbody></mujoco>", "<replicate>"),
+    ("entities", "<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco/>", "document type"),
+    ("endless solver", "<mujoco><option iterations='2000000000'/></mujoco>", "up to 1000"),
+    ("endless line search", "<mujoco><option ls_iterations=' 1001'/></mujoco>", "up to 1000"),
+    ("endless slip", "<mujoco><option noslip_iterations='0x7fffffff'/></mujoco>", "up to 1000"),
+    ("endless collisions", "<mujoco><option ccd_iterations='1e9'/></mujoco>", "up to 1000"),
+    ("other XML", "<robot/>", "<mujoco>"),
+    ("no XML", "four bars", "no XML"),
+    ("no text", b"\xff\xfe\x00", "UTF-8"),
+    ("null byte", "<mujoco model='a\0b'/>", "no XML"),
+    ("large", " " * (LARGEST_MJCF + 1), "must not exceed"),
+    ("deep", "<mujoco>" + "<body>" * 10 * DEEPEST, "deeper"),
+    ("deep and closed", "<mujoco>" + "<b>" * 5000 + "</b>" * 5000 + "</mujoco>", "deeper"),
+]
+
+
+@pytest.mark.parametrize(("what", "text", "word"), HOSTILE, ids=[case[0] for case in HOSTILE])
+def test_what_an_mjcf_may_not_hold(what: str, text: str | bytes, word: str, tmp_path: Path) -> None:
+    path = tmp_path / "theirs.xml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(InputError) as caught:
+        read_mjcf(path)
+    assert word in str(caught.value) or (what == "deep" and "no XML" in str(caught.value))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("timestep", ["1e-12", "1e9"])
+def test_an_absurd_timestep_is_reported_and_not_run_through(timestep: str) -> None:
+    """One so long that no step is made once agreed in every position: the state at the start, again and again."""
+    text = re.sub('timestep="[^"]*"', f'timestep="{timestep}"', GENERATED)
+    assert text != GENERATED
+    _, through = examine(CRANK_ROCKER, text, {}).answers
+    assert through.refusal is not None and "steps of the motion; must be 1 to 400000" in through.refusal
+
+
+OVERDONE = [
+    ("every mass", 'mass="[^"]*"', 'mass="1e308"', "bars.coupler.mass is beyond the range of doubles: inf"),
+    ("lengths", ' pos="[^"]*"', ' pos="1e308 1e308 0"', "lengths.input is beyond the range"),
+    ("user data", "<worldbody>", '<size nuser_body="2000000000"/><worldbody>', "is a size in it too large?"),
+    ("keyframes", "<worldbody>", '<size nkey="2000000000"/><worldbody>', "asks for 2000000000 keyframes"),
+    ("terrain", "<worldbody>", '<asset><hfield name="h" nrow="40000" ncol="40000" size="1 1 1 1"/></asset><worldbody>',
+     "is a size in it too large?"),
+    *((f"timestep {t}", 'timestep="[^"]*"', f'timestep="{t}"', f"its timestep of {t} s must be above 0")
+      for t in ("-1", "0", "nan")),
+    ("no MJCF", "mass=", "weight=", "MuJoCo does not compile it"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "old", "new", "words"), OVERDONE, ids=[case[0] for case in OVERDONE])
+def test_a_file_that_overdoes_it_is_one_line_with_its_name(
+    what: str, old: str, new: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, path = re.sub(old, new, GENERATED), tmp_path / "mine.xml"
+    assert text != GENERATED
+    path.write_text(text)
+    scene = str(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
+    arguments = ["check-mjcf", scene, str(path), "--out", str(tmp_path / "out")]
+    assert status(arguments) == 2
+    message = capsys.readouterr().err.strip().splitlines()[-1]
+    assert message.startswith(f"error: {path}: MJCF = 'mine.xml': ") and words in message
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_ratio_beyond_the_range_of_doubles_has_its_remark() -> None:
+    heavy = examine(CRANK_ROCKER, GENERATED.replace('mass="0.4"', 'mass="4e307"'), {})
+    (difference,) = (
+        d for d in find_differences(generated(CRANK_ROCKER).described, heavy.described) if d.key == "bars.output.mass"
+    )
+    assert difference.remark.startswith("10^308 times")
+
+
+FIFTH = '<body name="fan"><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
+REFUSED = [
+    ("no such body", other_plane(), {"input": "wheel"}, "the file has: crank, rod, rocker"),
+    ("no guess", other_plane().replace("</worldbody>", FIFTH + "</worldbody>"), {},
+     "no guess makes a four-bar (every joint must be a hinge of the input"),
+    ("a slide", other_plane().replace("<joint/>", '<joint type="slide"/>', 1), MINE, "hinge"),
+    ("nothing closes", re.sub("<site [^>]*>", "", other_plane("")), MINE,
+     "no body is named B3, B4, and no guess makes a four-bar (no connect, weld or pair of sites closes it)"),
+    ("too few", "<mujoco><worldbody><body name='input'><joint/><geom size='.1'/></body></worldbody></mujoco>", {},
+     "no body is named coupler, output, and no guess makes a four-bar (it has fewer bodies on hinges)"),
+    ("does not compile", other_plane().replace("mass=", "weight="), MINE, "does not compile"),
+    ("two names, one body", other_plane(), {**MINE, "coupler": "crank"}, "three bodies"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "text", "names", "word"), REFUSED, ids=[case[0] for case in REFUSED])
+def test_a_file_that_is_no_four_bar_is_one_line(what: str, text: str, names: dict[str, str], word: str) -> None:
+    with pytest.raises(InputError) as caught:
+        examine(BARE, text, names)
+    assert word in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def crash(scene: Scene, text: str | None, names: dict[str, str]) -> None:
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def hang(scene: Scene, text: str | None, names: dict[str, str]) -> None:
+    time.sleep(3600.0)
+
+
+def devour(scene: Scene, text: str | None, names: dict[str, str]) -> None:
+    bytearray(2 * WORKER_MEMORY)
+
+
+def test_ctrl_c_does_not_wait_for_the_file() -> None:
+    # a test run in the background inherits SIGINT ignored
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    began = time.monotonic()
+    threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+    try:
+        with pytest.raises(KeyboardInterrupt), mjcf.examine_guarded(Path("mine.xml")) as examined:
+            examined(f"{__name__}:hang", BARE, "<mujoco/>", {})
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert time.monotonic() - began < mjcf.SECONDS / 4
+
+
+@pytest.mark.parametrize(("what", "word"), [(crash, "crashed"), (hang, "did not come back"), (devour, "memory")])
+def test_a_file_that_breaks_the_engine_is_one_line(what: object, word: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mjcf, "SECONDS", 4.0 if what is hang else 60.0)  # a busy machine starts a process slowly
+    with pytest.raises(InputError, match=word), mjcf.examine_guarded(Path("mine.xml")) as examined:
+        examined(f"{__name__}:{what.__name__}", BARE, "<mujoco/>", {})  # type: ignore[attr-defined]
+
+
+def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
+    path = tmp_path / "mine\x1b[31m.xml"
+    path.write_text(other_plane().replace('name="rod"', 'name="rod&#60;b&#62;|"'))
+    scene = tmp_path / "scene.toml"
+    scene.write_text(fourbar.dump(BARE))
+    names = [f"--name={role}={name}" for role, name in {**MINE, "coupler": "rod<b>|"}.items()]
+    arguments = [str(scene), str(path), *names, "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(mjcf.command, arguments, standalone_mode=False)
+    assert result.return_value == 1, result.output
+    assert "\x1b" not in result.output
+    assert "closure.softness" in result.output
+    report = (tmp_path / "out" / "theirs.md").read_text()
+    assert "\x1b" not in report
+    assert any(
+        row.verdict == FAILS and row.engine == ONE_STATE for row in read_columns(tmp_path / "out" / "results.csv")
+    )
+
+
+def test_a_role_that_no_body_has_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="ROLE=NAME"):
+        run(tmp_path, GENERATED, "--name", "wheel=a")
+
+
+def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[float]]:
+    """Exit status of the command on a file of the crank-rocker, and what its comparisons are allowed."""
+    scene, path = tmp_path / "scene.toml", tmp_path / "theirs.xml"
+    scene.write_text(fourbar.dump(BARE))
+    path.write_text(text)
+    out = tmp_path / f"out{len(options)}"
+    arguments = [str(scene), str(path), "--out", str(out), *options]
+    result = CliRunner().invoke(mjcf.command, arguments, standalone_mode=False)
+    if result.exception is not None:
+        raise result.exception
+    return result.return_value, sorted(
+        {row.allowed for row in read_columns(out / "results.csv") if row.quantity != "undecided"}
+    )
+
+
+def test_a_required_error_is_what_their_file_is_held_to(tmp_path: Path) -> None:
+    text = write_mjcf(BARE).replace("0.0016133333333333336", "0.0017")
+    assert run(tmp_path, text) == (1, [0.0, SIMULATED.factor])
+    assert run(tmp_path, text, "--error", "0.5") == (0, [0.0, 0.5])
+    with pytest.raises(InputError, match="above 0 and below 1"):
+        run(tmp_path, text, "--error", "2")

@@ -1,0 +1,85 @@
+"""The findings: what each says of itself, its script where the engine is, and the list of them."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fourbar_validation.cli import status
+from fourbar_validation.lab.simulators import findings as module
+from fourbar_validation.lab.simulators.findings import FIELDS, FOLDER, MENDED, find_interpreter, read, read_findings
+
+ALL = read_findings()
+SECONDS = 100.0
+
+
+OTHERS = [Path(python) for python in filter(None, os.environ.get("SIMULATORS", "").split(os.pathsep))]
+"""Interpreters of simulators that are not installed here."""
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("finding", ALL, ids=lambda finding: finding.script.stem)
+def test_each_finding_holds_or_says_since_when_not(finding: module.Reproduction) -> None:
+    if (place := find_interpreter(finding, [Path(sys.executable), *OTHERS])) is None:
+        pytest.skip(f"not run: {finding.engine[0]} is not installed")
+    state = finding.run(place[0], SECONDS)
+    assert state == "holds" or (state == MENDED and not finding.fields["Until"].startswith("still")), state
+
+
+def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
+    assert FOLDER is not None and len(ALL) >= 8
+    listed = (FOLDER / "README.md").read_text()
+    for finding in ALL:
+        assert set(FIELDS) - {"With"} <= finding.fields.keys(), finding.script
+        cells = [finding.fields[name] for name in ("Since", "Until", "Reported")]
+        name = finding.script.name
+        row = " | ".join([finding.sentence, finding.engine[0], *cells, f"[{name}]({name})"])
+        assert f"| {row} |" in listed, row
+    assert listed.count(".py)") == len(ALL), "a row without its script"
+
+
+@pytest.mark.parametrize(
+    ("code", "state"),
+    [
+        ("", "holds"),
+        ("import sys; sys.exit('mended')", MENDED),
+        ("1 / 0", "not run: ZeroDivisionError: division by zero"),
+        ("while True: pass", "not run: no answer within 1 s"),
+    ],
+)
+def test_a_script_that_breaks_down_is_not_mended(code: str, state: str, tmp_path: Path) -> None:
+    (tmp_path / "one.py").write_text(f'"""It is so.\n\nEngine: pip (pip)\nSince: 1.0 and\n  more\n"""\n{code}\n')
+    finding = read(tmp_path / "one.py")
+    assert finding.sentence == "It is so." and finding.fields["Since"] == "1.0 and more"
+    seconds = 1.0 if "while" in code else SECONDS
+    assert finding.run(Path(sys.executable), seconds) == state
+
+
+def test_the_command_says_what_could_not_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    script = tmp_path / "one.py"
+    script.write_text('"""It is so.\n\nEngine: nothing-such (nothing_such)\nWith: also=={version}, more\n"""\n')
+    monkeypatch.setattr(module, "FOLDER", tmp_path)
+    done = CliRunner().invoke(module.command)
+    assert "one.py: not run: nothing-such is not installed under any --python" in done.output and done.exit_code == 1
+    script.write_text(script.read_text().replace("nothing-such (nothing_such)", "pytest (pytest)"))
+    done = CliRunner().invoke(module.command)
+    assert done.exit_code == 0 and f"one.py: holds in pytest {pytest.__version__}, Python" in done.output
+    asked = []
+
+    def installed(*given: object) -> tuple[Path | None, str]:
+        asked.append(given)
+        return (Path(sys.executable), "") if given[1] == "2.0" else (None, "does not load: libtoy.so.7")
+
+    monkeypatch.setattr(module, "install_version", installed)
+    arguments = [str(script), "--release", "1.0", "--release", "2.0", "--cache", str(tmp_path)]
+    done = CliRunner().invoke(module.command, arguments)
+    assert done.output == "pytest 1.0: does not load: libtoy.so.7\npytest 2.0: holds\n"
+    assert asked[0] == ("pytest", "1.0", tmp_path, ["also==1.0", "more"], "pytest")
+
+
+@pytest.mark.parametrize("arguments", [["--release", "1.0"], [__file__], ["no_such.py"]])
+def test_bad_input_is_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert status(["standing", "--findings", *arguments]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

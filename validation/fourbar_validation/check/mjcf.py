@@ -1,0 +1,230 @@
+"""`python -m validation check-mjcf`: what differs from the generated MJCF, and what it costs in accuracy.
+
+The file is somebody's: it is compiled and run in a process of its own, with a limit on time and memory.
+"""
+
+import math
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any
+
+import click
+
+from fourbar.errors import FourBarError, InputError
+from fourbar.quantities import UNKNOWNS
+from fourbar.scene import Scene
+from fourbar.show.progress import show_running
+from fourbar.solve import solve
+from fourbar.writing import write_text
+from fourbar_validation.check.causes import Cause, order_causes
+from fourbar_validation.check.differences import find_differences
+from fourbar_validation.check.screen import read_mjcf
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import Comparison
+from fourbar_validation.compare.counts import Counts
+from fourbar_validation.compare.rows import Row, make_plain, write_results
+from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, hold_simulated
+from fourbar_validation.engines.memory import WORKER_MEMORY, bound_memory
+from fourbar_validation.report.templating import render, write_number
+from fourbar_validation.scenes.suites import read_scene_files
+
+SECONDS = 120.0
+"""A four-bar takes less than one."""
+ABOUT_SHARES = (
+    "share: by how much the error of that quantity falls when this one entry is set as in the generated file and all "
+    "others stay; shares do not add up to 100 %. A dash: this entry cannot be changed by itself in the compiled file"
+)
+HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
+EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
+CORRECTED = "fourbar_validation.engines.mujoco.theirs:examine_corrected"
+
+
+@dataclass(frozen=True, slots=True)
+class CostOfModel:
+    """One quantity by one method: the error of their file, and of the generated one."""
+
+    row: Row
+    generated: float
+
+    @property
+    def method(self) -> str:
+        """Engine and setting."""
+        return f"{self.row.engine} {self.row.setting}"
+
+    def cells(self) -> tuple[str, ...]:
+        """Under HEADINGS; a row without an error says why."""
+        row = self.row
+        verdict = row.verdict if not math.isnan(row.error) else f"{row.verdict}: {row.reason}"
+        return row.quantity, write_number(row.error), write_number(self.generated), write_number(row.allowed), verdict
+
+
+@dataclass(frozen=True, slots=True)
+class ModelReport:
+    """All that is reported of somebody's file."""
+
+    causes: list[Cause]
+    """What differs, the worst first."""
+    costs: list[CostOfModel]
+    notes: list[str]
+
+    def methods(self) -> list[str]:
+        """List the methods by which their file was evaluated."""
+        return list(dict.fromkeys(cost.method for cost in self.costs))
+
+    @property
+    def counts(self) -> Counts:
+        """The comparisons of their file by verdict."""
+        return Counts(cost.row for cost in self.costs)
+
+
+def read_names(pairs: tuple[str, ...]) -> dict[str, str]:
+    """Read ROLE=NAME pairs of the command line."""
+    allowed = ("input", "coupler", "output", "B3", "B4")
+    names = {}
+    for pair in pairs:
+        role, equals, name = pair.partition("=")
+        if not equals or role not in allowed or not name:
+            raise InputError("--name", pair, f"must be ROLE=NAME, ROLE one of {', '.join(allowed)}")
+        names[role] = name
+    return names
+
+
+def examine_model(
+    name: str, scene: Scene, mjcf: Path, names: Mapping[str, str], tolerance: ErrorBound = SIMULATED
+) -> ModelReport:
+    """Examine a file in a guarded process, and the generated one before; theirs is held to the tolerance."""
+    text = read_mjcf(mjcf)
+    with examine_guarded(mjcf) as examined:
+        generated, theirs = examined(EXAMINE, scene, None, {}), examined(EXAMINE, scene, text, dict(names))
+        ours = {(row.engine, row.quantity): row.error for row in _list_rows(name, scene, generated.answers, SIMULATED)}
+        rows = _list_rows(name, scene, theirs.answers, tolerance)
+        costs = [CostOfModel(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
+        result = find_differences(generated.described, theirs.described, theirs.called)
+        entries = [(difference.key, difference.generated) for difference in result]
+        failed = any(row.failed for row in rows)
+        corrected = examined(CORRECTED, scene, text, dict(theirs.names), entries) if failed else []
+    after = [[] if answers is None else _list_rows(name, scene, answers, tolerance) for answers in corrected]
+    return ModelReport(order_causes(result, rows, after), costs, theirs.notes)
+
+
+def _list_rows(name: str, scene: Scene, answers: list[Answer], tolerance: ErrorBound) -> list[Row]:
+    result = []
+    for answer in answers:
+        formulas = solve(scene, "force", at=answer.at)
+        result += Comparison(name, scene, answer, formulas, tolerance, UNKNOWNS).rows()
+    return result
+
+
+@contextmanager
+def examine_guarded(mjcf: Path) -> Iterator[Callable[..., Any]]:
+    """Examine a file, by an adapter and its arguments, in a process that may crash, hang or run out of memory."""
+    from multiprocessing import get_context
+
+    from pebble import ProcessExpired, ProcessPool
+
+    waiting = show_running(f"MuJoCo examines the file, in {SECONDS:g} s at most")
+    with waiting, ProcessPool(max_workers=1, context=get_context("spawn"), initializer=_confine) as pool:
+
+        def examined(*arguments: object) -> Any:
+            try:
+                return pool.schedule(_examine, args=arguments, timeout=SECONDS).result()
+            except FourBarError as error:
+                if not isinstance(error, InputError) or error.key != "MJCF":
+                    raise
+                raise InputError(error.key, error.value or mjcf.name, error.allowed, str(mjcf)) from None
+            except TimeoutError:
+                reason = f"MuJoCo did not come back in {SECONDS:g} s"
+            except MemoryError:
+                reason = f"asks for more than {WORKER_MEMORY // 2**30} GB of memory"
+            except ProcessExpired as error:
+                reason = f"MuJoCo crashed on it (exit code {error.exitcode})"
+            except KeyboardInterrupt:
+                pool.stop()  # type: ignore[no-untyped-call]  # or the pool would wait for the file to its time limit
+                raise
+            raise InputError("MJCF", mjcf.name, reason, str(mjcf))
+
+        yield examined
+
+
+def _confine() -> None:
+    """Bound the memory, and put MuJoCo's log where it is swept away."""
+    os.chdir(tempfile.gettempdir())
+    bound_memory()
+
+
+def _examine(adapter: str, *arguments: object) -> Any:
+    return resolve_name(adapter)(*arguments)
+
+
+def show(report: ModelReport, mjcf: Path, out: Path) -> None:
+    """Print the report and write theirs.md and results.csv."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.padding import Padding
+    from rich.table import Table
+
+    console = Console()
+    if not report.causes:
+        console.print("It differs in nothing from the generated MJCF.")
+    else:
+        console.print(f"{escape(make_plain(mjcf.name))} against the generated MJCF, the worst cause first")
+        console.print(f"[dim]{ABOUT_SHARES}[/]\n")
+    for cause in report.causes:
+        style = "bold" if cause.share is not None and cause.share >= 0.5 else ""
+        console.print(f"{cause.percent():>12}  {escape(make_plain(cause.line()))}", style=style)
+        for text in cause.texts():
+            console.print(Padding(escape(make_plain(text)), (0, 0, 0, 14)))
+    for note in report.notes:
+        console.print(f"note: {escape(make_plain(note))}")
+    for method in report.methods():
+        costs = Table(title=f"what it costs, {escape(make_plain(method))}: error", box=SIMPLE_HEAD, pad_edge=False)
+        for heading in HEADINGS:
+            costs.add_column(heading, overflow="fold")
+        for cost in report.costs:
+            if cost.method == method:
+                style = "bold red" if cost.row.failed else ""
+                costs.add_row(*(escape(make_plain(text)) for text in cost.cells()), style=style)
+        console.print(costs)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / "theirs.md", write_markdown(report, mjcf))
+    write_results([cost.row for cost in report.costs], out / "results.csv")
+    sentence = f"{report.counts.sentence()}. It differs in {len(report.causes)} entries"
+    console.print(f"[bold]{sentence}[/]; written to {escape(make_plain(str(out)))}")
+
+
+def write_markdown(report: ModelReport, mjcf: Path) -> str:
+    """Write the same as text for a page."""
+    what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_SHARES, "headings": ("method", *HEADINGS)}
+    what |= {"causes": [cause.cells() for cause in report.causes]}
+    what |= {"costs": [(cost.method, *cost.cells()) for cost in report.costs]}
+    return render("fourbar_validation.check", "theirs.md.j2", **what)
+
+
+@click.command(name="check-mjcf")
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("theirs", metavar="THEIRS.xml", type=click.Path(path_type=Path))
+@click.option(
+    "--name",
+    "names",
+    metavar="ROLE=NAME",
+    multiple=True,
+    help="The body that is the input, coupler or output; B3, B4: the sites of pin B on the coupler and the output, "
+    "where no connect or weld closes the loop. Left out: guessed from structure and lengths, and printed.",
+)
+@click.option("--error", "wanted", type=float, metavar="E", help="The relative error that THEIRS.xml may have.")
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
+)
+def command(scene: Path, theirs: Path, names: tuple[str, ...], wanted: float | None, out: Path) -> int:
+    """Compare your own MJCF of SCENE with the generated one, field by field, and say what each difference costs."""
+    suite = read_scene_files((scene,))
+    tolerance = SIMULATED if wanted is None else hold_simulated(wanted, "what this file may be wrong by")
+    report = examine_model(suite.name(0), suite.scene(0), theirs, read_names(names), tolerance)
+    show(report, theirs, out)
+    return report.counts.status

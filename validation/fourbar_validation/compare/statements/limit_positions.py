@@ -1,0 +1,253 @@
+"""Where each bar can stand: the loop closes within its range, not beyond its limits, and there it is at rest.
+
+The loop is a sum of vectors, d u_1 = a u_2 + b u_3 - c u_4, and any moving bar may come first in it: an engine
+that turns bar 2 alone is given the linkage with bar k in that place. The distance that the other two bars have to
+span grows steadily while bar k turns from the ground's direction to the opposite one, so the answers beyond and on
+the limits and along the ground settle every angle.
+"""
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.formulas import mobility
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Engine
+from fourbar_validation.compare.statements.finding import Finding, Place, Seen, compare_angles, look, require_answer
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    EQUIVALENCE,
+    NOTHING_TO_TELL,
+    TOUCHING_MARGIN,
+    TURN,
+    Array,
+    Mask,
+    find_lever,
+    find_margin,
+    find_roundoff,
+    wrap_angle,
+)
+
+BEYOND = 4.0 * TOUCHING_MARGIN
+"""Of the sum of the lengths: by this much the loop closes, or misses, past a limit where the engine is tried."""
+
+LENGTHS_ROUNDED = (EPS / 4.0, EPS)
+"""Of the perimeter: the lengths were rounded themselves, and between these two a change point may be stated or not."""
+PAST = 1e-3
+"""rad. This far on either side of a change point the speeds of the two motions differ visibly."""
+FAR = 0.1
+"""rad. As far as a sweep goes on."""
+
+
+def _compare_change_points(linkage: FourBar) -> Finding:
+    """By the exact sums of the lengths: which of the two positions with input and ground in line have all bars so."""
+    d, a, b, c = (Fraction(length) for length in linkage.lengths)
+    missing = {0.0: abs(abs(d - a) - abs(b - c)), math.pi: abs(d + a - b - c)}
+    stated, wrong, known = mobility.change_points(linkage), 0, 0
+    for psi, gap in missing.items():
+        part, angle = float(gap / (d + a + b + c)), linkage.ground_angle + psi
+        allowed = EQUIVALENCE.factor * max(1.0, abs(angle))
+        here = any(abs(math.remainder(point - angle, TURN)) <= allowed for point in stated)
+        known += here
+        wrong += part > LENGTHS_ROUNDED[1] if here else part < LENGTHS_ROUNDED[0]
+    return Finding(float(wrong + len(stated) - known), 0.0, linkage.ground_angle, "change points")
+
+
+def compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
+    """Compute the angle, rad, by which bar 2 turns until the loop closes, or misses, by BEYOND more."""
+    d, a, *_ = linkage.lengths
+    psi, little = theta_2 - linkage.ground_angle, BEYOND * sum(linkage.lengths)
+    e = max(abs(d - a * np.exp(1j * psi)), little)
+    # e grows by d a sin(psi)/e to first order, by d a/(2 e) to second where the bar lies along the ground
+    slope = max(d * a * abs(math.sin(psi)) / e, math.sqrt(0.5 * little * d * a / e))
+    return float(little / slope) + 4.0 * EPS * (abs(theta_2) + TURN)
+
+
+class _Trial(NamedTuple):
+    """What an engine is tried with for one bar, and what the formulas state of it."""
+
+    scene: Scene
+    """The linkage with the bar in the place of bar 2."""
+    command: Command
+    angles: Array
+    """Of the bar, rad."""
+    inside: Mask
+    """Whether the loop closes there."""
+    decidable: Mask
+    """And it is not rounding that decides."""
+    findings: tuple[Finding, ...]
+    """Of the statements among themselves."""
+
+
+def _try_bar(linkage: FourBar, bar: int) -> _Trial:
+    second, third = (linkage.bar(k) for k in MOVING_BARS if k != bar)
+    first = FourBar(linkage.ground, linkage.bar(bar), second, third, linkage.ground_angle)
+    shift = math.pi if bar == 4 else 0.0  # the loop runs along bar 4 from B to O4
+    spans, full = mobility.find_intervals(linkage, bar), mobility.turns_fully(linkage, bar)
+    expected = [((start + stop) / 2.0, True) for start, stop in spans]
+    # that the loop closes up to its limits is seen where the limit positions themselves are examined
+    for i, (start, stop) in enumerate(() if full else spans):
+        before, after = (start - spans[i - 1][1]) % TURN, (spans[i + 1 - len(spans)][0] - stop) % TURN
+        expected.append((start - min(compute_step_beyond(first, start + shift), 0.5 * before), False))
+        expected.append((stop + min(compute_step_beyond(first, stop + shift), 0.5 * after), False))
+    along = [linkage.ground_angle + angle - shift for angle in (0.0, math.pi)]  # the ground, in both directions
+    within = [any((angle - start) % TURN < stop - start for start, stop in spans) for angle in along]
+    expected += zip(along, within, strict=True)
+    if bar == 2:
+        expected += [(angle, True) for angle in mobility.choose_range(linkage)]
+    angles, inside = (np.array(column) for column in zip(*expected, strict=True))
+    limits = [limit[MOVING_BARS.index(bar)] for limit in mobility.limit_positions(linkage, bar)]
+    findings = (
+        compare_angles(
+            f"limits of bar {bar}", limits, [] if full else [end for span in spans for end in span], linkage
+        ),
+        compare_angles(f"swing of bar {bar}", [mobility.swing(linkage, bar)], [spans[0][1] - spans[0][0]], linkage),
+        Finding(float(full != all(within)), 0.0, along[0], f"whether bar {bar} turns fully"),
+    )
+    decidable = np.abs(find_margin(first, angles + shift)) > TOUCHING_MARGIN
+    command = Command(angles + shift, np.ones(len(angles), np.int8), None, 0.0)
+    return _Trial(Scene(first), command, angles, inside, decidable, findings)
+
+
+def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
+    """Compute the little that bar 2 turns from its limit to where the loop closes, rad."""
+    step = compute_step_beyond(linkage, theta_2)
+    ahead, behind = find_margin(linkage, np.array([theta_2 + step, theta_2 - step]))
+    return step if ahead > behind else -step
+
+
+def _mark_collinear(linkage: FourBar, bar: int) -> list[bool]:
+    """Of each limit of a bar, whether all bars are collinear there but for rounding."""
+    angles = np.array([limit.theta_2 for limit in mobility.limit_positions(linkage, bar)])
+    return [bool(each) for each in np.abs(find_margin(linkage, angles)) <= TOUCHING_MARGIN]
+
+
+class Stated(NamedTuple):
+    """What the formulas state of the limits of a linkage: evaluated once, for all engines."""
+
+    linkage: FourBar
+    trials: dict[int, _Trial]
+    """By moving bar."""
+    inside: list[tuple[mobility.LimitPosition, float]]
+    """Limits of bar 2, and the little that it turns from each: at the limit rounding decides if the loop closes."""
+    collinear: dict[int, list[bool]]
+    """Of each limit of bars 3 and 4, whether all bars are collinear there but for rounding."""
+
+    @classmethod
+    def of(cls, linkage: FourBar) -> "Stated":
+        """Evaluate the formulas."""
+        inside = [(limit, _compute_inwards(linkage, limit.theta_2)) for limit in mobility.limit_positions(linkage)]
+        trials = {bar: _try_bar(linkage, bar) for bar in MOVING_BARS}
+        return cls(linkage, trials, inside, {bar: _mark_collinear(linkage, bar) for bar in (3, 4)})
+
+    def dead_centres(self, bar: int) -> list[mobility.LimitPosition]:
+        """Select the limits of a bar that are of one branch, as they should be."""
+        limits = zip(mobility.limit_positions(self.linkage, bar), self.collinear[bar], strict=True)
+        return [limit for limit, collinear in limits if not collinear and limit.branch != 0]
+
+
+def compare_ranges(stated: Stated, engine: Engine) -> Iterator[Finding]:
+    """Ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
+    for bar, tried in stated.trials.items():
+        closes = require_answer(engine, tried.scene, tried.command).assembled
+        assert closes is not None
+        wrong = tried.decidable & (closes != tried.inside)
+        where = float(tried.angles[int(np.argmax(wrong))])
+        what = f"bar {bar} at {where!r} rad: the engine finds the opposite" if wrong.any() else "closes where stated"
+        yield Finding(float(np.count_nonzero(wrong)), 0.0, where, what)
+        yield from tried.findings
+    yield _compare_change_points(stated.linkage)
+
+
+def choose_places(stated: Stated) -> list[Place]:
+    """Where an engine is looked at for them."""
+    inside = [(limit.theta_2 + step, branch) for limit, step in stated.inside for branch in (1, -1)]
+    return inside + [(limit.theta_2, limit.branch) for bar in (3, 4) for limit in stated.dead_centres(bar)]
+
+
+def compare_limit_positions(stated: Stated, seen: Seen) -> Iterator[Finding]:
+    """Compare the limits of every moving bar; where all bars are collinear no side can be stated."""
+    yield Finding(0.0, 0.0, stated.linkage.ground_angle, "the same positions")
+    yield from _check_input(stated, seen)
+    for bar in (3, 4):
+        yield from _check_dead_centres(stated, bar, seen)
+
+
+def _check_input(stated: Stated, seen: Seen) -> Iterator[Finding]:
+    """On both branches just inside each limit: bars 3 and 4 stand off their common line by the same angles."""
+    linkage = stated.linkage
+    d, a, *_ = linkage.lengths
+    for limit, step in stated.inside:
+        open_, crossed = (
+            {name: seen[(limit.theta_2 + step, branch)][name] for name in ("theta_3", "theta_4")} for branch in (1, -1)
+        )
+        yield Finding(float(limit.branch != 0), 0.0, limit.theta_2, "both branches meet at a limit of bar 2")
+        digits = find_lever(linkage) * abs(math.sin(open_["theta_4"] - open_["theta_3"]))
+        if digits * NOTHING_TO_TELL <= EPS:
+            continue
+        e = abs(d - a * np.exp(1j * (limit.theta_2 - linkage.ground_angle)))
+        allowed = find_roundoff(linkage) / digits + a / e * (abs(step) + _compute_moved(linkage, 2, limit))
+        middle = {}
+        for name, angle in (("theta_3", limit.theta_3), ("theta_4", limit.theta_4)):
+            middle[name] = open_[name] + 0.5 * wrap_angle(crossed[name] - open_[name])
+            error = abs(wrap_angle(middle[name] - angle))
+            yield Finding(error, allowed, limit.theta_2, f"{name} at a limit of bar 2")
+        aligned = math.cos(middle["theta_4"] - middle["theta_3"]) < 0.0
+        yield Finding(float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded")
+
+
+def _compute_moved(linkage: FourBar, bar: int, limit: mobility.LimitPosition) -> float:
+    """Compute what rounding may turn a limit by: the triangle of the ground, the bar and the other two in one line."""
+    upright = abs(math.sin(limit[MOVING_BARS.index(bar)] - linkage.ground_angle))
+    d, *moving = linkage.lengths
+    spread = sum(linkage.lengths) / d * (1.0 + sum(moving) / linkage.bar(bar).length)
+    return find_roundoff(linkage) * spread / max(upright, EPS)
+
+
+def _check_dead_centres(stated: Stated, bar: int, seen: Seen) -> Iterator[Finding]:
+    """Check that the other two bars are in one line there, and the bar is at rest."""
+    linkage = stated.linkage
+    for limit, collinear in zip(mobility.limit_positions(linkage, bar), stated.collinear[bar], strict=True):
+        known = (0, 1, -1) if collinear else (1, -1)  # all bars collinear: rounding decides
+        yield Finding(float(limit.branch not in known), 0.0, limit.theta_2, f"branch of a limit of bar {bar}")
+    for limit in stated.dead_centres(bar):
+        what, place = f"bar {bar} at theta_2 = {limit.theta_2!r}", (limit.theta_2, limit.branch)
+        theta_3, theta_4, omega_3, omega_4 = (seen[place][q] for q in ("theta_3", "theta_4", "omega_3", "omega_4"))
+        sine, speed = abs(math.sin(theta_4 - theta_3)), max(1.0, abs(omega_3), abs(omega_4))
+        digits = find_lever(linkage) * sine
+        if digits * NOTHING_TO_TELL <= EPS:
+            continue
+        moved = _compute_moved(linkage, bar, limit)
+        for angle, of_formula in ((theta_3, limit.theta_3), (theta_4, limit.theta_4)):
+            error = abs(wrap_angle(angle - of_formula))
+            yield Finding(error, find_roundoff(linkage) / digits + moved * speed, limit.theta_2, what)
+        # the loop runs along bar 4 from B to O4
+        aligned = math.cos({3: theta_4 + math.pi, 4: theta_3}[bar] - limit.theta_2) > 0.0
+        yield Finding(float(aligned != limit.stretched), 0.0, limit.theta_2, "stretched or folded")
+        slowing = abs(seen[place][f"alpha_{bar}"])
+        at_rest = find_roundoff(linkage) * speed / (digits * sine) + slowing * moved
+        yield Finding(abs({3: omega_3, 4: omega_4}[bar]), at_rest, limit.theta_2, f"{what}: at rest")
+
+
+def check_through(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
+    """Through a change point two motions go on: the smooth one is that whose speeds the engine finds unbroken.
+
+    Every change point, in both senses and from both branches, with a position on the point itself and without.
+    """
+    for point in mobility.change_points(linkage):
+        for sense in (1.0, -1.0):
+            for start in (1, -1):
+                angles = point + sense * np.array([-FAR, -PAST, PAST, FAR])
+                places = [(float(angles[1]), start), (float(angles[2]), 1), (float(angles[2]), -1)]
+                seen = look(engine, linkage, places)
+                rates = np.array([[seen[place][name] for place in places] for name in ("omega_3", "omega_4")])
+                goes_on = (1, -1)[int(np.argmin(np.abs(rates[:, 1:] - rates[:, :1]).max(axis=0)))]
+                expected = [start, start, goes_on, goes_on]
+                stated = mobility.follow_smooth_path(linkage, angles, start)
+                on_it = mobility.follow_smooth_path(linkage, np.insert(angles, 2, point), start)
+                wrong = np.count_nonzero(stated != expected) + np.count_nonzero(np.delete(on_it, 2) != expected)
+                yield Finding(float(wrong), 0.0, float(point), f"from branch {start:+d} at {point!r} rad")

@@ -1,0 +1,193 @@
+"""Each simulator in its own environment, compared with the formulas at the states that it reached by itself."""
+
+import json
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fourbar
+from fourbar.errors import FourBarError
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command, Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.rows import say_error
+from fourbar_validation.compare.tolerance import find_error, magnitude
+from fourbar_validation.run.elsewhere import run_to_end, start_harness
+
+SIMULATORS = {
+    "mujoco_c": ("MuJoCo", "mujoco"),
+    "pinocchio_simulated": ("Pinocchio", "pinocchio"),
+    "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
+    "mujoco_mjx": ("MJX", "mujoco.mjx"),
+    "newton_mujoco": ("Newton, MuJoCo solver", "newton"),
+    "newton_kamino": ("Newton, Kamino", "newton"),
+    "genesis_rigid": ("Genesis", "genesis"),
+    "pybullet": ("PyBullet", "pybullet"),
+    "drake_sap": ("Drake, SAP", "pydrake"),
+    "exudyn_simulated": ("Exudyn", "exudyn"),
+}
+"""By module: name, and what must be importable."""
+TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
+
+
+@dataclass(slots=True)
+class Line:
+    """One setting of a simulator, over single states or over a turn in so many steps."""
+
+    simulator: str
+    version: str
+    setting: str
+    steps: int | None
+    errors: dict[str, float]
+    """Greatest of the readings, by the greatest value in a turn; a quantity that cannot be read is left out."""
+    gap: float
+    """By the longest bar."""
+    cost: float | None
+    """Seconds of the processor for one simulated second."""
+    order: float | None = None
+    """Of the torque's error, from the number of steps before to this one."""
+    apart: str = ""
+    """Why it does not stand with the others: what the setting is not meant for."""
+
+    @property
+    def worst(self) -> float:
+        """The greatest of the errors, NaN where one is."""
+        return float(np.max(list(self.errors.values())))
+
+
+@dataclass(slots=True)
+class Differentiated:
+    """What a simulator that can be differentiated says of the driving torque at a state."""
+
+    simulator: str
+    version: str
+    how: str
+    """Or why not."""
+    errors: dict[str, float | None] = field(default_factory=dict)
+    """Of the torque, and of its derivative by each number, by our own; None: it says 0."""
+
+
+@dataclass(slots=True)
+class Examination:
+    """All that the page shows."""
+
+    lines: list[Line] = field(default_factory=list)
+    changed: dict[str, str] = field(default_factory=dict)
+    devices: dict[str, str] = field(default_factory=dict)
+    """What each ran on."""
+    made_for: dict[str, str] = field(default_factory=dict)
+    """Of simulators that are made for something else than what is asked here."""
+    left_out: dict[str, str] = field(default_factory=dict)
+    slopes: list[Differentiated] = field(default_factory=list)
+
+
+def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Examination:
+    """Examine every simulator under the first of the interpreters that has it."""
+    found = Examination()
+    for module, (name, library) in SIMULATORS.items():
+        python = next((python for python in pythons if _has(python, library)), None)
+        if python is None:
+            found.left_out[name] = "not installed under any --python"
+            continue
+        done = start_harness(
+            [python, "-m", "fourbar_validation.lab.simulators.work", module, file.absolute()], seconds=seconds
+        )
+        if done.why:
+            found.left_out[name] = done.why
+            continue
+        try:
+            answer = json.loads(done.out)
+            judged, changed = compare_lines(scene, name, answer), str(answer["changed"])
+            differentiated = slopes(scene, name, answer)
+            ran_on = f"{answer['device']}, Python {answer['python']}"
+            not_run = {f"{name}, {what}": str(why) for what, why in answer.get("not_run", {}).items()}
+        except (AttributeError, IndexError, KeyError, TypeError, ValueError, FourBarError) as error:
+            found.left_out[name] = f"no answer that can be read: {say_error(error)}"
+            continue
+        found.lines += judged
+        found.slopes += differentiated
+        found.changed[name], found.devices[name] = changed, ran_on
+        found.made_for[name] = str(answer.get("made_for", ""))
+        found.left_out |= not_run
+    return found
+
+
+def compare_lines(scene: Scene, name: str, answer: dict[str, Any]) -> list[Line]:
+    """Compare one simulator's readings with the formulas, line by line."""
+    made: list[Line] = []
+    turn = abs(math.tau / scene.motion.omega_2) if scene.motion.omega_2 else math.nan
+    for reading in answer["readings"]:
+        found = compute_errors(scene, reading)
+        steps = reading["steps"]
+        line = Line(
+            name,
+            answer["version"],
+            reading["setting"],
+            steps,
+            found,
+            reading["gap"] / max(scene.linkage.lengths),
+            None if steps is None else reading["seconds"] / turn,
+            apart=answer.get("apart", {}).get(reading["setting"], ""),
+        )
+        before = made[-1] if made else None
+        if before is not None and steps and before.steps and before.setting == line.setting:
+            ratio = before.errors["torque"] / found["torque"] if found["torque"] else math.inf
+            if 0.0 < ratio < math.inf:  # one that diverged has none
+                line.order = math.log(ratio) / math.log(steps / before.steps)
+        made.append(line)
+    return made
+
+
+def slopes(scene: Scene, name: str, answer: dict[str, Any]) -> list[Differentiated]:
+    """Compare one simulator's derivatives of the driving torque with the formulas' at its own state."""
+    made = []
+    for each in answer.get("slopes", ()):
+        line = Differentiated(name, answer["version"], str(each["how"]))
+        if "by" in each:
+            stated = {key: each[key] for key in scene.motion.names}
+            ours = fourbar.sensitivity(replace(scene, motion=replace(scene.motion, **stated)))
+            pairs = {"torque": (each["torque"], ours.value("torque"))}
+            pairs |= {key: (theirs, ours.of("torque", key)) for key, theirs in each["by"].items()}
+            line.errors = {
+                key: None if theirs == 0.0 else float(abs(theirs - own[0]) / abs(own[0]))
+                for key, (theirs, own) in pairs.items()
+            }
+        made.append(line)
+    return made
+
+
+def compute_errors(scene: Scene, reading: dict[str, Any]) -> dict[str, float]:
+    """Compute the errors of torque and pin forces at the simulator's own state; NaN where it answers NaN."""
+    theta = np.array(reading["theta"], dtype=float)
+    n = len(theta)
+    if not n or any(np.shape(reading[name]) != (n,) for name in ("omega_2", "alpha_2")) or theta.shape != (n, 3):
+        raise ValueError("its angles, speeds and accelerations are not of one length")
+    at = Command(
+        theta[:, 0],
+        np.full(n, scene.motion.branch, dtype=np.int8),
+        np.array(reading["omega_2"]),
+        np.array(reading["alpha_2"]),
+    )
+    ours, whole = fourbar.solve(scene, "force", at=at), fourbar.solve(scene, "force")
+    answered: dict[str, Array] = {name: np.array(values, float) for name, values in reading["forces"].items()}
+    answered["torque"] = np.array(reading["torque"], float)
+    found = {}
+    for name in TORQUE_AND_FORCES:
+        if name not in answered:
+            continue
+        size = np.full(n, magnitude(getattr(whole, name)).max())
+        found[name] = float(np.max(find_error(name, getattr(ours, name), answered[name], size)))  # NaN stays NaN
+    return found
+
+
+def _has(python: Path, library: str) -> bool:
+    look = (
+        "import importlib.util, sys\n"
+        f"try: found = importlib.util.find_spec({library!r})\n"
+        "except ModuleNotFoundError: found = None\n"
+        "sys.exit(found is None)"
+    )
+    return not run_to_end([python, "-c", look]).why

@@ -1,0 +1,78 @@
+"""What a simulator that can be differentiated says of the driving torque at a state: its derivatives by three numbers.
+
+Assembling the loop and compiling a model are no part of what it differentiates: how its state and the numbers of its
+model change with a number of the scene is taken from two scenes to either side, each assembled by MuJoCo.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.scene import Scene
+from fourbar.studies.keys import command_key, list_entries, read_place, replace_numbers
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.loop import Assembler
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.stepping import open_model
+from fourbar_validation.lab.simulators.motion import start
+from fourbar_validation.lab.simulators.mujoco_c import text
+
+STEPS = 156
+"""In a turn; the quarter of them is run through."""
+DIFFERENCE = 1e-6
+"""To either side, SI: of differences of doubles ten digits are left."""
+
+
+class ClosedState(NamedTuple):
+    """A compiled model, and a state that closes its loop."""
+
+    model: Any
+    data: Any
+    qpos: Array
+    qvel: Array
+
+
+def assemble(scene: Scene, theta_2: float, reader: str) -> ClosedState:
+    """Compile a scene as it is written for a simulator, and assemble it at theta_2 (rad) and its speed."""
+    written = text(scene, STEPS, reader)
+    loop, (model, data) = ClosedLoop(written), open_model(written)
+    q = Assembler(loop).find(theta_2, scene.motion.branch)
+    assert q is not None
+    loop.set_state(q, scene.motion.omega_2 or 0.0)
+    return ClosedState(model, data, loop.data.qpos.copy(), loop.data.qvel.copy())
+
+
+def list_keys(scene: Scene) -> tuple[str, ...]:
+    """List the numbers by which is differentiated."""
+    return ("lengths.coupler", "bars.coupler.mass", command_key(scene))
+
+
+def assemble_either_side(scene: Scene, theta_2: float, key: str, reader: str) -> list[ClosedState]:
+    """Assemble the scene with a number a little greater, and a little less."""
+    sides = []
+    for step in (DIFFERENCE, -DIFFERENCE):
+        if key == command_key(scene):
+            sides.append(assemble(scene, theta_2 + step, reader))
+        else:
+            number = float(read_place(scene, list_entries(scene)[key].place)) + step
+            sides.append(assemble(replace_numbers(scene, {key: number}), theta_2, reader))
+    return sides
+
+
+def change(more: Any, less: Any) -> Any:
+    """Differentiate numbers by what the two sides differ in."""
+    return (np.asarray(more, dtype=float) - np.asarray(less, dtype=float)) / (2.0 * DIFFERENCE)
+
+
+def choose_quarter(scene: Scene) -> tuple[float, float]:
+    """Return theta_2 of the common start, and a quarter turn on, rad."""
+    begin = float(start(scene).qpos[0])
+    return begin, begin + 0.5 * np.pi * float(np.sign(scene.motion.omega_2 or 1.0))
+
+
+def collect_answer(scene: Scene, how: str, state: tuple[Any, Any, Any, Any], by: dict[str, Any]) -> dict[str, Any]:
+    """Put together theta_2, omega_2, alpha_2 and torque of a state, and the torque's derivatives, as plain numbers."""
+    names = (*scene.motion.names, "torque")
+    return {"how": how, "by": {key: float(x) for key, x in by.items()}} | {
+        name: float(x) for name, x in zip(names, state, strict=True)
+    }

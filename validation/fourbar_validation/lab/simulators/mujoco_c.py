@@ -1,0 +1,82 @@
+"""MuJoCo itself (the C library), with the settings of the generated file and with its own defaults."""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from fourbar.mjcf import SIMULATORS, write_mjcf
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.loop import Assembler
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.drives import remove_attributes
+from fourbar_validation.engines.mujoco.stepping import open_model
+from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through, start, turn
+
+VERSION = mujoco.__version__
+STEPS = (157, 314, 628, 1256)
+CHANGED = "nothing"
+SETTINGS = {"generated file": "mujoco", "its defaults": None}
+BY_DEFAULT = {"option": ("integrator", "solver", "tolerance", "iterations"), "equality/connect": ("solref", "solimp")}
+"""What is left to MuJoCo under the latter."""
+
+
+def text(scene: Scene, steps: int, simulator: str | None) -> str:
+    """Write the MJCF, opening in the simulators' common start, with so many steps a turn.
+
+    Without a simulator's name all that the solver is set to goes.
+    """
+    timestep, _ = turn(scene, steps)
+    reader = simulator or "warp"  # without pads
+    written = write_mjcf(scene, replace(SIMULATORS[reader], timestep=timestep), reader, start=start(scene))
+    return written if simulator is not None else remove_attributes(written, BY_DEFAULT)
+
+
+def reading(model: Any, q: Any, v: Any, a: Any, drive: float, closing: Any, **pins: Any) -> Instant:
+    """Read as the comment in the file says; q, v, a in the joints' coordinates."""
+    torque = drive - model.dof_armature[0] * a[0]
+    return Instant((q[0], q[0] + q[1], q[2]), v[0], a[0], torque, {"F43": closing, **pins})
+
+
+def through(scene: Scene, steps: int, setting: str) -> Readings:
+    """Simulate a turn in so many steps."""
+    model, data = open_model(text(scene, steps, SETTINGS[setting]))
+    advance = partial(mujoco.mj_step, model, data)
+    return run_through(scene, steps, setting, advance, lambda _: _evaluated(model, data))
+
+
+def states(scene: Scene, setting: str) -> Readings:
+    """Evaluate single states, each set by itself."""
+    written = text(scene, 628, SETTINGS[setting])
+    (model, data), found = open_model(written), Readings(setting)
+    for q, v in states_of(written, scene):
+        data.qpos[:], data.qvel[:] = q, v
+        found.read(scene, _evaluated(model, data))
+    return found
+
+
+def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
+    """Assemble states of a turn by MuJoCo's own kinematics: Newton on the gap, speeds by its Jacobian."""
+    loop, made = ClosedLoop(written), []
+    position, begin = Assembler(loop), start(scene).qpos[0]
+    for theta_2 in (begin + np.linspace(0.0, 2.0 * np.pi, 25)).tolist():
+        if (q := position.find(theta_2, scene.motion.branch)) is not None:
+            loop.set_state(q, scene.motion.omega_2 or 0.0)
+            made.append((loop.data.qpos.copy(), loop.data.qvel.copy()))
+    return made
+
+
+def _evaluated(model: Any, data: Any) -> Instant:
+    mujoco.mj_forward(model, data)
+    mujoco.mj_rnePostConstraint(model, data)
+    forces = {name: data.cfrc_int[model.body(body).id][3:5] for name, body in PINS.items()}
+    forces["F32"] = -forces["F32"]
+    drive = data.actuator_force[model.actuator("drive").id]
+    return reading(model, data.qpos, data.qvel, data.qacc, drive, data.efc_force[:2], **forces)
+
+
+PINS = {"F12": "input", "F32": "coupler", "F14": "output"}
+"""The bodies whose parent bears the force; without loads on sites cfrc_int is that force alone."""

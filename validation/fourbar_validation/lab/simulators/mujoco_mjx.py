@@ -1,0 +1,114 @@
+"""MuJoCo MJX (JAX), in double precision."""
+
+from collections.abc import Callable
+from functools import partial
+from importlib.metadata import version
+from typing import Any
+
+import jax
+import numpy as np
+from mujoco import mjx
+
+from fourbar.scene import Scene
+from fourbar_validation.engines.mujoco.stepping import open_model
+from fourbar_validation.lab.simulators import gradients
+from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through
+from fourbar_validation.lab.simulators.mujoco_c import reading, states_of, text
+
+VERSION = version("mujoco-mjx")
+DEVICE = "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
+"""JAX takes a GPU where it has one."""
+STEPS = (157, 314, 628)
+CHANGED = "a closure of two timesteps (--for mjx), and jax_enable_x64"
+SETTINGS = {"written for MJX": "mjx", "as for MuJoCo": "mujoco"}
+APART = {"as for MuJoCo": "a closure of ten timesteps, not meant for MJX"}
+"""The one written for MJX yields within two timesteps and so makes up for the term that MJX leaves out."""
+jax.config.update("jax_enable_x64", True)
+forward = jax.jit(mjx.forward)
+
+
+@jax.jit  # type: ignore[untyped-decorator]
+def advance(model: Any, state: Any, steps: int) -> Any:
+    """Step on, with the number left open so that it compiles once."""
+    return jax.lax.fori_loop(0, steps, lambda _, now: mjx.step(model, now), state)
+
+
+def through(scene: Scene, steps: int, setting: str) -> Readings:
+    """Simulate a turn in so many steps."""
+    model, data = open_model(text(scene, steps, SETTINGS[setting]))
+    theirs, state = mjx.put_model(model), mjx.put_data(model, data)
+    jax.block_until_ready(advance(theirs, state, 1))  # compiled before the clock runs
+
+    def further(n: int) -> Any:
+        nonlocal state
+        state = jax.block_until_ready(advance(theirs, state, n))
+        return state
+
+    return run_through(scene, steps, setting, further, lambda now: _evaluated(model, forward(theirs, now)))
+
+
+def states(scene: Scene, setting: str) -> Readings:
+    """Evaluate single states, each set by itself."""
+    written = text(scene, 628, SETTINGS[setting])
+    model, data = open_model(written)
+    theirs, state, found = mjx.put_model(model), mjx.put_data(model, data), Readings(setting)
+    for q, v in states_of(written, scene):
+        given = state.replace(qpos=jax.numpy.array(q), qvel=jax.numpy.array(v))
+        found.read(scene, _evaluated(model, forward(theirs, given)))
+    return found
+
+
+def _evaluated(model: Any, state: Any) -> Instant:
+    q, v, a, drive = (np.array(x) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    closing = np.array(getattr(state, "_impl", state).efc_force)[:2]
+    return reading(model, q, v, a, drive[model.actuator("drive").id], closing)
+
+
+def slopes(scene: Scene) -> list[dict[str, Any]]:
+    """Differentiate the driving torque forwards, at a set state and through a quarter turn, and backwards."""
+    begin, end = gradients.choose_quarter(scene)
+    ways = [("jax.jvp at a set state", end, 0), ("jax.jvp through a quarter turn", begin, gradients.STEPS // 4)]
+    made = [_slopes(scene, how, at, partial(_forwards, steps=steps)) for how, at, steps in ways]
+    try:
+        made.append(_slopes(scene, "jax.grad at a set state", end, _backwards))
+    except ValueError as error:
+        made.append({"how": f"jax.grad: {error}"})
+    return [*made, _slopes(scene, 'jax.grad at a set state, iterations="1"', end, partial(_backwards, iterations=1))]
+
+
+def _slopes(scene: Scene, how: str, theta_2: float, differentiate: Callable[..., Any]) -> dict[str, Any]:
+    """Differentiate along the changes of model and state, which as trees differ in what is no number of theirs."""
+    model, data, q, v = gradients.assemble(scene, theta_2, "mjx")
+    given, by, state = (mjx.put_model(model), q, v), {}, (0.0,) * 4
+    for key in gradients.list_keys(scene):
+        more, less = (
+            jax.tree.leaves((mjx.put_model(side.model), side.qpos, side.qvel))
+            for side in gradients.assemble_either_side(scene, theta_2, key, "mjx")
+        )
+        moves = [gradients.change(x, y) for x, y in zip(more, less, strict=True)]
+        by[key], state = differentiate(given, moves, mjx.put_data(model, data))
+    return gradients.collect_answer(scene, how, state, by)
+
+
+def _torque(part: Any, given: Any, moves: Any, data: Any, steps: Any) -> tuple[Any, Any]:
+    """Evaluate the torque where so much of the moves is added to what is given, and the state it is of."""
+    leaves, tree = jax.tree.flatten(given)
+    moved = [x + part * y if jax.numpy.issubdtype(x.dtype, float) else x for x, y in zip(leaves, moves, strict=True)]
+    model, q, v = jax.tree.unflatten(tree, moved)
+    now = data.replace(qpos=q, qvel=v)
+    now = mjx.forward(model, now if steps is None else advance(model, now, steps))
+    torque = now.actuator_force[0] - model.dof_armature[0] * now.qacc[0]
+    return torque, (now.qpos[0], now.qvel[0], now.qacc[0], torque)
+
+
+@jax.jit  # type: ignore[untyped-decorator]
+def _forwards(given: Any, moves: Any, data: Any, steps: int) -> Any:
+    _, slope, state = jax.jvp(lambda part: _torque(part, given, moves, data, steps), (0.0,), (1.0,), has_aux=True)
+    return slope, state
+
+
+@partial(jax.jit, static_argnames="iterations")
+def _backwards(given: Any, moves: Any, data: Any, iterations: int = 10) -> Any:
+    model, *state = given
+    once = (model.tree_replace({"opt.iterations": iterations}), *state)
+    return jax.grad(lambda part: _torque(part, once, moves, data, None), has_aux=True)(0.0)

@@ -1,0 +1,99 @@
+"""MuJoCo Warp, in single precision; `forward` once as a user of MuJoCo would, and twice as the file's comment says."""
+
+import time
+from typing import Any
+
+import mujoco_warp as mjw
+import numpy as np
+import warp
+
+from fourbar.scene import Scene
+from fourbar_validation.engines.mujoco.stepping import open_model
+from fourbar_validation.lab.simulators import gradients
+from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through
+from fourbar_validation.lab.simulators.mujoco_c import reading, states_of, text
+
+VERSION = mjw.__version__ if hasattr(mjw, "__version__") else ""
+DEVICE = str(warp.get_preferred_device().name)
+"""Its arrays lie on a GPU where there is one."""
+STEPS = (78, 157)
+MADE_FOR = "many worlds at once on a GPU"
+CHANGED = "a light flywheel and no pads (--for warp): single precision; midphase may not be switched off"
+SETTINGS = {"forward twice": (2, 1), "forward once": (1, 1)}
+"""How often a state is evaluated, and how many worlds are simulated; the last is read."""
+BATCHES = (64, 4096)
+NUMBERS = ("body_mass", "body_inertia", "body_ipos", "site_pos", "dof_armature")
+"""Of a model that change with a bar's length or mass, or with theta_2."""
+if warp.get_preferred_device().is_cuda:
+    SETTINGS |= {f"forward twice, {worlds} worlds": (2, worlds) for worlds in BATCHES}
+else:
+    NOT_RUN = {f"batches of {' and '.join(map(str, BATCHES))} worlds": "no GPU here"}
+
+
+def through(scene: Scene, steps: int, setting: str) -> Readings:
+    """Simulate a turn in so many steps."""
+    model, data = open_model(text(scene, steps, "warp"))
+    times, worlds = SETTINGS[setting]
+    theirs, state = mjw.put_model(model), mjw.put_data(model, data, nworld=worlds)
+    mjw.step(theirs, mjw.put_data(model, data, nworld=worlds))  # compiled before the clock runs
+
+    def advance(n: int) -> None:
+        for _ in range(n):
+            mjw.step(theirs, state)
+        warp.synchronize()
+
+    clock = time.perf_counter if warp.get_preferred_device().is_cuda else time.process_time
+    found = run_through(scene, steps, setting, advance, lambda _: _evaluated(model, theirs, state, times), clock)
+    found.seconds /= worlds
+    return found
+
+
+def states(scene: Scene, setting: str) -> Readings:
+    """Evaluate single states, each set by itself."""
+    written = text(scene, 628, "warp")
+    model, data = open_model(written)
+    theirs, state, found = mjw.put_model(model), mjw.put_data(model, data), Readings(setting)
+    for q, v in states_of(written, scene):
+        state.qpos.assign(np.array([q], dtype=np.float32))
+        state.qvel.assign(np.array([v], dtype=np.float32))
+        found.read(scene, _evaluated(model, theirs, state, SETTINGS[setting][0]))
+    return found
+
+
+def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> Instant:
+    for _ in range(times):
+        mjw.forward(theirs, state)
+    q, v, a, drive = (x.numpy()[-1].astype(float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    closing = state.efc.force.numpy()[-1, :2].astype(float)
+    return reading(model, q, v, a, drive[model.actuator("drive").id], closing)
+
+
+def slopes(scene: Scene) -> list[dict[str, Any]]:
+    """Differentiate the driving torque at a set state backwards, by the tape, then along each change."""
+    _, theta_2 = gradients.choose_quarter(scene)
+    model, data, q, v = gradients.assemble(scene, theta_2, "warp")
+    theirs, state = mjw.put_model(model), mjw.put_data(model, data)
+    state.qpos.assign(np.array([q], dtype=np.float32))
+    state.qvel.assign(np.array([v], dtype=np.float32))
+    inputs = {name: getattr(theirs, name) for name in NUMBERS} | {"qpos": state.qpos, "qvel": state.qvel}
+    for array in (*inputs.values(), state.qacc, state.actuator_force):
+        array.requires_grad = True
+    with warp.Tape() as tape:
+        now = _evaluated(model, theirs, state, 2)
+    drive = warp.full_like(state.actuator_force, 1.0)
+    tape.backward(grads={state.actuator_force: drive, state.qacc: warp.full_like(state.qacc, -model.dof_armature[0])})
+    by = {}
+    for key in gradients.list_keys(scene):
+        more, less = (
+            {name: getattr(side.model, name) for name in NUMBERS} | {"qpos": side.qpos, "qvel": side.qvel}
+            for side in gradients.assemble_either_side(scene, theta_2, key, "warp")
+        )
+        by[key] = sum(
+            np.sum(array.grad.numpy() * gradients.change(more[name], less[name])) for name, array in inputs.items()
+        )
+    here = (now.theta[0], now.omega_2, now.alpha_2, now.torque)
+    return [
+        gradients.collect_answer(
+            scene, "warp.Tape at a set state; it warns that its modules have no backward pass", here, by
+        )
+    ]

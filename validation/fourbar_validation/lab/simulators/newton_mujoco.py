@@ -1,0 +1,58 @@
+"""Newton's MuJoCo solver (MuJoCo Warp inside, single precision), from the MJCF file."""
+
+from importlib.metadata import version
+
+import mujoco_warp as mjw
+import newton
+import warp
+
+from fourbar.scene import Scene
+from fourbar_validation.lab.simulators.motion import (
+    Instant,
+    Readings,
+    find_gravity,
+    run_through,
+    start,
+    turn,
+    write_temp,
+)
+from fourbar_validation.lab.simulators.mujoco_c import reading, text
+
+VERSION = version("newton")
+DEVICE = str(warp.get_preferred_device().name)
+STEPS = (78, 157)
+MADE_FOR = "many worlds at once on a GPU"
+CHANGED = "add_mjcf takes neither timestep, gravity nor keyframe: all three given by hand; --for newton"
+SETTINGS = {"SolverMuJoCo": None}
+
+
+def through(scene: Scene, steps: int, setting: str) -> Readings:
+    """Simulate a turn in so many steps."""
+    timestep, _ = turn(scene, steps)
+    builder = newton.ModelBuilder(gravity=find_gravity(scene))
+    with write_temp(text(scene, steps, "newton"), "four_bar.xml") as file:
+        builder.add_mjcf(file)
+    model = builder.finalize(device=warp.get_preferred_device())
+    solver, control = newton.solvers.SolverMuJoCo(model), model.control()
+    now, then = model.state(), model.state()
+    speeds = now.joint_qd.numpy()
+    speeds[:3] = start(scene).qvel
+    now.joint_qd.assign(speeds)
+    newton.solvers.SolverMuJoCo(model).step(now, then, control, None, timestep)  # compiled before the clock runs
+    names = [solver.mj_model.body(number).name for number in range(solver.mj_model.nbody)]
+    assert [name.rpartition("_")[2] for name in names[2:]] == ["input", "coupler", "output"]
+
+    def advance(n: int) -> None:
+        nonlocal now, then
+        for _ in range(n):
+            solver.step(now, then, control, None, timestep)
+            now, then = then, now
+
+    def read(_: None) -> Instant:
+        data = solver.mjw_data
+        for _again in range(2):
+            mjw.forward(solver.mjw_model, data)
+        q, v, a, drive = (x.numpy()[0].astype(float) for x in (data.qpos, data.qvel, data.qacc, data.actuator_force))
+        return reading(solver.mj_model, q, v, a, drive[0], data.efc.force.numpy()[0, :2].astype(float))
+
+    return run_through(scene, steps, setting, advance, read)

@@ -1,0 +1,162 @@
+"""Pinocchio's forward dynamics of the closed loop: its acceleration solvers under RK4, its impulse solvers of 4.1."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from fourbar.mjcf import size_flywheel
+from fourbar.mjcf.settings import RECIPE
+from fourbar.scene import Scene
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.pinocchio import PinocchioTree
+from fourbar_validation.engines.pinocchio_forward import ClosedTree, make_step
+from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through, start, turn
+
+VERSION = pin.__version__
+STEPS = (314, 628, 1256)
+CHANGED = (
+    "the tree is built in Python; around its acceleration solvers (proximal settings 1e-14, 1e-8, 10) stands RK4, "
+    "around its impulse solvers (tolerances 1e-10) the semi-implicit Euler of its own example"
+)
+SOFTNESS_STEPS = 30.0
+"""Time constant of Baumgarte's stabilisation, in steps of RK4."""
+PROXIMAL = 1e-10
+"""Added to the diagonal of the Delassus matrix, as in Pinocchio's example: one of its three rows depends on the rest.
+"""
+ACCURATE = 1e-10
+"""What the impulse solvers are asked for in place of 1e-6 of the example, absolute and relative."""
+LIGHT = replace(RECIPE, flywheel=1e5)
+"""For accelerations that are differences of speeds: of a heavier flywheel's they keep no digits."""
+
+
+class LoopConstrained(ClosedTree):
+    """The same closure solved by the loop-constrained articulated body algorithm (lcaba)."""
+
+    def __init__(self, tree: PinocchioTree, time_constant: float) -> None:
+        super().__init__(tree, time_constant)
+        pin.computeJointMinimalOrdering(tree.model, self.data, self.models)
+
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
+        """Accelerate the closed loop."""
+        return pin.lcaba(self.tree.model, self.data, q, v, tau, self.models, self.found, self.proximal).copy()
+
+    def loop_force(self) -> Array:
+        """F43: lcaba leaves the force on bar 4, in the axes of bar 3, whatever frame the closure was given."""
+        return np.array(-self.tree.rotation(3) @ self.found[0].contact_force.linear[:2])
+
+
+class Impulses:
+    """A PointAnchorConstraintModel whose impulse over a step ADMM or PGS finds.
+
+    Source: Pinocchio 4.1, examples of its ADMM solver.
+    """
+
+    def __init__(self, tree: PinocchioTree, timestep: float, solver: str) -> None:
+        self.tree, self.h = tree, timestep
+        self.model, self.data = tree.model, tree.model.createData()
+        ends = [(tree.joint[bar], self.model.frames[tree.frame[f"end{bar}"]].placement) for bar in (3, 4)]
+        self.closure = pin.ConstraintModel(pin.PointAnchorConstraintModel(self.model, *ends[0], *ends[1]))
+        self.models, self.found = [self.closure], [self.closure.createData()]
+        self.cholesky: Any = None
+        self.solver = getattr(pin, f"{solver}ConstraintSolver")()
+        self.settings, self.result = getattr(pin, f"{solver}SolverSettings")(), getattr(pin, f"{solver}SolverResult")()
+        self.settings.max_iterations = 10000
+        for kind in ("absolute_feasibility", "relative_feasibility", "absolute_complementarity",
+                     "relative_complementarity"):  # fmt: skip
+            setattr(self.settings, f"{kind}_tol", ACCURATE)
+
+    def step(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Compute the speeds a step later, and F43 in the mean of the step."""
+        model, data, h, none = self.model, self.data, self.h, np.zeros(3)
+        pin.crba(model, data, q, pin.Convention.WORLD)
+        free = v + h * pin.aba(model, data, q, v, none)
+        self.closure.calc(model, data, self.found[0])
+        if self.cholesky is None:
+            self.cholesky = pin.ConstraintCholeskyDecomposition(model, data, self.models, self.found)
+        self.cholesky.compute(model, data, self.models, self.found, PROXIMAL)
+        jacobian = pin.getConstraintsJacobian(model, data, self.models, self.found)
+        g = jacobian @ free + self.found[0].extract().constraint_position_error / h
+        self.solver.solve(self.cholesky.getDelassusOperatorCholeskyExpression(), g, self.models, self.found,
+                          self.settings, self.result)  # fmt: skip
+        force = np.array(self.result.retrieveConstraintImpulses()) / h
+        self.tree.place(q.tolist())
+        return v + h * pin.aba(model, data, q, v, jacobian.T @ force), -self.tree.rotation(3) @ force[:2]
+
+
+SETTINGS: dict[str, Any] = {
+    "constraintDynamics (RigidConstraintModel), RK4": ClosedTree,
+    "lcaba, RK4": LoopConstrained,
+    "ADMM (PointAnchorConstraintModel), semi-implicit Euler": "ADMM",
+    "PGS (PointAnchorConstraintModel), semi-implicit Euler": "PGS",
+}
+
+
+def through(scene: Scene, steps: int, setting: str) -> Readings:
+    """Simulate a turn in so many steps, carried by a flywheel."""
+    timestep, _ = turn(scene, steps)
+    made, begin, tree = SETTINGS[setting], start(scene), PinocchioTree(scene)
+    if isinstance(made, str):
+        return _by_impulses(scene, steps, setting, Impulses(tree, timestep, made))
+    q, v, inertia = np.array(begin.qpos), np.array(begin.qvel), size_flywheel(scene)
+    loop = made(tree, SOFTNESS_STEPS * timestep)
+
+    def advance(n: int) -> tuple[Array, Array]:
+        nonlocal q, v
+        tree.model.armature = np.array([inertia, 0.0, 0.0])
+        for _ in range(n):
+            q, v = make_step(lambda q, v: loop.acceleration(q, v, np.zeros(3)), q, v, timestep)
+        return q, v
+
+    return run_through(scene, steps, setting, advance, lambda state: _evaluated(tree, loop, inertia, *state))
+
+
+def _by_impulses(scene: Scene, steps: int, setting: str, loop: Impulses) -> Readings:
+    begin, inertia = start(scene), size_flywheel(scene, LIGHT)
+    q, v = np.array(begin.qpos), np.array(begin.qvel)
+
+    def advance(n: int) -> tuple[Array, ...]:
+        """Return the state in which the last step began, its acceleration and force."""
+        nonlocal q, v
+        loop.model.armature = np.array([inertia, 0.0, 0.0])
+        for _ in range(n):
+            before = q, v
+            v, force = loop.step(q, v)
+            q = q + loop.h * v
+        return *before, (v - before[1]) / loop.h, force
+
+    return run_through(scene, steps, setting, advance, lambda ended: _read(loop.tree, inertia, *ended))
+
+
+def states(scene: Scene, setting: str) -> Readings | None:
+    """Evaluate single states; the impulse solvers have none: a step sees (dJ/dt) v in the step before."""
+    if isinstance(made := SETTINGS[setting], str):
+        return None
+    tree, found, inertia = PinocchioTree(scene), Readings(setting), size_flywheel(scene)
+    loop = made(tree, SOFTNESS_STEPS * turn(scene, STEPS[0])[0])
+    tree.model.armature = np.array([inertia, 0.0, 0.0])
+    for theta_2 in (start(scene).qpos[0] + np.linspace(0.0, 2.0 * np.pi, 25)).tolist():
+        state = loop.start(theta_2, scene.motion.branch, scene.motion.omega_2 or 0.0)
+        if state is not None:
+            found.read(scene, _evaluated(tree, loop, inertia, *state))
+    return found
+
+
+def _evaluated(tree: PinocchioTree, loop: ClosedTree, inertia: float, q: Array, v: Array) -> Instant:
+    tree.model.armature = np.array([inertia, 0.0, 0.0])
+    a = loop.acceleration(q, v, np.zeros(3))
+    tree.place(q.tolist())
+    return _read(tree, inertia, q, v, a, loop.loop_force())
+
+
+def _read(tree: PinocchioTree, inertia: float, q: Array, v: Array, a: Array, loop_force: Array) -> Instant:
+    """Read what Pinocchio's recursive Newton-Euler says the joints carry under its own closing force."""
+    tree.model.armature = np.zeros(3)
+    tree.place(q.tolist())
+    tree.moving(v, a)
+    tree.torques()
+    torque = float(-inertia * a[0])
+    return Instant(
+        (q[0], q[0] + q[1], q[2]), v[0], a[0], torque, {"F43": loop_force, **tree.forces(loop_force, torque)}
+    )

@@ -1,0 +1,85 @@
+"""PyBullet: an articulated body, a point constraint at B, and a velocity motor on O2."""
+
+from importlib.metadata import version
+from typing import Any
+
+import pybullet as bullet
+
+from fourbar.linkage import BAR_NAMES, FIRST_PIN
+from fourbar.scene import Scene
+from fourbar_validation.engines.description import list_parts
+from fourbar_validation.lab.simulators.motion import (
+    Instant,
+    Readings,
+    find_gravity,
+    run_through,
+    start,
+    turn,
+    write_temp,
+)
+
+VERSION = version("pybullet")
+STEPS = (628, 2512, 10048)
+CHANGED = "built from URDF, which holds no loop, and a point constraint"
+SETTINGS: dict[str, dict[str, float]] = {
+    "its defaults": {},
+    "500 iterations, no residual": {"numSolverIterations": 500, "solverResidualThreshold": 0.0},
+}
+STRONG = 1e9
+"""N and N m that constraint and motor may exert: no limit."""
+
+
+def write_urdf(scene: Scene) -> str:
+    """Build the tree: bars 2 and 3 in series, bar 4 on the ground; each link's frame lies in its mass centre."""
+    links = ['<robot name="four_bar"><link name="ground"/>']
+    for part in list_parts(scene.linkage):
+        turned = " ".join(f'{axes}="{part.inertia!r}"' for axes in ("ixx", "iyy", "izz"))
+        links.append(
+            f'<link name="{BAR_NAMES[part.bar]}"><inertial><origin xyz="{part.centre[0]!r} {part.centre[1]!r} 0"/>'
+            f'<mass value="{part.mass!r}"/><inertia {turned} ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="{FIRST_PIN[part.bar]}" type="continuous"><parent link="{BAR_NAMES[part.bearer]}"/>'
+            f'<child link="{BAR_NAMES[part.bar]}"/><origin xyz="{part.first_pin[0]!r} {part.first_pin[1]!r} 0"/>'
+            '<axis xyz="0 0 1"/></joint>'
+        )
+    return "".join([*links, "</robot>"])
+
+
+def through(scene: Scene, steps: int, setting: str) -> Readings:
+    """Simulate a turn; torque and force are those with which the step began."""
+    (timestep, _), begin = turn(scene, steps), start(scene)
+    client = bullet.connect(bullet.DIRECT)
+    try:
+        with write_temp(write_urdf(scene), "four_bar.urdf") as file:
+            flags = bullet.URDF_USE_INERTIA_FROM_FILE
+            body = bullet.loadURDF(file, useFixedBase=True, flags=flags, physicsClientId=client)
+        bullet.setPhysicsEngineParameter(fixedTimeStep=timestep, **SETTINGS[setting])
+        bullet.setGravity(*find_gravity(scene))
+        for joint, (angle, speed) in enumerate(zip(begin.qpos, begin.qvel, strict=True)):
+            bullet.changeDynamics(body, joint, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0)
+            bullet.resetJointState(body, joint, angle, speed)
+            bullet.setJointMotorControl2(body, joint, bullet.VELOCITY_CONTROL, force=0.0)
+        bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
+        drive = {"targetVelocity": begin.qvel[0], "force": STRONG}
+        bullet.setJointMotorControl2(body, 0, bullet.VELOCITY_CONTROL, **drive)
+        _, three, four = list_parts(scene.linkage)
+        frames = [[part.length - part.centre[0], -part.centre[1], 0.0] for part in (three, four)]
+        none = [0.0, 0.0, 0.0]
+        ball = bullet.createConstraint(body, 1, body, 2, bullet.JOINT_POINT2POINT, none, *frames)
+        bullet.changeConstraint(ball, maxForce=STRONG)
+
+        def advance(n: int) -> list[Any]:
+            for _ in range(n - 1):
+                bullet.stepSimulation()
+            before = [bullet.getJointState(body, joint)[:2] for joint in range(3)]
+            bullet.stepSimulation()
+            return before
+
+        def read(before: list[Any]) -> Instant:
+            after, q, speed = bullet.getJointState(body, 0), [state[0] for state in before], before[0][1]
+            force = [-part for part in bullet.getConstraintState(ball)[:2]]  # it speaks of the force on the child
+            theta = (q[0], q[0] + q[1], q[2])
+            return Instant(theta, speed, (after[1] - speed) / timestep, after[3], {"F43": force})
+
+        return run_through(scene, steps, setting, advance, read)
+    finally:
+        bullet.disconnect(client)

@@ -1,0 +1,260 @@
+"""The formulas' own numbers: the equations that they satisfy, and where they have none.
+
+The equations use the printed results alone (forces, accelerations, torque) and none of the elimination that produced
+them: closure, the sum of forces on the three bars, and the sum of moments about O2.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects import Actions
+from fourbar.effects.actions import list_bodies
+from fourbar.evaluation.case import compute_state
+from fourbar.formulas.pin_forces import Wrenches
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
+from fourbar.quantities import COUPLE, LINE, NO_LEVER, NO_TORQUE, NOT_ASSEMBLED, OK, OVERFLOW, SEVERAL, SINGULAR
+from fourbar.scene import Scene
+from fourbar.solution import Solution
+from fourbar_validation.compare.compare import CLOSURE, NOWHERE
+from fourbar_validation.compare.rows import FAILS, FORMULAS, Row
+from fourbar_validation.compare.tolerance import (
+    EPS,
+    IDENTITY,
+    NOTHING_TO_TELL,
+    Array,
+    Mask,
+    count_half_turns,
+    divide,
+    find_condition,
+    find_gap,
+    find_lever,
+    find_margin,
+    find_worst,
+    magnitude,
+    mark_touching,
+)
+from fourbar_validation.engines.exact import compute_sines
+from fourbar_validation.engines.free_body import count_solutions
+from fourbar_validation.engines.witnesses import find_missing
+from fourbar_validation.run.question import Question, select_positions
+
+STAGES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)
+"""One quantity of each stage that a position may lack."""
+LARGE = 1e75
+"""Numbers beyond this, or their squares, may leave the range of doubles in between: 1e300 in a product of four."""
+
+
+OfSome = Callable[[NDArray[np.intp]], Array]
+"""A number of each of some positions."""
+IN_ONE_LINE = 32.0 * 2.0**-53
+"""|sin(theta_4 - theta_3)| at which bars 3 and 4 may be called in line: their directions are rounded by that."""
+SAMPLE = 5
+"""Positions of a scene with several solutions of friction, and with one, that are tried: each may take a search."""
+NEAR = 1e-6
+"""|sin(theta_4 - theta_3)| below which doubles have no word in it."""
+
+
+def check_identities(question: Question) -> Iterator[Row]:
+    """Check each equation that the stage of the solution allows."""
+    solution, at, linkage = question.solution, question.at, question.scene.linkage
+    closing = solution.assembled & (solution.status_code != OVERFLOW)
+    gap = find_gap(linkage, solution.theta_2, solution.theta_3, solution.theta_4)
+    yield _make_row(question, "closure", CLOSURE, gap, closing)
+    if question.scene.motion.angle is None and question.scene.motion.law is None and at.bar == 2:
+        yield _check_sweep(question)
+    if solution.F12 is not None and (solution.status_code == OK).any():
+        yield from _check_sums(question)
+
+
+def _check_sweep(question: Question) -> Row:
+    """Check a sweep that the scene leaves open: a whole turn, or one degree short of where the loop just closes.
+
+    At the end of an interval narrower than four degrees it leaves out a quarter of that, which is half of the sweep.
+    """
+    at, linkage = question.at, question.scene.linkage
+    start, stop = float(at.theta_2[0]), float(at.theta_2[-1])
+    if (start, stop) == (0.0, 2.0 * np.pi):
+        missed = np.maximum(-find_margin(linkage, at.theta_2), 0.0)
+    else:
+        left_out = min(np.radians(1.0), 0.5 * (stop - start))
+        missed = np.abs(find_margin(linkage, np.array([start - left_out, stop + left_out])))
+    allowed = IDENTITY.factor * count_half_turns(linkage.ground_angle, at.theta_2)
+    reason = "one degree short of where the loop just closes, or a whole turn"
+    return question.row("sweep", np.array([missed.max()]), allowed, reason)
+
+
+def _make_row(question: Question, quantity: str, equation: str, error: Array, where: Mask) -> Row:
+    """By how much an equation is missed, in parts of its terms, where it is worst."""
+    condition = 1.0 / count_half_turns(question.scene.linkage.ground_angle, question.at.angle)
+    reason = f"identity: {equation}" if where.any() else NOWHERE
+    return question.row(quantity, error, IDENTITY.factor / condition, reason, where, condition)
+
+
+def _check_sums(question: Question) -> Iterator[Row]:
+    """F12 + F14 + sum of loads = sum of m a_G, and the moments of the same about O2 with the torque."""
+    scene, at, solution = question.scene, question.at, question.solution
+    assert solution.F12 is not None and solution.F14 is not None
+    assert solution.F32 is not None and solution.F43 is not None
+    state = compute_state(scene, at)
+    # what acts at the speeds that were answered, not at another evaluation of them
+    speeds = {f"omega_{bar}": getattr(solution, f"omega_{bar}") for bar in MOVING_BARS if bar != at.bar}
+    state = state._replace(moving=state.moving._replace(**speeds))
+    actions = Actions(state, list_bodies(scene.linkage, scene.effects))
+    with np.errstate(all="ignore"):
+        for term in (*scene.loads, *scene.effects):
+            term.act(actions, state)
+            if term.loaded_pins:
+                term.act_known(actions, {name: getattr(solution, name) for name in PIN_FORCE.values()})
+    torque, drive = solution.torque, COUPLE.value
+    if solution.drive is not None:
+        torque, drive = np.zeros(len(solution)), LINE.value
+        with np.errstate(all="ignore"):
+            solution.drive.act(actions, solution.drive_force)
+    assert torque is not None
+    acting = actions.wrenches(Wrenches())
+    n, first_pin = len(solution), complex(np.ravel(state.foot(4))[0])
+    O4 = np.array([first_pin.real, first_pin.imag])
+    force = solution.F12 + solution.F14
+    force_terms = magnitude(solution.F12) + magnitude(solution.F14)
+    moment = torque + _compute_cross(O4, solution.F14)
+    moment_terms = np.abs(torque) + np.hypot(*O4) * magnitude(solution.F14)
+    # the moments of the forces inside, which cancel
+    moment_terms = moment_terms + _reach(solution.A) * magnitude(solution.F32)
+    moment_terms = moment_terms + _reach(solution.B) * magnitude(solution.F43)
+    first_pins = {2: np.zeros(2), 3: solution.A, 4: O4}
+    for number in MOVING_BARS:
+        bar = scene.linkage.bar(number)
+        force_on, couple = acting.on(number)
+        resultant = np.broadcast_to(force_on, n)
+        load = np.stack([resultant.real, resultant.imag], axis=1)
+        centre, acceleration = getattr(solution, f"G{number}"), getattr(solution, f"a_G{number}")
+        alpha = getattr(solution, f"alpha_{number}")
+        force = force + load - bar.mass * acceleration
+        force_terms = force_terms + magnitude(load) + bar.mass * magnitude(acceleration)
+        turned = couple + _compute_cross(first_pins[number], load)
+        swept = bar.mass * _compute_cross(centre, acceleration) + actions.bodies[number - 2].I * alpha
+        moment = moment + turned - swept
+        moment_terms = (
+            moment_terms
+            + (np.abs(couple) + _reach(first_pins[number]) * magnitude(load))
+            + bar.mass * _reach(centre) * magnitude(acceleration)
+            + actions.bodies[number - 2].I * np.abs(alpha)
+        )
+    # the forces of the bars that are not driven are solved apart, and the torque is that of virtual work
+    assert solution.drive_condition is not None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        force_terms = force_terms / (find_lever(scene.linkage) * solution.drive_condition)
+        moment_terms = moment_terms / find_condition(drive, scene.linkage, solution)
+    where = solution.status_code == OK
+    # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
+    where &= ~question.reversing(IDENTITY.factor)
+    yield _check_power(question, drive, where)
+    forces, moments = divide(magnitude(force), force_terms), divide(np.abs(moment), moment_terms)
+    yield _make_row(question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, where)
+    yield _make_row(question, "moment_sum", "moments about O2, with the torque", moments, where)
+
+
+def _check_power(question: Question, drive: str, where: Mask) -> Row:
+    """Compare the power of the drive with its torque or force times the speed at which it works."""
+    solution = question.solution
+    works = getattr(solution, drive) * getattr(solution, f"omega_{solution.drive_bar}", solution.stroke_speed)
+    return _make_row(question, "power", "of the drive", divide(np.abs(solution.power - works), np.abs(works)), where)
+
+
+def _compute_cross(u: Array, v: Array) -> Array:
+    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
+
+
+def _reach(point: Array) -> Array:
+    return np.asarray(np.hypot(point[..., 0], point[..., 1]))
+
+
+def check_status(question: Question) -> Iterator[Row]:
+    """Check that the formulas have no value exactly where another derivation has none."""
+    reference, free_body = question.reference, question.free_body
+    if reference is not None and question.at.speed is not None:
+        yield compare_status(question, reference, *_solve_exactly(question))
+    elif reference is None and (free_body is None or free_body.refusal is None):
+        what = "the free bodies, by which it is judged, broke down"
+        yield Row.unmeasured(question.name, FORMULAS, "exact", "status", FAILS, what)
+
+
+def _solve_exactly(question: Question) -> tuple[OfSome | None, OfSome | None]:
+    """Give the sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
+    scene, at = question.scene, question.at
+    unknown = at.remainder is not None or at.commanded != "theta_2" or find_missing("flint")
+    loaded = any(effect.loaded_pins for effect in scene.effects)
+    return (
+        None if unknown else lambda where: compute_sines(scene.linkage, select_positions(at, where)),
+        (lambda where: count_solutions(scene, select_positions(at, where))) if loaded else None,
+    )
+
+
+def compare_status(
+    question: Question,
+    reference: Solution,
+    sines: OfSome | None = None,
+    solutions: OfSome | None = None,
+) -> Row:
+    """Count where the formulas have a value and `reference` has none, or the reverse, where it has digits left.
+
+    That a loop does not close is compared by itself where doubles can decide it.
+
+    Parameters
+    ----------
+    sines : sin(theta_4 - theta_3) in many digits at some positions, NaN where the loop does not close; near 0 it
+        decides whether they are singular. None: nothing is.
+    solutions : how many solutions loaded friction has at some positions.
+    """
+    scene, formulas = question.scene, question.solution
+    differ = np.zeros(len(formulas), dtype=bool)
+    large = _mark_large(scene, reference)
+    for quantity in STAGES:
+        ours, theirs = getattr(formulas, quantity), getattr(reference, quantity)
+        if ours is None or theirs is None:
+            continue
+        sound = find_condition(quantity, scene.linkage, reference) * NOTHING_TO_TELL > EPS
+        differ |= sound & ~large & (np.isfinite(ours) != np.isfinite(theirs))
+    differ &= formulas.status_code != NOT_ASSEMBLED
+    if reference.drive_condition is not None:
+        own = [formulas.a_G2, formulas.a_G3, formulas.a_G4, *formulas.acceleration.values()]
+        # where all is there that the forces need, what is lacking is theirs
+        moves = np.isfinite(np.hstack([a for a in own if a is not None])).all(axis=1)
+        in_line = reference.drive_condition < IN_ONE_LINE
+        differ |= (formulas.status_code == OVERFLOW) & moves & in_line
+        differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (reference.drive_condition > NEAR)
+    if sines is not None and len(near := np.flatnonzero(_mark_near(scene, formulas, reference))):
+        sine = np.abs(sines(near))
+        closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR
+        differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes
+        differ[near] |= closes & np.where(in_line, sine > IN_ONE_LINE, sine < 1.0 / 16.0 * IN_ONE_LINE)
+    if solutions is not None and len(many := np.flatnonzero(formulas.status_code == SEVERAL)[:SAMPLE]):
+        differ[many] |= solutions(many) < 2
+    if solutions is not None and len(ok := np.flatnonzero(formulas.status_code == OK)):
+        some = ok[np.unique(np.linspace(0, len(ok) - 1, SAMPLE).astype(int))]
+        differ[some] |= solutions(some) > 1
+    index, wrong = find_worst(differ.astype(float)), np.count_nonzero(differ)
+    stated = ", ".join(f"{count} {name}" for name, count in Counter(formulas.status).items() if name != "ok")
+    reason = f"the formulas state: {stated}" if stated else "every position has its values"
+    if differ.any():
+        reason = f"{wrong} positions differ, the first is {formulas.status[index]}; {reason}"
+    return question.row("status", float(wrong) * differ, 0.0, reason, theta_2=formulas.theta_2)
+
+
+def _mark_near(scene: Scene, formulas: Solution, reference: Solution) -> Mask:
+    """Where bars 3 and 4 are so nearly in line that exact arithmetic has to decide, (n,)."""
+    close = mark_touching(scene.linkage, formulas.theta_2)
+    return np.asarray(close | (reference.condition < NEAR) | (formulas.condition < NEAR))
+
+
+def _mark_large(scene: Scene, reference: Solution) -> Mask:
+    """Where numbers are so large that the formulas may have to give up, (n,)."""
+    large = np.full(len(reference), max(scene.linkage.lengths) > LARGE or min(scene.linkage.lengths) < 1.0 / LARGE)
+    for name in ("omega_2", "alpha_2", *STAGES, "F12", "F43"):
+        values = getattr(reference, name)
+        if values is not None:
+            large |= magnitude(values) > LARGE
+    return np.asarray(large)

@@ -1,0 +1,181 @@
+"""Sensitivities and tolerances: by differences and by cubature of what the free bodies say of changed linkages."""
+
+import math
+from dataclasses import replace
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+import fourbar
+from fourbar.quantities import FORCES, LINE, UNKNOWNS
+from fourbar.scene import Scene
+from fourbar.studies.keys import command_key
+from fourbar.studies.spread import Spread
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.tolerance import ErrorBound, divide, magnitude
+from fourbar_validation.run.question import Question
+from fourbar_validation.run.shipped.variants import (
+    ask_free_bodies,
+    find_stated,
+    make_row,
+    move_numbers,
+    split_parts,
+    take_few,
+)
+
+STEP = 1e-4
+"""Of each number, of an angle in rad: what the fourth order leaves out and what rounding adds are then alike."""
+DIFFERENCES = ErrorBound(
+    "differences",
+    "1e-7 of the sum of the absolute terms: the fourth-order difference of free bodies at positions whose condition is "
+    "at least 0.1, where it leaves out 1e-11 and rounding adds 1e-10",
+    1e-7,
+    conditioned=False,
+)
+"""What the derivatives along one direction in which every number changes are held to."""
+SAMPLES, DRAWN = 1024, 20_000
+"""Of the tolerances; and of the sum of the first order by which percentiles are judged."""
+SPREAD = ErrorBound(
+    "spread",
+    "3 % of a deviation or of a worst case, of a percentile 30 % of one: 1024 quasi-random samples against cubature "
+    "and 20 000 draws, twice what they were seen to differ by",
+    0.03,
+    conditioned=False,
+)
+NEARLY_STRAIGHT, STRAIGHT = 0.1, 1e-4
+"""Where cubature and first order differ by a smaller part, three points are enough for a deviation, and percentiles
+are those of the first order: what bends a curve by q skews it by q and widens it by q^2."""
+SLIGHT = 1e-3
+"""Of the greatest worst case of a quantity: below, the differences and rounding are as large as what they give."""
+MOST = 3
+"""Tolerances of a scene that are judged together: three points each."""
+GIVEN = 1e-4
+"""Of a length: the tolerance that the run gives it."""
+NODES = {False: (0.6**0.5, 5.0 / 18.0), True: (3.0**0.5, 1.0 / 6.0)}
+"""Outer nodes, in parts of the width, and weights of Gauss's three points of an even and of a normal distribution."""
+
+
+def sensitivity(question: Question) -> list[Row]:
+    """Judge the derivatives of the unknowns and of the scene's points along one direction."""
+    scene = take_few(question)
+    result = fourbar.sensitivity(scene)
+    directions = {key: step for key, (_, step) in find_stated(scene, result.keys).items()}
+    if scene.motion.stroke is None:
+        directions[command_key(scene)] = 1.0
+
+    def along(part: float) -> dict[str, Array]:
+        return ask_free_bodies(
+            move_numbers(scene, {key: part * STEP * step for key, step in directions.items()})
+        ).quantities
+
+    near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
+    rows = []
+    for name in (name for name in (*UNKNOWNS, LINE.value) if name in result.by):
+        first, second = (_subtract(name, up[name], down[name]) for up, down in (near, far))
+        slope = (8.0 * first - second) / (12.0 * STEP)
+        terms = np.array([step * result.of(name, key) for key, step in directions.items()])
+        size = magnitude(result.value(name)) + sum(magnitude(term) for term in terms)
+        known = np.array([status == "ok" for status in result.status]) | (name not in FORCES)
+        error = np.where(known, divide(magnitude(terms.sum(axis=0) - slope), size), 0.0)
+        if known.any():
+            reason = f"along one direction in {len(directions)} numbers"
+            rows.append(make_row(question, "sensitivity", name, error, DIFFERENCES, result.solution.theta_2, reason))
+    return rows
+
+
+def tolerances(question: Question) -> list[Row]:
+    """Judge the spread that a few tolerances make: the scene's own, or those that the run gives it."""
+    scene = take_few(question)
+    lengths = {name: getattr(scene.linkage, name).length for name in ("input", "coupler", "output")}
+    given = (fourbar.Tolerance(f"lengths.{name}", GIVEN * x, name == "output") for name, x in lengths.items())
+    scene = replace(scene, tolerances=(scene.tolerances or tuple(given))[:MOST])
+    result, expected = fourbar.tolerances(scene, SAMPLES), _compute_expected(scene)
+    errors: dict[str, Array] = {}
+    for name in (*UNKNOWNS, LINE.value):
+        own = [part for part in expected if part in (name, f"{name}_x", f"{name}_y", f"|{name}|")]
+        if not own:
+            continue
+        slight = SLIGHT * max(float(np.max(expected[part].worst)) for part in own)
+        errors[name] = np.max([_compute_off(result.spreads[part], expected[part], slight) for part in own], axis=0)
+    reason = ", ".join(each.key for each in scene.tolerances)
+    return [
+        make_row(question, "tolerances", name, each, SPREAD, result.theta_2, reason) for name, each in errors.items()
+    ]
+
+
+class Expected(NamedTuple):
+    """What the tolerances do to a part of a quantity at n positions."""
+
+    deviation: Array
+    """By cubature of the linkages themselves."""
+    first_order: Array
+    worst: Array
+    low: Array
+    """Percentiles of the first order, from the nominal value."""
+    high: Array
+
+
+def _compute_expected(scene: Scene) -> dict[str, Expected]:
+    """Compute what the free bodies of changed linkages answer, by the parts of the unknowns."""
+    bare = replace(scene, tolerances=())
+    nominal = split_parts(ask_free_bodies(bare))
+    numbers = find_stated(bare, [each.key for each in scene.tolerances])
+
+    def changed(changes: dict[str, float]) -> dict[str, Array]:
+        result = split_parts(ask_free_bodies(move_numbers(bare, changes)))
+        return {part: _subtract(part, values, nominal[part]) for part, values in result.items()}
+
+    weights, off = [], []
+    nodes = [[(0.0, 1.0 - 2.0 * w), (x, w), (-x, w)] for x, w in (NODES[each.sigma] for each in scene.tolerances)]
+    for node in product(*nodes):
+        off.append(changed({each.key: x * each.width for each, (x, _) in zip(scene.tolerances, node, strict=True)}))
+        weights.append(math.prod(w for _, w in node))
+    slopes = []
+    for each in scene.tolerances:
+        h = max(STEP * abs(numbers[each.key].number), STEP * each.width)
+        up, down = (changed({each.key: change}) for change in (h, -h))
+        slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
+    rng, w = np.random.default_rng(0), np.array(weights)[:, None]
+    drawn = [rng.normal(size=DRAWN) if each.sigma else rng.uniform(-1.0, 1.0, DRAWN) for each in scene.tolerances]
+    result = {}
+    for part in nominal:
+        values, slope = np.array([each[part] for each in off]), np.array([each[part] for each in slopes])
+        mean = (w * values).sum(axis=0)
+        widths = np.array([[each.width] for each in scene.tolerances])
+        variances = np.array([[1.0 if each.sigma else 1.0 / 3.0] for each in scene.tolerances])
+        reaches = widths * np.array([[3.0 if each.sigma else 1.0] for each in scene.tolerances])
+        low, high = np.percentile(np.array(drawn).T @ (slope * widths), (1.0, 99.0), axis=0)
+        result[part] = Expected(
+            np.sqrt((w * (values - mean) ** 2).sum(axis=0)),
+            np.sqrt((variances * (slope * widths) ** 2).sum(axis=0)),
+            np.abs(slope * reaches).sum(axis=0),
+            low,
+            high,
+        )
+    return result
+
+
+def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
+    """By what part the figures of a spread are off, (n,)."""
+    bent = divide(np.abs(expected.deviation - expected.first_order), expected.deviation)
+    every, near, straight = bent >= 0.0, bent <= NEARLY_STRAIGHT, bent <= STRAIGHT
+    pairs = [
+        (spread.worst, expected.worst, expected.worst, 1.0, every),
+        (spread.first_order, expected.first_order, expected.first_order, 1.0, every),
+        (spread.deviation, expected.deviation, expected.deviation, 1.0, near),
+        (spread.low - spread.nominal, expected.low, expected.deviation, 0.1, straight),
+        (spread.high - spread.nominal, expected.high, expected.deviation, 0.1, straight),
+    ]
+    errors = [
+        np.where(where & (expected.worst > slight), part * divide(np.abs(ours - theirs), size), 0.0)
+        for ours, theirs, size, part, where in pairs
+    ]
+    return np.asarray(np.max(errors, axis=0))
+
+
+def _subtract(name: str, one: Array, other: Array) -> Array:
+    """Subtract, angles within half a turn."""
+    difference = one - other
+    return np.asarray(np.angle(np.exp(1j * difference)) if name.startswith("theta") else difference)
