@@ -19,6 +19,8 @@ from fourbar_validation.engines.description import PINS, find_centre, find_inert
 
 BITS = 320
 """Working precision; 50 digits are 167 bits, the rest is what the worst sample (a limit position at 1e-20) cancels."""
+OF_PIECE = ("table_start", "table_stop", "table_first", "table_last")
+"""Of a load's table: the angles and factors of the piece that a position is in."""
 STEP_BITS = 90
 """Sensitivities are difference quotients with a relative step of 2^-90: wrong by about 2^-90 / (distance to the
 nearest singular position), and the cancelled 90 bits are there to lose."""
@@ -224,7 +226,7 @@ def _add_effects(
     """Add loads and springs, from the directions and first pins of all bars, the ground's too."""
     for k, load in enumerate(scene.loads):
         theta_2 = x.get("theta_2", w[2].arg())
-        factor = _interpolate_factor(load.table, theta_2) if load.table else arb(1)
+        factor = _interpolate_factor(load.table, theta_2, x, k) if load.table else arb(1)
         axes = w[load.bar] if load.frame == "bar" else acb(1)
         f, arm = (axes * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"]) for name in ("F", "at"))
         force[load.bar] += factor * f
@@ -249,13 +251,18 @@ def _add_effects(
                         moment[bar] += wedge(arm - centre[bar], f)
 
 
-def _interpolate_factor(table: Table, theta_2: Ball) -> Ball:
-    """Interpolate between the two points of a table that enclose an angle, taken modulo a turn."""
+def _interpolate_factor(table: Table, theta_2: Ball, x: Values, k: int) -> Ball:
+    """Interpolate between the two points of a table that enclose an angle, taken modulo a turn.
+
+    Where the inputs have them, the four numbers are multiplied by those of `OF_PIECE`.
+    """
     turns = math.floor((float(theta_2.mid()) - table.theta_2[0]) / math.tau + 1e-12)
     angle = theta_2 - 2 * turns * arb.pi()
     after = min(max(bisect(table.theta_2, float(angle.mid())), 1), len(table.theta_2) - 1)
-    start, stop = (arb(table.theta_2[k]) for k in (after - 1, after))
-    first, last = (arb(table.factor[k]) for k in (after - 1, after))
+    piece = (*table.theta_2[after - 1 : after + 1], *table.factor[after - 1 : after + 1])
+    start, stop, first, last = (
+        arb(value) * x.get(f"{name}_{k}", 1) for name, value in zip(OF_PIECE, piece, strict=True)
+    )
     return first + (last - first) * (angle - start) / (stop - start)
 
 
@@ -288,6 +295,7 @@ def compute_response(base: Values, changed: Iterable[Values | None]) -> dict[str
 def compute_reference(scene: Scene, branch: int, angle: float) -> tuple[Values, dict[str, float]] | None:
     """Compute values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
     exact = make_balls(scene, angle)
+    exact |= {f"{name}_{k}": arb(1) for k, load in enumerate(scene.loads) if load.table for name in OF_PIECE}
 
     def evaluate(**changed: Ball) -> Values | None:
         return compute_outputs(scene, branch, exact | changed, scene.drive_bar)

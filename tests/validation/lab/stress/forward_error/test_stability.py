@@ -97,6 +97,11 @@ def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them(library: 
     assert tally.holds() and not tally.untold and {"torque", "F12_x", "theta_4", "a_B_y"} <= tally.worst.keys()
 
 
+def test_the_numbers_of_a_table_are_inputs() -> None:
+    """The load's factor is what two of them leave of each other: 3.9 of what the other inputs allow."""
+    assert run("tables", range(8523, 8524)).holds()
+
+
 @pytest.mark.nightly
 def test_kites_that_stand_still_beside_no_exact_directions() -> None:
     """B rests on O2: its speed across is the product of two roundings, where lengths are no constants."""
