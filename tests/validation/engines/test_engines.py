@@ -325,17 +325,17 @@ IN_A_TREE = {
 PLANTED = {
     **dict.fromkeys(TREES, IN_A_TREE),
     "exudyn-constraints": {
-        "_applied": (partial(scaled, factor=1.0 + 1e-9), {"F12", "F32", "F43", "F14", "torque"}),
+        "_sum_applied": (partial(scaled, factor=1.0 + 1e-9), {"F12", "F32", "F43", "F14", "torque"}),
         "acceleration": (partial(scaled, factor=0.0), {"alpha_3", "alpha_4", "torque"}),
-        "_constraint_jacobian": (partial(scaled, factor=1.0 + 1e-9), {"omega_3", "omega_4", "torque"}),
+        "_read_constraint_jacobian": (partial(scaled, factor=1.0 + 1e-9), {"omega_3", "omega_4", "torque"}),
         "rotation": (partial(scaled, factor=1.0 + 1e-9), {"F43", "torque"}),
         "twist": (nothing_on_bar_3, {"torque"}),
         "angle": (larger, {"theta_3", "theta_4"}),
     },
     "opensim-constraints": {
-        "_equations": (partial(scaled, factor=1.0 + 1e-9), {"omega_3", "omega_4", "torque"}),
-        "_reaction": (partial(scaled, factor=1.0 + 1e-9), {"F12", "F43", "F14"}),
-        "_closing_force": (partial(scaled, factor=-1.0), {"F32"}),
+        "_differentiate_constraints": (partial(scaled, factor=1.0 + 1e-9), {"omega_3", "omega_4", "torque"}),
+        "_read_reaction": (partial(scaled, factor=1.0 + 1e-9), {"F12", "F43", "F14"}),
+        "_compute_closing_force": (partial(scaled, factor=-1.0), {"F32"}),
         "rotation": (partial(scaled, factor=1.0 + 1e-9), {"F43", "torque"}),
         "twist": (nothing_on_bar_3, {"torque"}),
         "angle": (larger, {"theta_3", "theta_4"}),
