@@ -1,6 +1,7 @@
 """What is shipped besides `solve` is judged: each check holds, and each fails where its public call errs."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -106,6 +107,13 @@ def test_equilibria_that_err_fail(
     call = fourbar.equilibrium
     monkeypatch.setattr(fourbar, "equilibrium", lambda scene: change(call(scene)))
     assert failing(rows_of(SHIPPED, "equilibria")) >= quantities
+
+
+@pytest.mark.parametrize(("gravity", "compared"), [(-0.7, 1), (2.1, 0)])
+def test_an_equilibrium_too_near_a_limit_is_not_counted_as_compared(gravity: float, compared: int) -> None:
+    scene = replace(FAULT_SCENES["shipped, limited"], effects=(fourbar.Gravity(9.81, gravity),))
+    slopes = [row for row in rows_of(scene, "equilibria") if row.quantity == "slope"]
+    assert [row.reason for row in slopes] == [f"rest: {compared} of 2 equilibria"] * bool(compared)
 
 
 COMMANDS = {

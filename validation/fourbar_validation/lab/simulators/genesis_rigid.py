@@ -29,7 +29,6 @@ SETTINGS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "its defaults": ({}, {}),
 }
 """What is given to the MJCF morph and to the rigid solver's options."""
-WITHOUT = {"enable_collision": False, "enable_joint_limit": False}
 genesis.init(backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu, precision="64", logging_level="error")
 
 

@@ -58,11 +58,13 @@ def equilibria(question: Question) -> Iterator[Row]:
     reason = f"{len(result.found)} equilibria; {SAMPLES} positions of a turn held by free bodies"
     verdict = FAILS if missed else AGREES
     yield Row(question.name, "equilibria", "exact", "missed", float(missed), 0.0, verdict, reason, float("nan"), 1.0)
-    errors = [_errors(scene, each, most) for each in result.found if _decided(each)]
-    if errors:
-        where = np.array([each.place.theta_2 for each in result.found if _decided(each)])
-        for name, error in zip(("torque", "slope", "inertia", "frequency"), np.array(errors).T, strict=True):
-            yield make_row(question, "equilibria", name, error, REST, where, f"{len(error)} equilibria")
+    decided = [each for each in result.found if each.stability != "undecided"]
+    rows = [(each.place.theta_2, *error) for each in decided if (error := _errors(scene, each, most)) is not None]
+    if rows:
+        where, *errors = np.array(rows).T
+        for name, error in zip(("torque", "slope", "inertia", "frequency"), errors, strict=True):
+            compared = f"{len(rows)} of {len(result.found)} equilibria"
+            yield make_row(question, "equilibria", name, error, REST, where, compared)
 
 
 def _at_rest(scene: Scene) -> Scene:
@@ -107,10 +109,6 @@ def _held(
     return held
 
 
-def _decided(each: Equilibrium) -> bool:
-    return each.stability != "undecided"
-
-
 def _of_branch(found: tuple[Equilibrium, ...], sign: int) -> Array:
     return np.array([each.place.theta_2 for each in found if each.place.branch == sign])
 
@@ -128,8 +126,8 @@ def _differing(theta_2: Array, torque: Array, found: Array) -> int:
     return int(np.count_nonzero(known & (changes != (counted % 2 == 1))))
 
 
-def _errors(scene: Scene, each: Equilibrium, most: float) -> tuple[float, float, float, float]:
-    """Compare torque, slope, inertia and frequency, each by its size; NaN of what is ill-conditioned is 0."""
+def _errors(scene: Scene, each: Equilibrium, most: float) -> tuple[float, float, float, float] | None:
+    """Compare torque, slope, inertia and frequency, each by its size; None where it is ill-conditioned."""
     place, bar = each.place, int(each.angle[-1])
     theta = {2: place.theta_2, 3: place.theta_3, 4: place.theta_4}
     one, other = (theta[k] for k in (2, 3, 4) if k != bar)
@@ -139,7 +137,7 @@ def _errors(scene: Scene, each: Equilibrium, most: float) -> tuple[float, float,
     push = most / each.inertia if each.inertia > 0.0 else 1.0
     pushed = _held(scene, bar, around[3:4], branch, push)
     if not np.isfinite(torque).all():
-        return 0.0, 0.0, 0.0, 0.0
+        return None
     slope = float(DIFFERENCES @ torque) / STEP
     J = float(pushed[0] - torque[3]) / push
     off = abs(slope + each.slope) / (most + abs(slope)), abs(J - each.inertia) / max(abs(J), each.inertia, 1e-300)
