@@ -243,6 +243,44 @@ def test_mapped_over_linkages_as_vary(library: Library) -> None:
         assert (gap.reshape(len(sine), -1).max(axis=1) * sine**2 <= ROUNDED).all()
 
 
+def test_derivatives_are_mapped_over_linkages_and_positions(library: Library) -> None:
+    """In a table's piece too, which a transformed index looks up."""
+    f = function(LOADED, ["lengths.input", "motion.theta_2"], ["torque"])
+    pairs = np.array([[0.1, 0.5], [0.11, 4.0]])
+    found = library.vmap(library.grad(lambda x: f(x[0], x[1])["torque"]))(library.array(pairs))
+    one = library.vmap(library.grad(lambda a: f(a, 4.0)["torque"]))(library.array([0.1, 0.11]))
+    for row, (a, theta) in zip(np.asarray(found), pairs, strict=True):
+        linkage = replace(LOADED.linkage, input=replace(LOADED.linkage.input, length=a))
+        slopes = fourbar.sensitivity(replace(LOADED, linkage=linkage, motion=Motion(theta, 8.0, 3.0)))
+        exact = [slopes.of("torque", key)[0] for key in ("lengths.input", "motion.theta_2")]
+        assert row == pytest.approx(exact, rel=ROUNDED)
+    assert float(one[1]) == pytest.approx(float(found[1, 0]), rel=ROUNDED)
+
+
+@pytest.mark.nightly
+def test_numbers_of_the_scene_go_to_the_device_of_the_values() -> None:
+    """One that computes nothing, and like a GPU takes no array of another."""
+    torch = pytest.importorskip("torch")
+    f = function(replace(LOADED, motion=Motion(ANGLES, 8.0)), ["lengths.input"], EVERY)
+    assert {of.device.type for of in f(torch.tensor(0.1, device="meta")).values()} == {"meta"}
+
+
+NO_VALUE = {
+    "no_torque": replace(LOADED, linkage=uniform(0.3, 0.1, 0.3, 0.1), drive_bar=3, loads=()),
+    "overflow": replace(LOADED, motion=Motion(0.5, 1e153)),
+}
+
+
+@pytest.mark.parametrize("status", NO_VALUE)
+def test_where_solve_has_no_value_there_is_none(library: Library, status: str) -> None:
+    """The power alone is beyond the range of doubles in the second."""
+    scene = NO_VALUE[status]
+    assert fourbar.solve(scene).status == [status]
+    for make in (float, np.array, library.array):
+        found = function(scene, ["motion.theta_2"], ["power", "theta_4"])(make(0.5))
+        assert np.isnan(float(found["power"])) and np.isfinite(float(found["theta_4"]))
+
+
 def test_single_precision_stays_single(library: Library) -> None:
     f = function(LOADED, ["lengths.input", "motion.theta_2"], ["torque"])
     kind = library.xp.float32
@@ -259,6 +297,7 @@ def test_scenes_state_the_positions_and_shapes_are_broadcast() -> None:
     )
     assert one(1.0)["torque"].shape == () and one(np.ones(3))["torque"].shape == (3,)
     assert many(0.3)["torque"].shape == (13,)
+    assert one(np.float32([1.0]))["torque"].tolist() == [one(1.0)["torque"]]  # NumPy's are all made doubles
     assert (many(0.3)["torque"] == fourbar.solve(replace(LOADED, motion=Motion(ANGLES, 8.0))).torque).all()
 
 
