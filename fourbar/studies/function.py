@@ -15,6 +15,7 @@ from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, O
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
+from fourbar.scene.stroke import find_triangle
 from fourbar.studies.keys import command_key, list_entries, read_place, refuse_key, replace_numbers
 
 NO_DIGIT_LEFT, UNDECIDED = 8.0, 16.0
@@ -53,7 +54,7 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     ------
     InputError : an unknown key or quantity; what cannot be traced: friction that depends on the pin forces, a free
         motion, a position stated from a limit, a path that is followed through change points, a table that
-        covers less than a turn, a stroke. The function: values that are no real floating-point numbers of one
+        covers less than a turn. The function: values that are no real floating-point numbers of one
         library, or whose shapes do not broadcast.
     DependencyError : array-api-compat is missing, without which other libraries than NumPy are not known.
 
@@ -63,12 +64,7 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     [-0.009, -0.011, nan]
     """
     expect("scene", scene, Scene)
-    for name, names in (("keys", keys), ("quantities", quantities)):
-        expect(name, names, tuple, list)
-        for each in names:
-            expect(name, each, str)
-        if len(set(names)) < len(names) or not names:
-            raise InputError(name, names, "must be one or more, each once")
+    _expect_names(keys=keys, quantities=quantities)
     known, theta, motion = list_entries(scene), command_key(scene), scene.motion
     for key in keys:
         if key not in (*known, theta):
@@ -92,11 +88,18 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
             q, changed = numbers.pop(theta, None), replace_numbers(scene, numbers)
             speed, acceleration = changed.motion.speed, changed.motion.acceleration
             if stated is not None:
-                q = make_like(stated.angle.reshape(shape), zero)
+                q = make_like((stated.angle if stated.stroke is None else stated.stroke).reshape(shape), zero)
                 if motion.law is not None:
                     speed, acceleration = (make_like(x, zero) for x in (stated.speed, stated.acceleration))
+            q, lever = q + zero, 1.0
+            if motion.stroke is not None:
+                triangle = find_triangle(changed.linkage, changed.drive)
+                q, speed, acceleration, lever = triangle.turned(q, speed, acceleration, motion.side)
+                holds = holds & (lever > NO_DIGIT_LEFT * given.eps)
             case, moved = Case.of(changed, motion.bar), (0.0 if speed is None else speed, acceleration)
-            found, ok = _evaluate(case, q + zero, float(motion.branch), moved, given, wanted)
+            found, ok = _evaluate(case, q, float(motion.branch), moved, given, wanted)
+            if "condition" in wanted:
+                found["condition"] = found["condition"] * lever
             ok = ok & holds
             parts = {
                 name: (found[name] + zero,) if is_scalar(name) else (found[name].real + zero, found[name].imag + zero)
@@ -106,6 +109,16 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
         return {name: of[0] if is_scalar(name) else xp.stack(of, axis=-1) for name, of in kept.items()}
 
     return of_numbers
+
+
+def _expect_names(**lists: Sequence[str]) -> None:
+    """Raise an InputError for a list that is none of words, each once."""
+    for name, names in lists.items():
+        expect(name, names, tuple, list)
+        for each in names:
+            expect(name, each, str)
+        if len(set(names)) < len(names) or not names:
+            raise InputError(name, names, "must be one or more, each once")
 
 
 def _evaluate(
@@ -211,8 +224,6 @@ def _refuse_untraceable(scene: Scene, keys: Sequence[str]) -> None:
     motion = scene.motion
     if motion.free is not None:
         raise InputError("motion.free", motion.free, "is integrated step by step, which cannot be traced")
-    if motion.stroke is not None:
-        raise InputError("motion.stroke", motion.stroke, "is turned into an angle first: state that of a bar")
     for effect in scene.effects:
         if effect.loaded_pins:
             allowed = "depends on the pin forces, which are searched for and cannot be traced"

@@ -158,6 +158,29 @@ def test_other_bars_command(library: Library, motion: Motion) -> None:
         assert np.asarray(value) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
 
 
+@pytest.mark.parametrize(("bar", "side", "length"), [(2, "left", 0.35), (4, "right", 0.5)])
+def test_a_stroke_commands(library: Library, bar: int, side: str, length: float) -> None:
+    """The strokes before and after the one are none that this cylinder can have."""
+    line = LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(bar, -0.12, 0.4))
+    scene = replace(CYLINDER, drive=line, loads=(), motion=Motion(stroke=length, stroke_speed=0.1, side=side))
+    solution, slopes = fourbar.solve(scene), fourbar.sensitivity(scene)
+    assert solution.status == ["ok"]
+    names, keys = ["drive_force", "alpha_3", "condition"], ["motion.stroke", "drive.to.at.0"]
+    f, stroke, end = function(scene, keys, names), library.array([0.01, length, 3.0]), library.array(-0.12)
+    found = library.jit(f)(stroke, end)
+    jacobian = library.jacrev if library.xp.__name__ == "torch" else library.jacfwd
+    by = jacobian(lambda x: {name: library.xp.nansum(of) for name, of in f(x[0] + stroke, x[1] + end).items()})(
+        library.array([0.0, 0.0])
+    )
+    for name in names:
+        assert np.isnan(np.asarray(found[name])).tolist() == [True, False, True]
+        assert float(found[name][1]) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
+        assert np.asarray(by[name]) == pytest.approx([slopes.of(name, key)[0] for key in keys], rel=ROUNDED)
+    assert np.isnan(f(np.array([0.01, length, 3.0]), -0.12)["alpha_3"]).tolist() == [True, False, True]
+    stated = function(scene, keys[1:], names[:1])
+    assert float(stated(end)["drive_force"]) == pytest.approx(solution.drive_force[0], rel=ROUNDED)
+
+
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name != "tables"])
 def test_derivatives_are_those_of_sensitivity(library: Library, family: str) -> None:
     """Forwards in JAX and backwards in PyTorch, which are no derivation of ours."""
@@ -307,7 +330,6 @@ REFUSED = {
     "motion.theta_2": replace(LOADED, motion=Motion(FromLimit(1, 0.1), 1.0)),
     "motion.through": replace(LOADED, linkage=uniform(0.3, 0.1, 0.3, 0.1), motion=Motion(1.0, 1.0, through="follow")),
     "loads.0.table": replace(LOADED, loads=(Load(3, moment=1.0, table=Table((0.0, 1.0), (1.0, 2.0))),)),
-    "motion.stroke": replace(CYLINDER, motion=Motion(stroke=0.2, stroke_speed=0.1, side="left")),
     "motion.omega_2": replace(LOADED, motion=Motion(0.5)),
 }
 
