@@ -143,7 +143,8 @@ def _evaluate(
     found = list_kinematics(case, state, wanted.keys()) | name_of_command(case, at, state, q)
     if "force" in stages:
         done = case.dynamics(state, acceleration)
-        found |= {**done.pins._asdict(), case.names.value: done.drive, "power": done.work * speed}
+        power = xp.where(xp.isfinite(done.drive), done.work * speed, xp.nan)
+        found |= {**done.pins._asdict(), case.names.value: done.drive, "power": power}
         found["drive_condition"] = case.drive_condition(state)
         for term in case.terms:
             if (status := term.status(state, None)) is not None:

@@ -169,9 +169,11 @@ def test_a_stroke_commands(library: Library, bar: int, side: str, length: float)
     f, stroke, end = function(scene, keys, names), library.array([0.01, length, 3.0]), library.array(-0.12)
     found = library.jit(f)(stroke, end)
     jacobian = library.jacrev if library.xp.__name__ == "torch" else library.jacfwd
-    by = jacobian(lambda x: {name: library.xp.nansum(of) for name, of in f(x[0] + stroke, x[1] + end).items()})(
-        library.array([0.0, 0.0])
-    )
+
+    def summed(x: Any) -> Any:
+        return {name: library.xp.nansum(of) for name, of in f(x[0] + stroke, x[1] + end).items()}
+
+    by = library.jit(jacobian(summed))(library.array([0.0, 0.0]))
     for name in names:
         assert np.isnan(np.asarray(found[name])).tolist() == [True, False, True]
         assert float(found[name][1]) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
@@ -270,8 +272,8 @@ def test_derivatives_are_mapped_over_linkages_and_positions(library: Library) ->
     """In a table's piece too, which a transformed index looks up."""
     f = function(LOADED, ["lengths.input", "motion.theta_2"], ["torque"])
     pairs = np.array([[0.1, 0.5], [0.11, 4.0]])
-    found = library.vmap(library.grad(lambda x: f(x[0], x[1])["torque"]))(library.array(pairs))
-    one = library.vmap(library.grad(lambda a: f(a, 4.0)["torque"]))(library.array([0.1, 0.11]))
+    found = library.jit(library.vmap(library.grad(lambda x: f(x[0], x[1])["torque"])))(library.array(pairs))
+    one = library.jit(library.vmap(library.grad(lambda a: f(a, 4.0)["torque"])))(library.array([0.1, 0.11]))
     for row, (a, theta) in zip(np.asarray(found), pairs, strict=True):
         linkage = replace(LOADED.linkage, input=replace(LOADED.linkage.input, length=a))
         slopes = fourbar.sensitivity(replace(LOADED, linkage=linkage, motion=Motion(theta, 8.0, 3.0)))
