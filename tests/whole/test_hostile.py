@@ -19,7 +19,7 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import COLUMNS, FAILS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines.memory import WORKER_MEMORY
+from fourbar_validation.engines.memory import WORKER_MEMORY, bound_memory
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.terminal import print_table
@@ -250,6 +250,20 @@ class Greedy:
         return Answer("greedy", "exact", refusal="declined")
 
 
+def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    resource = pytest.importorskip("resource")
+    asked = []
+
+    def refuse(*limit: object) -> None:  # as macOS does
+        asked.append(limit)
+        raise ValueError("current limit exceeds maximum limit")
+
+    monkeypatch.setattr(resource, "setrlimit", refuse)
+    bound_memory()
+    assert asked
+
+
+@pytest.mark.linux
 def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
