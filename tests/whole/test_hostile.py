@@ -13,6 +13,8 @@ import fourbar
 import fourbar_validation.run.run
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.mjcf import write_mjcf
+from fourbar.mjcf.sdf import write_sdf
+from fourbar.mjcf.usd import write_usd
 from fourbar.scene import Command, Scene
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
@@ -103,6 +105,15 @@ def test_mjcf_holds_a_hostile_title_as_an_attribute(kind: str) -> None:
     assert root.tag == "mujoco"
     assert not STEERING.search(root.attrib["model"])
     assert not root.findall(".//script")
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_sdf_and_usd_hold_a_hostile_title_as_a_text(kind: str) -> None:
+    scene = crank_rocker(title=HOSTILE[kind])
+    root = ET.fromstring(write_sdf(scene, without_loads=True))
+    (model,) = root.findall(".//model")
+    *_, title = re.findall(r"^ *doc = (.*)$", write_usd(scene, without_loads=True), re.MULTILINE)
+    assert not STEERING.search(model.attrib["name"] + json.loads(title)) and not root.findall(".//script")
 
 
 @pytest.mark.parametrize("kind", HOSTILE)

@@ -366,7 +366,7 @@ OVERDONE = [
     ("lengths", ' pos="[^"]*"', ' pos="1e308 1e308 0"', "lengths.input is beyond the range"),
     ("user data", "<worldbody>", '<size nuser_body="2000000000"/><worldbody>', "is a size in it too large?"),
     ("keyframes", "<worldbody>", '<size nkey="2000000000"/><worldbody>', "asks for 2000000000 keyframes"),
-    ("terrain", "<worldbody>", '<asset><hfield name="h" nrow="40000" ncol="40000" size="1 1 1 1"/></asset><worldbody>',
+    ("terrain", "<worldbody>", '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset><worldbody>',
      "is a size in it too large?"),
     *((f"timestep {t}", 'timestep="[^"]*"', f'timestep="{t}"', f"its timestep of {t} s must be above 0")
       for t in ("-1", "0", "nan")),
