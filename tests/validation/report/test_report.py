@@ -27,7 +27,7 @@ from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.svg import FLOOR
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.judge import judge_for_report
-from tests.support.here import summary_of
+from tests.support.here import judge_solve_alone, summary_of
 from tests.support.scenes import crank_rocker
 
 COMMENT_LIMIT = 65_536
@@ -165,7 +165,8 @@ def test_costs_are_those_of_the_run() -> None:
     ],
     ids=["positions", "one position", "released", "sweep"],
 )
-def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> None:
+def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    judge_solve_alone(monkeypatch)
     witnesses = tuple(w for w in WITNESSES if w.name == "free-body")
     made = judge_for_report("kind", crank_rocker(motion=motion), witnesses)
     assert made.figure is not None and made.figure.count("<svg") == pictures
