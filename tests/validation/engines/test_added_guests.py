@@ -3,6 +3,7 @@
 import ctypes
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -338,6 +339,9 @@ def test_parts_judged_with_another_code_or_limit_are_made_again(
         return found
 
     again = "made again: the parts of another run"
+    notes("1.0")
+    shutil.rmtree(tmp_path / "out")
+    monkeypatch.setattr(added, "OURS", frozenset(sys.modules) - {"mine", "near"})  # not loaded by the witness, but here
     assert notes("1.0") == [] == notes("1.0")
     assert notes("1.01") == [f"{again} (witnesses)"]
     assert notes("1.01", 5.0) == [f"{again} (time limit)"]
