@@ -35,7 +35,7 @@ def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
         assert set(FIELDS) - {"With"} <= finding.fields.keys(), finding.script
         dates = " ".join(f"*{name}:* {finding.fields[name]}." for name in ("Since", "Until", "Reported"))
         name = finding.script.name
-        entry = f"- **{finding.engine[0]}** {finding.sentence}\n  {dates} [{name}]({name})\n"
+        entry = f"- **{finding.engine[0]}**: {finding.sentence}\n  {dates} [{name}]({name})\n"
         assert entry in listed, entry
     assert listed.count(".py)") == len(ALL), "an entry without its script"
 
