@@ -1,6 +1,7 @@
 """A compiled MJCF as a closed loop: MuJoCo's own kinematics, assembly, velocities and pin forces."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -26,6 +27,20 @@ def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Arr
     site, frame = model.actuator_trnid[actuator]
     axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
     return np.asarray(axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator])
+
+
+def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Compile a text and evaluate it at keyframe 0."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def make_stepper(text: str) -> Callable[[int], None]:
+    """Make a function that steps a text on from its first keyframe, as often as wanted."""
+    return partial(mujoco.mj_step, *open_model(text))
 
 
 class ClosedLoop(Assembled):
