@@ -14,30 +14,30 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Gravity
 from fourbar.errors import BROKEN, FAILED, HOLDS
 from fourbar.evaluation.case import BLOCK
 from fourbar.formulas.mobility import choose_range
-from fourbar.linkage import MOVING_BARS, Bar, FourBar
+from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS
-from fourbar.scene import Command, Scene
 from fourbar.show.plot.style import format_of
 from fourbar.solve import solve
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.lab.cost.formulas import make_bodies
 from fourbar_validation.lab.stress.against import ONE_THREAD
 from fourbar_validation.lab.stress.against import time_against as against_revision
-from fourbar_validation.lab.stress.bench_picture import Times, draw_bench
 from fourbar_validation.lab.stress.contenders import (
     POSITIONS,
     STUDY,
+    Times,
     collect_loops,
+    draw_bench,
     time_interleaved,
     time_linkages,
     time_positions,
 )
 from fourbar_validation.lab.stress.speed_limits import JUDGED_BY_SYSTEMS, LIMITS
-from fourbar_validation.lab.stress.timed import LINKAGE, allocate, make_command, make_example, time_call
-from fourbar_validation.published.thirteen import FreeBodies, solve_thirteen
+from fourbar_validation.lab.stress.timed import allocate, make_command, make_example, time_call
+from fourbar_validation.published.thirteen import solve_thirteen
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.terminal import make_table
 from fourbar_validation.run.judge import judge_for_report
@@ -71,22 +71,6 @@ class Measured(NamedTuple):
     over_positions: Times
     over_linkages: Times
     not_run: dict[str, str]
-
-
-def make_bodies(scene: Scene, at: Command) -> FreeBodies:
-    """Make the right-hand sides of the 13x13 system from the kinematics; not part of what is timed."""
-    s = solve(scene, "acceleration", at=at)
-    gravity = np.array(next((effect.vector for effect in scene.effects if isinstance(effect, Gravity)), (0.0, 0.0)))
-    first = {2: np.zeros_like(s.A), 3: s.A, 4: np.full_like(s.A, (LINKAGE.ground, 0.0))}
-    second = {2: s.A, 3: s.B, 4: s.B}
-    bars = {k: scene.linkage.bar(k) for k in MOVING_BARS}
-    centre = {k: getattr(s, f"G{k}") for k in MOVING_BARS}
-    return FreeBodies(
-        {k: np.ascontiguousarray(first[k] - centre[k]) for k in MOVING_BARS},
-        {k: np.ascontiguousarray(second[k] - centre[k]) for k in MOVING_BARS},
-        {k: np.ascontiguousarray(bars[k].mass * (getattr(s, f"a_G{k}") - gravity)) for k in MOVING_BARS},
-        {k: bars[k].moment_of_inertia * getattr(s, f"alpha_{k}") for k in MOVING_BARS},
-    )
 
 
 def import_cost() -> float:
@@ -139,7 +123,6 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
         format_of(picture)
     if against is not None:
         return print_comparison(against, positions, rounds)
-    from rich.box import HEAVY_HEAD
     from rich.console import Console
 
     if any(os.environ.get(name) != "1" for name in ONE_THREAD):
@@ -162,7 +145,7 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
         broken += [] if holds else [f"{what}: {limit.reason}"]
     console = Console()
     title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {name_machine()}"
-    console.print(make_table(("what", "measured", "needed", ""), rows, title=title, box=HEAVY_HEAD))
+    console.print(make_table(("what", "measured", "needed", ""), rows, title=title))
     for title, times in ((OVER_POSITIONS, result.over_positions), (OVER_LINKAGES, result.over_linkages)):
         console.print(_make_table(title, times))
     for who, reason in result.not_run.items():
@@ -176,16 +159,13 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
 
 def _make_table(title: str, times: Times) -> "Table":
     """Lay out one row for each contender, one column for each count."""
-    from rich.box import HEAVY_HEAD
-
     counts = sorted({n for own in times.values() for n in own})
     rows = [[who, *(f"{own[n]:.4g}" if n in own else "" for n in counts)] for who, own in times.items()]
-    return make_table(["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)], rows, title=title, box=HEAVY_HEAD)
+    return make_table(["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)], rows, title=title)
 
 
 def print_comparison(revision: str, positions: int, rounds: int) -> int:
     """Print this tree's times over those of a revision; a measurement without limits."""
-    from rich.box import HEAVY_HEAD
     from rich.console import Console
     from rich.markup import escape
 
@@ -196,7 +176,7 @@ def print_comparison(revision: str, positions: int, rounds: int) -> int:
     title = f"CPU ms of a call in this tree and at {escape(revision)}, and their ratio; "
     title += f"{positions} positions, one core, medians of {rounds} pairs in turns; {name_machine()}"
     head = ("what", "ours", "theirs", "ratio", "least", "most")
-    Console().print(make_table(head, rows, title=title, box=HEAVY_HEAD))
+    Console().print(make_table(head, rows, title=title))
     return HOLDS
 
 

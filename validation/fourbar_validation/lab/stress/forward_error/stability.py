@@ -167,7 +167,6 @@ def stability(
     samples: int, families: tuple[str, ...], seed: int, bar: int, library: str, derivatives: bool, jobs: int
 ) -> int:
     """Measure the error of every output against 50-digit arithmetic, and whether the error bars hold."""
-    from rich.box import HEAVY_HEAD
     from rich.console import Console
     from rich.progress import track
 
@@ -192,7 +191,7 @@ def stability(
     console = Console()
     of = ", of derivatives by every number" if derivatives else ""
     title = f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}, {library}{of}"
-    console.print(make_table(("output", *chosen), rows, title=title, box=HEAVY_HEAD))
+    console.print(make_table(("output", *chosen), rows, title=title))
     for family, tally in tallies.items():
         for name, (part, sample) in tally.worst.items():
             if part > 1.0:
