@@ -91,8 +91,6 @@ class BodyWrenches:
 
 MEET = 16.0 * 2.0**-52
 """Two points nearer than this part of the lengths by which they are reached lie in one."""
-
-
 FOLLOWED = np.radians(2.0)
 """Step in which angles are followed from where a motion begins, rad."""
 

@@ -56,8 +56,6 @@ NEAREST_CENTRE = Boundary(
     "m",
     "a centre nearer than about 1e-6 m to its pin is silently taken to lie on it (the compiler's sameframe)",
 )
-
-
 LIGHTEST = Boundary(
     "mass or inertia of a moving bar, least",
     1e-15,

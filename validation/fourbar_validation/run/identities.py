@@ -45,8 +45,6 @@ STAGES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)
 """One quantity of each stage that a position may lack."""
 LARGE = 1e75
 """Numbers beyond this, or their squares, may leave the range of doubles in between: 1e300 in a product of four."""
-
-
 OfSome = Callable[[NDArray[np.intp]], Array]
 """A number of each of some positions."""
 IN_ONE_LINE = 32.0 * 2.0**-53
@@ -203,11 +201,9 @@ def compare_status(
 
     That a loop does not close is compared by itself where doubles can decide it.
 
-    Parameters
-    ----------
-    sines : sin(theta_4 - theta_3) in many digits at some positions, NaN where the loop does not close; near 0 it
-        decides whether they are singular. None: nothing is.
-    solutions : how many solutions loaded friction has at some positions.
+    `sines`: sin(theta_4 - theta_3) in many digits at some positions, NaN where the loop does not close; near 0 it
+    decides whether they are singular. None: nothing is.
+    `solutions`: how many solutions loaded friction has at some positions.
     """
     scene, formulas = question.scene, question.solution
     differ = np.zeros(len(formulas), dtype=bool)

@@ -74,10 +74,8 @@ def trace_steps(
 ) -> Curve:
     """Make a curve over the timestep.
 
-    Parameters
-    ----------
-    held : a part of a revolution at which the closure's time constant is held in seconds, so that the timestep alone
-        changes; None: it is so many steps as in the settings.
+    `held`: a part of a revolution at which the closure's time constant is held in seconds, so that the timestep alone
+    changes; None: it is so many steps as in the settings.
     """
 
     def at(n: float) -> Settings:
