@@ -10,13 +10,7 @@ from fourbar_validation.engines.prediction import predict_from_data
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.scenes.hard_families import FAMILIES
 
-BALLS = Witness(
-    "ball-arithmetic",
-    BallArithmetic,
-    FULL_ACCURACY,
-    nearby=True,
-    library="flint",
-)
+BALLS = Witness("ball-arithmetic", BallArithmetic, FULL_ACCURACY, nearby=True, library="flint")
 
 
 def hold_fully(witness: Witness) -> Witness:

@@ -54,13 +54,7 @@ def _compute_extent(scene: Scene) -> float:
 
 
 def predict_error(
-    scene: Scene,
-    at: Command,
-    quantity: str,
-    reach: float,
-    where: Mask | None = None,
-    *,
-    carried: bool = False,
+    scene: Scene, at: Command, quantity: str, reach: float, where: Mask | None = None, *, carried: bool = False
 ) -> Array:
     """Predict the absolute error of a quantity at each position, or at those of a mask, (n,).
 

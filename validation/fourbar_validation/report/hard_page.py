@@ -119,12 +119,7 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     for witness in HARD_WITNESSES:
         found = list_errors(approach.scene, quantity, witness)
         if found is not None and len(found[0]):
-            axes.loglog(
-                np.abs(found[0] - singular),
-                found[1],
-                label=witness.name,
-                **choose_style(witness.name).line,
-            )
+            axes.loglog(np.abs(found[0] - singular), found[1], label=witness.name, **choose_style(witness.name).line)
     axes.set_xlim(approach.distances[0] * 2, approach.distances[-1] / 2)
     axes.set_ylim(FLOOR, 1e3)
     axes.grid(visible=True, color=INK, alpha=0.2)

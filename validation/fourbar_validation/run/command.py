@@ -47,13 +47,7 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
 )
 @click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
-@click.option(
-    "--error",
-    "wanted",
-    type=float,
-    metavar="E",
-    help="Simulate no more precisely than this relative error.",
-)
+@click.option("--error", "wanted", type=float, metavar="E", help="Simulate no more precisely than this relative error.")
 @click.option("--suite", "named", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
 @click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Of the random linkages; left out: 0.")

@@ -192,10 +192,7 @@ def _solve_exactly(question: Question) -> tuple[OfSome | None, OfSome | None]:
 
 
 def compare_status(
-    question: Question,
-    reference: Solution,
-    sines: OfSome | None = None,
-    solutions: OfSome | None = None,
+    question: Question, reference: Solution, sines: OfSome | None = None, solutions: OfSome | None = None
 ) -> Row:
     """Count where the formulas have a value and `reference` has none, or the reverse, where it has digits left.
 

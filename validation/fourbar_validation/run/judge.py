@@ -87,12 +87,7 @@ def name_output(row: Row) -> Row:
 
 
 def judge(
-    name: str,
-    scene: Scene,
-    witnesses: Sequence[Witness] = WITNESSES,
-    *,
-    order: bool = True,
-    shipped: bool = False,
+    name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, order: bool = True, shipped: bool = False
 ) -> Record:
     """Make every check of one scene.
 

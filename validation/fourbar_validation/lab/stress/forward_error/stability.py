@@ -94,13 +94,7 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
 
 
 def run(
-    family: str,
-    samples: range,
-    seed: int = 0,
-    bar: int = 2,
-    library: str = "numpy",
-    *,
-    derivatives: bool = False,
+    family: str, samples: range, seed: int = 0, bar: int = 2, library: str = "numpy", *, derivatives: bool = False
 ) -> Tally:
     """Judge some samples of a family; each depends on the family, the seed and its number alone.
 
