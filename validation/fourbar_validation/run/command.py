@@ -107,7 +107,7 @@ def command(
     """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
     from fourbar_validation.report.terminal import print_table
 
-    of_random = {"--random": count, "--seed": seed, "--type": types}
+    of_random: dict[str, Any] = {"--random": count, "--seed": seed, "--type": types}
     refuse_combinations(
         {"scenes": scenes or None, "--suite": named, "--against": against, "--python": python} | of_random
     )
@@ -126,12 +126,7 @@ def command(
 
         witnesses = adjust_witnesses(witnesses, wanted)
     if python is not None:
-        the_same = of_random | {
-            "--workers": workers,
-            "--engines": engines,
-            "--error": wanted,
-            "--time-limit": time_limit,
-        }
+        the_same = of_random | {"--workers": workers, "--engines": engines}
         the_same |= {"--error": wanted, "--time-limit": time_limit}
         the_same["--suite"] = named if named in (None, "hard") else os.path.abspath(named)
         passed_on = [*map(os.path.abspath, scenes), "--no-pictures", *(f"--witness={adapter}" for adapter in adapters)]
