@@ -47,7 +47,9 @@ class BallArithmetic:
             if values is None:
                 continue
             assembled[i] = True
-            _put(out, i, values)
+            for name, array in out.items():
+                axes = ("_x", "_y") if name in VECTORS else ("",)
+                array[i] = np.squeeze([_to_double(values.get(name + axis)) for axis in axes])
         return Answer(
             NAME,
             "exact",
@@ -72,18 +74,9 @@ def compute_sines(linkage: FourBar, command: Command) -> Array:
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         closed = closure(x | {"theta_2": arb(theta_2)}, branch)
         # with A on O4 bars 3 and 4 have no direction
-        result[i] = math.nan if closed is None else np.nan_to_num(_count_solutions(wedge(*closed[1:])))
+        result[i] = math.nan if closed is None else np.nan_to_num(_to_double(wedge(*closed[1:])))
     return result
 
 
-def _put(out: dict[str, Array], i: int, values: dict[str, Any]) -> None:
-    """Write the numbers of one position into those of all."""
-    for name, array in out.items():
-        if name in VECTORS:
-            array[i] = _count_solutions(values.get(f"{name}_x")), _count_solutions(values.get(f"{name}_y"))
-        else:
-            array[i] = _count_solutions(values.get(name))
-
-
-def _count_solutions(ball: Any) -> float:
+def _to_double(ball: Any) -> float:
     return math.nan if ball is None else float(ball.mid())

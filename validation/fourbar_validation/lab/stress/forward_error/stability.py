@@ -2,7 +2,6 @@
 
 import math
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -137,12 +136,6 @@ def _run(seed: int, bar: int, library: str, derivatives: bool, task: tuple[str, 
     return run(*task, seed, bar, library, derivatives=derivatives)
 
 
-def make_chunks(samples: int) -> Iterator[range]:
-    """Divide the sample numbers into tasks."""
-    for start in range(0, samples, CHUNK):
-        yield range(start, min(start + CHUNK, samples))
-
-
 @click.command()
 @click.option("--samples", default=FULL, show_default=True, type=click.IntRange(1), help="Samples per family.")
 @click.option("--family", "families", multiple=True, type=click.Choice(list(FAMILIES)), help="Only these (repeatable).")
@@ -165,7 +158,8 @@ def stability(
     from rich.progress import track
 
     chosen = families or tuple(FAMILIES)
-    tasks = [(family, part) for family in chosen for part in make_chunks(samples)]
+    parts = [range(start, min(start + CHUNK, samples)) for start in range(0, samples, CHUNK)]
+    tasks = [(family, part) for family in chosen for part in parts]
     results = apply_each(partial(_run, seed, bar, library, derivatives), tasks, jobs, seconds=None)
     tallies = {family: Tally() for family in chosen}
     for (family, _), tally in track(zip(tasks, results, strict=True), "samples", total=len(tasks)):
