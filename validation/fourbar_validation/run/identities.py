@@ -219,7 +219,8 @@ def compare_status(
         in_line = reference.drive_condition < IN_ONE_LINE
         differ |= (formulas.status_code == OVERFLOW) & moves & in_line
         differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (reference.drive_condition > NEAR)
-    if sines is not None and len(near := np.flatnonzero(_mark_near(scene, formulas, reference))):
+    close = mark_touching(scene.linkage, formulas.theta_2) | (reference.condition < NEAR) | (formulas.condition < NEAR)
+    if sines is not None and len(near := np.flatnonzero(close)):  # where exact arithmetic has to decide
         sine = np.abs(sines(near))
         closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR
         differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes
@@ -235,12 +236,6 @@ def compare_status(
     if differ.any():
         reason = f"{wrong} positions differ, the first is {formulas.status[index]}; {reason}"
     return question.row("status", float(wrong) * differ, 0.0, reason, theta_2=formulas.theta_2)
-
-
-def _mark_near(scene: Scene, formulas: Solution, reference: Solution) -> Mask:
-    """Where bars 3 and 4 are so nearly in line that exact arithmetic has to decide, (n,)."""
-    close = mark_touching(scene.linkage, formulas.theta_2)
-    return np.asarray(close | (reference.condition < NEAR) | (formulas.condition < NEAR))
 
 
 def _mark_large(scene: Scene, reference: Solution) -> Mask:

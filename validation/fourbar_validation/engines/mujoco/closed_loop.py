@@ -185,10 +185,6 @@ class ClosedLoop(Assembled):
         else:
             self.data.qfrc_applied[TURNED_BY[drive_bar]] += size
 
-    def keeps_centre(self, name: str) -> bool:
-        """Tell whether the compiler left a bar's mass centre where the file has it, and not at the bar's origin."""
-        return int(self.model.body_sameframe[self.body[name]]) != int(mujoco.mjtSameFrame.mjSAMEFRAME_BODY)
-
     def bad(self) -> int:
         """Count warnings of a bad position, velocity or acceleration: each resets the data."""
         return sum(int(self.data.warning[kind].number) for kind in WARNINGS)

@@ -192,16 +192,13 @@ class CostStudy:
         setting_value: float = math.nan,
     ) -> CostPoint:
         """Make a point of a method that answers each position by itself."""
-        per_revolution = self._count_positions_per_revolution()
+        span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
+        per_revolution = 2.0 * math.pi / span * max(len(self.command.theta_2) - 1, 1)
         reference, (seconds, scatter) = self._time_rk4_step(), summarise_timings(times)
         cost = seconds / n * per_revolution
         return CostPoint(
             name, kind, label, setting_value, n, per_revolution, *found, cost, seconds / n, cost / reference, scatter
         )
-
-    def _count_positions_per_revolution(self) -> float:
-        span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
-        return 2.0 * math.pi / span * max(len(self.command.theta_2) - 1, 1)
 
     def _time_rk4_step(self) -> float:
         try:

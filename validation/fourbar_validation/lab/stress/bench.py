@@ -45,7 +45,7 @@ from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    pass
 
 Array = NDArray[np.float64]
 
@@ -147,7 +147,10 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
     title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {name_machine()}"
     console.print(make_table(("what", "measured", "needed", ""), rows, title=title))
     for title, times in ((OVER_POSITIONS, result.over_positions), (OVER_LINKAGES, result.over_linkages)):
-        console.print(_make_table(title, times))
+        counts = sorted({n for own in times.values() for n in own})
+        head = ["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)]
+        each = [[who, *(f"{own[n]:.4g}" if n in own else "" for n in counts)] for who, own in times.items()]
+        console.print(make_table(head, each, title=title))
     for who, reason in result.not_run.items():
         click.echo(f"not run: {who}: {reason}")
     if picture is not None:
@@ -155,13 +158,6 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
     for what in broken:
         click.echo(f"fails: {what}")
     return FAILED if broken else HOLDS
-
-
-def _make_table(title: str, times: Times) -> "Table":
-    """Lay out one row for each contender, one column for each count."""
-    counts = sorted({n for own in times.values() for n in own})
-    rows = [[who, *(f"{own[n]:.4g}" if n in own else "" for n in counts)] for who, own in times.items()]
-    return make_table(["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)], rows, title=title)
 
 
 def print_comparison(revision: str, positions: int, rounds: int) -> int:

@@ -81,7 +81,10 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
         tally.no_torque += 1
         return
     (values, exact), found, numbers = compute_exact_slopes(scene), differentiate(scene, library), list_numbers(scene)
-    moves = {name: _moves(by, numbers) for name, by in exact.items()}
+    moves = {  # sum |x_i dy/dx_i|
+        name: math.fsum(abs(number * float(by[key][0].mid())) for key, number in numbers.items())
+        for name, by in exact.items()
+    }
     if library != "numpy" and np.isnan(found["sin_mu"]).any() and is_untold(values["sin_mu"], moves["sin_mu"]):
         tally.untold += 1
         return
@@ -94,8 +97,3 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
                 value, rate = exact[component][key]
                 rate += together / (abs(number) or 1.0)
                 tally.note(component, compute_ratio("", np.ravel(row)[index], value, rate)[0], f"{sample} by {key}")
-
-
-def _moves(slopes: dict[str, tuple[Any, float]], numbers: dict[str, float]) -> float:
-    """Compute sum |x_i dy/dx_i|."""
-    return math.fsum(abs(number * float(slopes[key][0].mid())) for key, number in numbers.items())
