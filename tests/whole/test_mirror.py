@@ -60,7 +60,7 @@ JUDGED_BY = {
     "validation/engines/test_added_guests.py": "validation/engines: checked output workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects free_body_stroke",
     "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
-    "validation/compare: nearby; validation/engines: exact; validation/engines/mujoco: shipped; "
+    "validation/engines: exact; validation/engines/mujoco: shipped; "
     "validation/report: hard_page",
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives led monitor motions runner",
     "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls sensitivities equilibria files "
