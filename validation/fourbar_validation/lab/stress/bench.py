@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import click
 import numpy as np
@@ -43,9 +43,6 @@ from fourbar_validation.report.terminal import make_table
 from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
-
-if TYPE_CHECKING:
-    pass
 
 Array = NDArray[np.float64]
 
