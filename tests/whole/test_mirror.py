@@ -77,7 +77,7 @@ JUDGED_BY = {
     "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
     "templating",
     # studies: each through its command
-    "validation/lab/stress/test_bench.py": "validation/lab/stress: against contenders speed_limits timed",
+    "validation/lab/stress/test_bench.py": "validation/lab/stress: against contenders timed",
     "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families "
     "libraries slopes tally",
     "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
