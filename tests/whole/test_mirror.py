@@ -83,7 +83,7 @@ JUDGED_BY = {
     "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
     "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: code_mutants harness",
     "validation/lab/stress/mutation/test_faults.py": "validation/lab/stress/mutation: fault_scenes injection",
-    "validation/lab/cost/test_cost.py": "validation/lab/cost: series formulas laws orders pictures study; "
+    "validation/lab/cost/test_cost.py": "validation/lab/cost: series formulas laws pictures study; "
     "validation/advise: worst_errors; validation/engines/mujoco: one_state",
     "validation/advise/test_advise.py": "validation/advise: matters; validation/lab/cost: exhaustive measure; "
     "validation/run: required_error; validation/engines/mujoco: trial",

@@ -21,11 +21,11 @@ from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.one_state import MujocoOneState
 from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
 from fourbar_validation.engines.pinocchio_forward import PinocchioForward
-from fourbar_validation.lab.cost import formulas, laws, orders, pictures, study
+from fourbar_validation.lab.cost import formulas, laws, pictures, study
 from fourbar_validation.lab.cost.cost import cost, list_front
 from fourbar_validation.lab.cost.series import BEST
-from fourbar_validation.lab.stress.bench import LINKAGE
 from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
+from fourbar_validation.lab.stress.timed import LINKAGE
 from tests.support.scenes import crank_rocker, thesis
 
 
@@ -220,8 +220,8 @@ def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping: tuple[float
     assert {name for name, law in found.items() if not law.holds} == {"F43"} and found["F43"].decided
     jump = f"jumps from 4.0e-03 to {jumping[5]:.1e} at 640/rev"
     assert laws.list_warnings({"Euler, tc held": ladder}) == [f"Euler, tc held: F43: {jump}"]
-    assert "F43 jumps" in orders.write_statement({"Euler, tc held": ladder})
-    drawn = {line.get_gid(): len(line.get_xdata()) for axes in orders.draw_picture({"Euler, tc held": ladder}, "").axes
+    assert "F43 jumps" in pictures.state_jumps({"Euler, tc held": ladder})
+    drawn = {line.get_gid(): len(line.get_xdata()) for axes in pictures.draw_orders({"Euler, tc held": ladder}, "").axes
              for line in axes.lines if line.get_gid() and len(line.get_xdata())}  # fmt: skip
     assert drawn == {"jump-F43": 1}
     (line,) = laws.write_laws(list(found.values()))
@@ -244,7 +244,7 @@ def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported() -> 
     assert laws.list_warnings({"Euler, tc held": ladder}) == [
         "Euler, tc held: no timestep of the ladder brings F12 below 0.1"
     ]
-    assert orders.write_statement({"Euler, tc held": ladder}) == "No time step brings F12 below 0.1 with Euler"
+    assert pictures.state_jumps({"Euler, tc held": ladder}) == "No time step brings F12 below 0.1 with Euler"
 
 
 def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump() -> None:

@@ -111,8 +111,7 @@ class ClosedLoop(Assembled):
     def carried(self) -> dict[str, Array]:
         """Read the force of the parent on each bar and all that the bar carries, world axes, N.
 
-        That is cfrc_int, but MuJoCo counts the forces
-        of actuators on sites into it; they are taken out again. Those of tendons it keeps apart.
+        That is cfrc_int without the forces of actuators on sites, which MuJoCo counts into it, unlike those of tendons.
         """
         d = self.data
         on = {name: d.cfrc_int[body][3:5].copy() for name, body in self.body.items()}
@@ -196,14 +195,10 @@ def solve_couple_elsewhere(
     """Solve for what accelerates the crank as before; None where it does not move the crank.
 
     That is a couple on bar 3 or 4, or the force of the actuator between the cylinder's two sites. The accelerations are
-    linear in it; two trials give it, and `light` is left at a third, to be read.
+    linear in it; two trials of the size of the crank's torque (T2, N m) give it, and `light`, the same linkage with a
+    light flywheel, is left at a third, to be read.
 
-    Parameters
-    ----------
-    loop : at the simulated state.
-    light : the same linkage with a light flywheel.
-    alpha_2 : what the flywheel's motor was given, rad/s^2.
-    crank_torque : T2 at that state, N m: the size of the trials.
+    `alpha_2`: what the flywheel's motor was given, rad/s^2.
     """
     d = light.data
     d.qpos[:], d.qvel[:] = loop.data.qpos[: d.qpos.size], loop.data.qvel[: d.qvel.size]  # a drive may have its own
