@@ -26,6 +26,7 @@ from fourbar_validation.scenes.suites import read_scene_files
 DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
 WANTED = (1e-3, 1e-6)
 """Errors whose price the table of several scenes has."""
+HEAD = ("setting", "error", "RK4 steps", "ms/turn", "+-")
 
 
 @click.command(name="cost")
@@ -54,8 +55,10 @@ def cost(scenes: tuple[Path, ...], out: Path) -> int:
         ranked = measure_influences(scene, setup, BEST)
         fitted += [law for law in result if law.decided]
         written = write(study, curves, result, scene.title or name)
-        click.echo(write_summary(name, curves, result, study.left_out))
-        click.echo(write_sentence(ranked))
+        Console().print(make_table(HEAD, list_front(curves), title=f"{name}: what accuracy costs"))
+        lines = [*write_laws(result), *(f"warning: {line}" for line in list_warnings(curves))]
+        lines += [*(f"left out: {line}" for line in study.left_out), write_sentence(ranked)]
+        click.echo("\n".join(lines))
         held = sum(law.holds for law in result if law.decided)
         most = ranked[0].setting if ranked[0].times >= MATTERS else "none by itself"
         rows.append((name, *find_cheapest(curves), f"{held} of {sum(law.decided for law in result)}", most))
@@ -80,6 +83,7 @@ def write(
         "setup": describe_setup(),
         "pictures": [path.stem for path in pictures if path.suffix == ".svg"],
         "laws": write_laws(found),
+        "head": HEAD,
         "front": list_front(curves),
         "warnings": list_warnings(curves),
         "left_out": study.left_out,
@@ -99,15 +103,6 @@ def write_subtitle(scene: Scene, title: str) -> str:
     return f"{title}{omega}{', ' + ' and '.join(acting) if acting else ''}"
 
 
-def write_summary(
-    name: str, curves: Mapping[str, Sequence[CostPoint]], found: Sequence[ErrorLaw], left_out: Sequence[str]
-) -> str:
-    """Summarise the study for the terminal."""
-    text = [f"{name}: what accuracy costs", "", *list_front(curves), "", *write_laws(found), ""]
-    text += [f"warning: {line}" for line in list_warnings(curves)]
-    return "\n".join((*text, *(f"left out: {line}" for line in left_out)))
-
-
 def find_cheapest(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     """Find the least work of a revolution, in RK4 steps, for each of WANTED; a dash where nothing reaches it."""
     points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
@@ -115,19 +110,12 @@ def find_cheapest(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     return [f"{min(steps):.0f}" if steps else "-" for steps in work]
 
 
-def list_front(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
-    """List the Pareto front of everything stepped, by the worse of torque and force."""
+def list_front(curves: Mapping[str, Sequence[CostPoint]]) -> list[tuple[str, ...]]:
+    """List the Pareto front of everything stepped, by the worse of torque and force, under HEAD."""
     points = [p for name, row in curves.items() if "slow" not in name for p in row if p.kind == STEPPED]
-    head = f"{'error':>8} {'RK4 steps':>10} {'ms/turn':>8} {'+-':>5}  setting"
-    front = find_pareto(points, "worst")
-    rows = [
-        f"{p.worst:8.0e} {p.rk4_steps:10.0f} {1e3 * p.seconds_per_revolution:8.2f} {write_percent(p.scatter):>5}  "
-        f"{p.curve}: {p.setting}"
-        for p in front
-    ]
-    return [head, *rows]
-
-
-def write_percent(scatter: float) -> str:
-    """Format the scatter of timings; a dash where there was one."""
-    return "-" if math.isnan(scatter) else f"{100.0 * scatter:.0f} %"
+    rows: list[tuple[str, ...]] = []
+    for p in find_pareto(points, "worst"):
+        scatter = "-" if math.isnan(p.scatter) else f"{100.0 * p.scatter:.0f} %"  # a dash where there was one timing
+        of_work = f"{p.rk4_steps:.0f}", f"{1e3 * p.seconds_per_revolution:.2f}", scatter
+        rows.append((f"{p.curve}: {p.setting}", f"{p.worst:.0e}", *of_work))
+    return rows
