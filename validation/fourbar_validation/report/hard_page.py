@@ -13,7 +13,7 @@ from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, divide, find_condition, find_error, magnitude
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES
-from fourbar_validation.engines.limits import LIMITS, Boundary
+from fourbar_validation.engines.limits import LIMITS
 from fourbar_validation.engines.prediction import predict_in_world_axes
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.colours import choose_style
@@ -140,9 +140,5 @@ def write_page(svg: str) -> str:
         svg=shrink_svg(svg),
         source=base64.b64encode(svg.encode()).decode("ascii"),
         families=[(family.name, family.statement) for family in FAMILIES],
-        limits=[(each.engine, each.of.name, _write_boundary(each.of), each.of.reason) for each in LIMITS],
+        limits=[(of.engine, of.name, f"{of.boundary:g} {of.unit}".rstrip(), of.reason) for of in LIMITS],
     )
-
-
-def _write_boundary(of: Boundary) -> str:
-    return f"{of.boundary:g}" + (f" {of.unit}" if of.unit != "1" else "")
