@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from fourbar.linkage import Bar
@@ -97,7 +98,8 @@ def _centre_kept(r: float) -> bool:
     """Whether the compiled MJCF places a mass centre at this distance from its pin where it was put."""
     base = _base()
     scene = replace_bars(base, output=replace(base.linkage.output, centre=(r, 0.5)))
-    return ClosedLoop(write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False)).keeps_centre("output")
+    loop = ClosedLoop(write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False))
+    return bool(loop.model.body_sameframe[loop.body["output"]] != mujoco.mjtSameFrame.mjSAMEFRAME_BODY)
 
 
 def _proximal(mu: float) -> bool:

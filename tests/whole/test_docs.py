@@ -27,7 +27,7 @@ from fourbar.files.effects import REGISTRY
 from fourbar_validation.cli import COMMANDS, group
 from fourbar_validation.cli import status as harness
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.lab.effects.work import EFFECTS
+from fourbar_validation.lab.effects import EFFECTS
 from fourbar_validation.scenes.suites import read_suite
 
 ROOT = Path(__file__).parents[2]

@@ -60,7 +60,7 @@ JUDGED_BY = {
     "validation/engines/test_added_guests.py": "validation/engines: checked output workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects free_body_stroke",
     "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
-    "validation/compare: nearby; validation/engines: exact; validation/engines/mujoco: shipped; "
+    "validation/engines: exact; validation/engines/mujoco: shipped; "
     "validation/report: hard_page",
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives led monitor motions runner",
     "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls sensitivities equilibria files "
@@ -77,18 +77,16 @@ JUDGED_BY = {
     "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
     "templating",
     # studies: each through its command
-    "validation/lab/stress/test_bench.py": "validation/lab/stress: against bench_picture contenders in_c "
-    "speed_limits timed",
+    "validation/lab/stress/test_bench.py": "validation/lab/stress: against contenders timed",
     "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families "
     "libraries slopes tally",
     "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
     "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: code_mutants harness",
     "validation/lab/stress/mutation/test_faults.py": "validation/lab/stress/mutation: fault_scenes injection",
-    "validation/lab/cost/test_cost.py": "validation/lab/cost: series formulas laws orders pictures study; "
+    "validation/lab/cost/test_cost.py": "validation/lab/cost: series formulas laws pictures study; "
     "validation/advise: worst_errors; validation/engines/mujoco: one_state",
     "validation/advise/test_advise.py": "validation/advise: matters; validation/lab/cost: exhaustive measure; "
     "validation/run: required_error; validation/engines/mujoco: trial",
-    "validation/lab/effects/test_cost.py": "validation/lab/effects: table work; validation/engines/mujoco: stepping",
     # simulators that need not be there: their scripts run where they are installed
     "validation/lab/simulators/test_simulators.py": "validation/lab/simulators: drake_sap examine exudyn_simulated "
     "genesis_rigid gradients motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco "

@@ -13,8 +13,9 @@ from fourbar.formulas.arithmetic import cross, dot
 from fourbar.formulas.path import compute_state as state_of
 from fourbar.formulas.path import drive_sine
 from fourbar.formulas.pin_forces import Wrenches, solve_between
-from fourbar_validation.lab.stress.bench import make_bodies, make_command, make_example
-from fourbar_validation.published.thirteen import assemble, solve_thirteen
+from fourbar.linkage import MOVING_BARS
+from fourbar_validation.lab.stress.timed import make_command, make_example
+from fourbar_validation.published.thirteen import FreeBodies, assemble, solve_thirteen
 
 EPS = 2.0**-52
 SOLVED = 1e-11
@@ -26,6 +27,22 @@ GROWN = 1e-13
 """Relative, divided by the drive's condition: two evaluations of some hundred roundings each."""
 PRINTED = 5e-14
 """Relative: the thesis's case recomputed in doubles elsewhere, printed to 16 digits."""
+
+
+def make_bodies(case: fourbar.Scene, at: fourbar.scene.Command) -> FreeBodies:
+    """The right-hand sides of the thirteen equations from the kinematics, under gravity alone."""
+    s = fourbar.solve(case, "acceleration", at=at)
+    gravity = np.array(next((each.vector for each in case.effects if isinstance(each, fourbar.Gravity)), (0.0, 0.0)))
+    first = {2: np.zeros_like(s.A), 3: s.A, 4: np.full_like(s.A, (case.linkage.ground, 0.0))}
+    second = {2: s.A, 3: s.B, 4: s.B}
+    bars = {k: case.linkage.bar(k) for k in MOVING_BARS}
+    centre = {k: getattr(s, f"G{k}") for k in MOVING_BARS}
+    return FreeBodies(
+        {k: first[k] - centre[k] for k in MOVING_BARS},
+        {k: second[k] - centre[k] for k in MOVING_BARS},
+        {k: bars[k].mass * (getattr(s, f"a_G{k}") - gravity) for k in MOVING_BARS},
+        {k: bars[k].moment_of_inertia * getattr(s, f"alpha_{k}") for k in MOVING_BARS},
+    )
 
 
 def scene(drive_bar: int) -> fourbar.Scene:

@@ -136,7 +136,7 @@ def hopeless(scene: fourbar.Scene) -> object:
 def test_a_count_that_cannot_decide_says_which_one_can(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    case = measure.AdviceCase(0, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
+    case = measure.AdviceCase(0, 1e-3, True, 5e-4, 20.0, 19.0)
     monkeypatch.setattr(measure, "measure_case", lambda seed, index, costs: replace(case, index=index))
     monkeypatch.setattr(measure, "time_relative_costs", lambda setup: {})
     for count, status in ((40, 1), (73, 0)):
@@ -150,7 +150,7 @@ def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
     def case(seed: int, index: int, costs: object) -> measure.AdviceCase:
         made.append(index)
-        return measure.AdviceCase(index, "drag-link", 1.0, True, 2, 1e-3, True, 5e-4, 20.0, 19.0, 5)
+        return measure.AdviceCase(index, 1e-3, True, 5e-4, 20.0, 19.0)
 
     monkeypatch.setattr(measure, "measure_case", case)
     monkeypatch.setattr(measure, "time_relative_costs", lambda setup: {})

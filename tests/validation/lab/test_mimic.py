@@ -33,7 +33,7 @@ def test_the_command_writes_its_page(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert status(["cost", "--mimic", str(BONNET), "-o", str(out)]) == 0
     text, kept = out.read_text(), (ROOT / "docs" / "examples" / "mimic.md").read_text()
     about = text.partition("| scene")[0]
-    assert about == kept.partition("| scene")[0] and text.count("| bonnet_hinge |") == 3
+    assert about == kept.partition("| scene")[0] and text.count("| bonnet\\_hinge |") == 3
     capsys.readouterr()
     still = tmp_path / "still.toml"
     still.write_text(BONNET.read_text().replace('omega_2 = "-20 deg/s"', 'omega_2 = "0 deg/s"'))

@@ -51,10 +51,8 @@ def order_causes(
 ) -> list[Cause]:
     """Order differences by their shares, the one whose correction gains most first; the others keep their order.
 
-    Parameters
-    ----------
-    before : rows of the file as it is.
-    after : for each difference, rows of the file with that one mended; empty where it was not.
+    `before`: rows of the file as it is.
+    `after`: for each difference, rows of the file with that one mended; empty where it was not.
     """
     errors = _collect_errors(before)
     result = []

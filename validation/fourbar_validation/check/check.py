@@ -14,6 +14,7 @@ from fourbar_validation.check.judgement import Judgement, judge_table, write_jso
 from fourbar_validation.check.mistakes import NEARER, Explanation
 from fourbar_validation.check.theirs import TheirTable, read_table
 from fourbar_validation.compare.rows import make_plain
+from fourbar_validation.report.terminal import make_table
 
 SHOWN = 3
 
@@ -28,14 +29,6 @@ def write_extent(explanation: Explanation) -> str:
     if explanation.nearer:
         parts.append(", ".join(explanation.nearer) + f" then at least {NEARER:g} times nearer")
     return "; ".join(parts)
-
-
-def read_tolerance(rtol: float | None, atol: float | None) -> Allowance | None:
-    """Read the tolerance of the options; None where they give none."""
-    for option, value in (("--rtol", rtol), ("--atol", atol)):
-        if value is not None and not 0.0 <= value < math.inf:
-            raise InputError(option, value, "must be a finite number >= 0")
-    return None if rtol is None and atol is None else Allowance(rtol or 0.0, atol or 0.0)
 
 
 @click.command()
@@ -59,7 +52,11 @@ def check(
     for path in (json, junit):
         if path is not None:
             require_file(path, scene, theirs)
-    judgement = judge_table(load(scene), table, read_tolerance(rtol, atol))
+    for option, value in (("--rtol", rtol), ("--atol", atol)):
+        if value is not None and not 0.0 <= value < math.inf:
+            raise InputError(option, value, "must be a finite number >= 0")
+    tolerance = None if rtol is None and atol is None else Allowance(rtol or 0.0, atol or 0.0)
+    judgement = judge_table(load(scene), table, tolerance)
     if json is not None:
         write_text(json, write_json(judgement, table))
     if junit is not None:
@@ -70,10 +67,8 @@ def check(
 
 def show(judgement: Judgement, table: TheirTable, name: str) -> None:
     """Print what differs, what explains it, and the count."""
-    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
-    from rich.table import Table
 
     console = Console(soft_wrap=True)
     for why in dict.fromkeys(table.left_out.values()):
@@ -82,15 +77,10 @@ def show(judgement: Judgement, table: TheirTable, name: str) -> None:
     differing = judgement.differing
     if differing:
         title = f"{escape(make_plain(name))}: what differs, the {SHOWN} worst of each quantity"
-        shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
-        for heading in ("line", "theta_2\ndeg", "quantity", "theirs", "ours", "error", "allowed"):
-            shown.add_column(heading, justify="right")
-        for finding in choose_worst(differing):
-            theirs, ours = write_in_their_unit(finding, table)
-            numbers = (theirs, ours, f"{finding.error:.1e}", f"{finding.allowed:.1e}")
-            where = f"{math.degrees(finding.theta_2):.7g}"
-            shown.add_row(str(finding.line), where, escape(write_with_unit(finding, table)), *numbers)
-        console.print(shown)
+        head = ("line", "theta_2\ndeg", "quantity", "theirs", "ours", "error", "allowed")
+        rows = [(str(each.line), f"{math.degrees(each.theta_2):.7g}", *write_in_their_unit(each, table),
+                 f"{each.error:.1e}", f"{each.allowed:.1e}") for each in choose_worst(differing)]  # fmt: skip
+        console.print(make_table(head, rows, title=title, show_edge=False, padding=(0, 1, 0, 0)))
         counted = Counter(finding.quantity for finding in differing)
         console.print("in all: " + ", ".join(f"{count} of {quantity}" for quantity, count in counted.items()))
     for line in judgement.not_assembled:
@@ -111,18 +101,10 @@ def choose_worst(differing: list[Discrepancy]) -> list[Discrepancy]:
     return [finding for findings in by_quantity.values() for finding in findings[:SHOWN]]
 
 
-def write_with_unit(finding: Discrepancy, table: TheirTable) -> str:
-    """Write the quantity with the unit of their column."""
-    return f"{finding.quantity} [{make_plain(table.units[_make_key(finding, table)].text)}]"
-
-
-def write_in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, str]:
-    """Write both numbers in the unit of their column, with the digits that set them apart."""
-    factor = table.units[_make_key(finding, table)].factor
-    theirs, ours = ([x / factor for x in numbers] for numbers in (finding.theirs, finding.ours))
+def write_in_their_unit(finding: Discrepancy, table: TheirTable) -> tuple[str, ...]:
+    """Write the quantity with the unit of their column, and both numbers in it with the digits that set them apart."""
+    unit = table.units[next(key for key in table.values if table.label(key) == finding.quantity)]
+    theirs, ours = ([x / unit.factor for x in numbers] for numbers in (finding.theirs, finding.ours))
     digits = next((d for d in (4, 6, 9, 12) if any(f"{a:.{d}g}" != f"{b:.{d}g}" for a, b in zip(theirs, ours))), 15)  # noqa: B905
-    return tuple(", ".join(f"{x:.{digits}g}" for x in numbers) for numbers in (theirs, ours))  # type: ignore[return-value]
-
-
-def _make_key(finding: Discrepancy, table: TheirTable) -> str:
-    return next(key for key in table.values if table.label(key) == finding.quantity)
+    written = (", ".join(f"{x:.{digits}g}" for x in numbers) for numbers in (theirs, ours))
+    return f"{finding.quantity} [{make_plain(unit.text)}]", *written

@@ -110,11 +110,6 @@ def _round_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | Non
     return (f"every number is {near:.6g} times ours", near) if judge.explained(key, near * judge.ours(key)) else None
 
 
-def _compute_change(judge: Judge, wrong: Solution, keys: list[str]) -> Array:
-    """Compute what a changed scene adds to the right numbers, each quantity over its scale, in one line."""
-    return np.concatenate([_compute_residual(judge, key, judge.ours(key, wrong), judge.ours(key)) for key in keys])
-
-
 def _compute_residual(judge: Judge, key: str, one: Array, other: Array) -> Array:
     scale = judge.size(key)
     where = judge.where(key) & (scale > 0.0)
@@ -139,7 +134,8 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
             return replace_bars(scene, **{bar: change(getattr(scene.linkage, bar), f) for bar in which})
 
         try:
-            moves = _compute_change(judge, solve(scaled(2.0), "force", at=judge.at), keys)
+            twice = solve(scaled(2.0), "force", at=judge.at)
+            moves = np.concatenate([_compute_residual(judge, k, judge.ours(k, twice), judge.ours(k)) for k in keys])
             slope = float(moves @ moves)
             factor = 1.0 + float(moves @ theirs) / slope if slope else math.nan
             if not 0.0 < factor < math.inf or factor == 1.0:

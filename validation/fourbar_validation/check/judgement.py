@@ -98,16 +98,12 @@ def write_json(judgement: Judgement, table: TheirTable) -> str:
         "left_out": table.left_out,
         "lines_without_motion": judgement.not_assembled,
         "differing": [
-            {name: value if _is_json(value) else None for name, value in asdict(finding).items()}
+            {name: None if isinstance(x, float) and not math.isfinite(x) else x for name, x in asdict(finding).items()}
             for finding in judgement.differing
         ],
         "explanations": [asdict(explanation) for explanation in judgement.explanations],
     }
     return json.dumps(result, indent=1, allow_nan=False) + "\n"
-
-
-def _is_json(value: object) -> bool:
-    return not isinstance(value, float) or math.isfinite(value)
 
 
 def write_junit(judgement: Judgement, name: str) -> str:

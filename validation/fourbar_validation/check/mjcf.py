@@ -31,6 +31,7 @@ from fourbar_validation.compare.rows import Row, make_plain, write_results
 from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, hold_simulated
 from fourbar_validation.engines.memory import WORKER_MEMORY, bound_memory
 from fourbar_validation.report.templating import render, write_number
+from fourbar_validation.report.terminal import make_table
 from fourbar_validation.scenes.suites import read_scene_files
 
 SECONDS = 120.0
@@ -163,11 +164,9 @@ def _examine(adapter: str, *arguments: object) -> Any:
 
 def show(report: ModelReport, mjcf: Path, out: Path) -> None:
     """Print the report and write theirs.md and results.csv."""
-    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
     from rich.padding import Padding
-    from rich.table import Table
 
     console = Console()
     if not report.causes:
@@ -183,14 +182,11 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
     for note in report.notes:
         console.print(f"note: {escape(make_plain(note))}")
     for method in report.methods():
-        costs = Table(title=f"what it costs, {escape(make_plain(method))}: error", box=SIMPLE_HEAD, pad_edge=False)
-        for heading in HEADINGS:
-            costs.add_column(heading, overflow="fold")
-        for cost in report.costs:
-            if cost.method == method:
-                style = "bold red" if cost.row.failed else ""
-                costs.add_row(*(escape(make_plain(text)) for text in cost.cells()), style=style)
-        console.print(costs)
+        costs = [cost for cost in report.costs if cost.method == method]
+        table = make_table(HEADINGS, (cost.cells() for cost in costs), title=f"what it costs, {escape(method)}: error")
+        for shown, cost in zip(table.rows, costs, strict=True):
+            shown.style = "bold red" if cost.row.failed else ""
+        console.print(table)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "theirs.md", write_markdown(report, mjcf))
     write_results([cost.row for cost in report.costs], out / "results.csv")

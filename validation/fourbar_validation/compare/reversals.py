@@ -95,10 +95,8 @@ def break_curve(
 ) -> tuple[Array, Array]:
     """Give a curve, (n,), both ends of each jump and NaN between them: no line is drawn across.
 
-    Parameters
-    ----------
-    theta_2, values : the curve at the positions of the solution, rad.
-    value : what the curve shows of a solution.
+    `theta_2` and `values`: the curve at the positions of the solution, rad.
+    `value`: what the curve shows of a solution.
     """
     for jump in sorted(jumps, key=lambda jump: -jump.position):
         after = jump.position + 1

@@ -94,8 +94,6 @@ POWER = {
 """By unit: angles and positions lose digits as 1/s, everything that follows from them as 1/s^2."""
 OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2"))
 """Quantities that the input alone decides: they lose none."""
-
-
 TOUCHING_MARGIN = 32.0 * EPS
 """A loop that closes, or misses, by less than this part of the sum of its lengths does so by the
 rounding of the data, and the engines may differ on whether it closes."""

@@ -140,9 +140,7 @@ def list_unknowns(scene: Scene, names: Iterable[str] = UNKNOWNS) -> list[str]:
 def find_unknown(scene: Scene, table: Container[str], *, linear: bool = False) -> str:
     """Give the reason to refuse a scene with an effect that a table has no row for; empty where there is none.
 
-    Parameters
-    ----------
-    linear : whether a drive along a line is known.
+    `linear`: whether a drive along a line is known.
     """
     if scene.drive is not None and scene.motion.free is None and not linear:
         return "the linear drive (drive.from, drive.to) has no model here"

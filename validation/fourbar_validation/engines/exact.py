@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import Flywheel, Friction, Gravity, Springs, Torsion, Viscous
+from fourbar.formulas.many_digits import DIGITS
 from fourbar.linkage import FourBar
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED
+from fourbar_validation.compare.tolerance import EPS, ROUNDINGS
 from fourbar_validation.engines.description import SHARED, find_unknown, list_speeds
 from fourbar_validation.engines.loop import make_blank
 
@@ -47,7 +49,9 @@ class BallArithmetic:
             if values is None:
                 continue
             assembled[i] = True
-            _put(out, i, values)
+            for name, array in out.items():
+                axes = ("_x", "_y") if name in VECTORS else ("",)
+                array[i] = np.squeeze([_to_double(values.get(name + axis)) for axis in axes])
         return Answer(
             NAME,
             "exact",
@@ -72,18 +76,29 @@ def compute_sines(linkage: FourBar, command: Command) -> Array:
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         closed = closure(x | {"theta_2": arb(theta_2)}, branch)
         # with A on O4 bars 3 and 4 have no direction
-        result[i] = math.nan if closed is None else np.nan_to_num(_count_solutions(wedge(*closed[1:])))
+        result[i] = math.nan if closed is None else np.nan_to_num(_to_double(wedge(*closed[1:])))
     return result
 
 
-def _put(out: dict[str, Array], i: int, values: dict[str, Any]) -> None:
-    """Write the numbers of one position into those of all."""
-    for name, array in out.items():
-        if name in VECTORS:
-            array[i] = _count_solutions(values.get(f"{name}_x")), _count_solutions(values.get(f"{name}_y"))
-        else:
-            array[i] = _count_solutions(values.get(name))
+def shift_to(linkage: FourBar, theta_2: float, sin_mu: float) -> Any:
+    """Compute what to add to theta_2 (mpmath, rad) for sin(theta_4 - theta_3) to be +-sin_mu; None if beyond rounding.
+
+    The diagonal e from A to O4 has d^2 + a^2 - 2 a d cos(theta_2 - theta_1) = e^2 = b^2 + c^2 -+ 2 b c cos(mu).
+    """
+    from mpmath import mp, mpf
+
+    with mp.workdps(DIGITS):
+        d, a, b, c = map(mpf, linkage.lengths)
+        theta_1, shifts = mpf(linkage.ground_angle), []
+        cos_mu = mp.sqrt(max(1 - mpf(sin_mu) ** 2, 0))
+        for side in (2 * b * c * cos_mu, -2 * b * c * cos_mu):
+            cosine = (d * d + a * a - b * b - c * c + side) / (2 * a * d)
+            if abs(cosine) <= 1:
+                shifts += [theta_1 + sign * mp.acos(cosine) - theta_2 for sign in (1, -1)]
+        shifts = [shift - 2 * mp.pi * mp.nint(shift / (2 * mp.pi)) for shift in shifts]
+        nearest = min(shifts, key=abs, default=mp.inf)
+        return nearest if abs(nearest) <= ROUNDINGS * EPS * max(1.0, abs(theta_2), abs(linkage.ground_angle)) else None
 
 
-def _count_solutions(ball: Any) -> float:
+def _to_double(ball: Any) -> float:
     return math.nan if ball is None else float(ball.mid())

@@ -157,13 +157,7 @@ def _place_line(scene: Scene, motion: BodyMotion) -> DriveLine | None:
 
 
 def move(
-    linkage: FourBar,
-    theta_2: Array,
-    speed: Array,
-    acceleration: Array,
-    theta_3: Array,
-    theta_4: Array,
-    bar: int = 2,
+    linkage: FourBar, theta_2: Array, speed: Array, acceleration: Array, theta_3: Array, theta_4: Array, bar: int = 2
 ) -> BodyMotion:
     """Compute speeds and accelerations where those of a bar are stated; NaN where the Jacobian is singular."""
     d, a, b, c = linkage.lengths

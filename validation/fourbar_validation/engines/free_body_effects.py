@@ -91,8 +91,6 @@ class BodyWrenches:
 
 MEET = 16.0 * 2.0**-52
 """Two points nearer than this part of the lengths by which they are reached lie in one."""
-
-
 FOLLOWED = np.radians(2.0)
 """Step in which angles are followed from where a motion begins, rad."""
 
@@ -153,15 +151,11 @@ def _apply_flywheel(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> 
     wrenches.twist(effect.bar, -effect.inertia * motion.alpha[effect.bar])
 
 
-def _apply_nothing(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
-    """Nothing: it depends on the pin forces, and is solved with them."""
-
-
 WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
     "gravity": _apply_gravity,
     "viscous": _apply_viscous,
     "friction": _apply_friction,
-    "pin_friction": _apply_nothing,
+    "pin_friction": lambda *_: None,  # it depends on the pin forces, and is solved with them
     "torsion": _apply_torsion,
     "springs": _apply_springs,
     "flywheel": _apply_flywheel,

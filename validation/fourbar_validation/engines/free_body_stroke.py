@@ -25,9 +25,7 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
 def find_angle(command: Command, motion: Motion, arm: complex, ground: complex) -> Command:
     """Find the bar's angle where its cylinder has the stroke, on the side that is stated, and its rates.
 
-    Parameters
-    ----------
-    arm, ground : as `measure_cylinder` has them, or as an engine measures them.
+    `arm` and `ground`: as `measure_cylinder` has them, or as an engine measures them.
     """
     assert command.stroke is not None
     sense = 1.0 if motion.side == "left" else -1.0

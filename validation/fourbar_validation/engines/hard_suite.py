@@ -1,6 +1,6 @@
 """The hard cases as a suite of a run, and the witnesses with their predictions."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 
 from fourbar.scene import Scene
@@ -10,13 +10,7 @@ from fourbar_validation.engines.prediction import predict_from_data
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.scenes.hard_families import FAMILIES
 
-BALLS = Witness(
-    "ball-arithmetic",
-    BallArithmetic,
-    FULL_ACCURACY,
-    nearby=True,
-    library="flint",
-)
+BALLS = Witness("ball-arithmetic", BallArithmetic, FULL_ACCURACY, nearby=True, library="flint")
 
 
 def hold_fully(witness: Witness) -> Witness:
@@ -29,34 +23,31 @@ def hold_fully(witness: Witness) -> Witness:
 HARD_WITNESSES = tuple(hold_fully(witness) for witness in (BALLS, *WITNESSES))
 
 
-@dataclass(frozen=True, slots=True)
 class Hard:
     """Every scene of every family, by name; a worker makes them again from the parameters alone."""
 
-    families: tuple[str, ...] = tuple(family.name for family in FAMILIES)
-
     def __len__(self) -> int:
-        return len(_make_scenes(self.families))
+        return len(_make_scenes())
 
     def name(self, index: int) -> str:
         """Name a scene; ascending."""
-        return _make_scenes(self.families)[index][0]
+        return _make_scenes()[index][0]
 
     def scene(self, index: int) -> Scene:
         """Return the scene itself."""
-        return _make_scenes(self.families)[index][1]
+        return _make_scenes()[index][1]
 
     def fingerprint(self) -> str:
         """Name the families and count their scenes."""
-        return f"hard {' '.join(self.families)} {len(self)}"
+        return f"hard {' '.join(family.name for family in FAMILIES)} {len(self)}"
 
 
 @cache
-def _make_scenes(families: tuple[str, ...]) -> list[tuple[str, Scene]]:
-    """Make the scenes of some families, by name."""
+def _make_scenes() -> list[tuple[str, Scene]]:
+    """Make the scenes, by name."""
     result = []
     for family in FAMILIES:
-        for label, scene in family.scenes() if family.name in families else ():
+        for label, scene in family.scenes():
             titled = replace(scene, title=f"{family.name}: {label}", source=family.statement)
             result.append((f"{family.name} {label}".replace(" ", "-"), titled))
     return sorted(result, key=lambda pair: pair[0])

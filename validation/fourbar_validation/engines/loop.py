@@ -31,12 +31,8 @@ NOT_ANSWERED = frozenset(
 """What is commanded, follows from others that are answered, or is of the formulas alone."""
 ROUNDING = 16.0 * 2.0**-52
 """Gap, relative to the sum of the lengths, that the roundings of a chain of three bars alone can leave."""
-
-
 Angles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
-
-
 CLOSING = {2: (3, 4), 3: (2, 4), 4: (3, 2)}
 """By the commanded bar the two others, which close the loop: in this order the sine between them is the branch's, and
 they stand on the diagonal between their free ends as bars 3 and 4 do from A to O4; bar 2 from A back to O2."""

@@ -29,12 +29,7 @@ Acceleration = Callable[[Array, Array], Array]
 
 
 class ClosedTree:
-    """A tree with its loop closed at B.
-
-    Parameters
-    ----------
-    time_constant : of the stabilisation, s: Kp = 1/tc^2 and Kd = 2/tc.
-    """
+    """A tree with its loop closed at B; `time_constant`: of the stabilisation, s: Kp = 1/tc^2 and Kd = 2/tc."""
 
     def __init__(self, tree: PinocchioTree, time_constant: float) -> None:
         self.tree = tree
@@ -81,9 +76,7 @@ def make_step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Arr
 class PinocchioForward:
     """One scene, driven at omega_2 by a flywheel, stepped with the classical Runge-Kutta method.
 
-    Parameters
-    ----------
-    time_constant_steps : of the closure's stabilisation, in steps.
+    `time_constant_steps`: of the closure's stabilisation, in steps.
     """
 
     def __init__(self, scene: Scene, command: Command, steps_per_revolution: float, time_constant_steps: float) -> None:

@@ -22,7 +22,7 @@ import numpy as np
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, Array, Mask
+from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, Array, Mask, sum_lengths
 from fourbar_validation.engines.description import find_centre, list_speeds
 
 FIRST_ORDER = 0.1
@@ -37,7 +37,7 @@ def predict_from_data(scene: Scene, at: Command, quantity: str, where: Mask | No
 
 def predict_in_world_axes(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
     """Predict for an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
-    return predict_error(scene, at, quantity, _compute_extent(scene), where)
+    return predict_error(scene, at, quantity, sum_lengths(scene.linkage), where)
 
 
 def predict_about_mass_centre(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
@@ -46,21 +46,11 @@ def predict_about_mass_centre(scene: Scene, at: Command, quantity: str, where: M
     Every bar is accelerated with the first of its tree and back again by its own joint.
     """
     furthest = max(abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
-    return predict_error(scene, at, quantity, _compute_extent(scene) + furthest, where, carried=True)
-
-
-def _compute_extent(scene: Scene) -> float:
-    return math.fsum(scene.linkage.lengths)
+    return predict_error(scene, at, quantity, sum_lengths(scene.linkage) + furthest, where, carried=True)
 
 
 def predict_error(
-    scene: Scene,
-    at: Command,
-    quantity: str,
-    reach: float,
-    where: Mask | None = None,
-    *,
-    carried: bool = False,
+    scene: Scene, at: Command, quantity: str, reach: float, where: Mask | None = None, *, carried: bool = False
 ) -> Array:
     """Predict the absolute error of a quantity at each position, or at those of a mask, (n,).
 
@@ -81,7 +71,7 @@ def predict_error(
         if quantity == "torque":
             turned = max(moved.first_order(f"theta_{bar}", reach) for bar in (3, 4))
             pulled = max(moved.first_order(force, reach, carried=carried) for force in PIN_FORCES)
-            errors[i] += pulled * turned * _compute_extent(scene)
+            errors[i] += pulled * turned * sum_lengths(scene.linkage)
     return errors
 
 
@@ -144,7 +134,7 @@ def _compute_sensitivity(
                 add(loop, [{name: most * step * direction}])
     if "torque" in base:
         strongest = max(abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y"))
-        strongest += abs(base["torque"]) / _compute_extent(scene)  # the couple on a bar is rounded too
+        strongest += abs(base["torque"]) / sum_lengths(scene.linkage)  # the couple on a bar is rounded too
         heaviest = max(scene.linkage.bar(bar).mass for bar in MOVING_BARS)
         for bar in MOVING_BARS:
             add(loop, [{f"couple_{bar}": strongest * step}])

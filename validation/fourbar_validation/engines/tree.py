@@ -22,8 +22,6 @@ from fourbar_validation.engines.loaded import Act, Loaded, Values, make_no_wrenc
 
 if TYPE_CHECKING:
     from fourbar.effects.spring import SpringEnd
-
-
 OMEGAS, ALPHAS = (tuple(f"{name}_{bar}" for bar in MOVING_BARS) for name in ("omega", "alpha"))
 
 

@@ -13,11 +13,10 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Engine
 from fourbar_validation.compare.compare import COMPARED, Nearby, Predicted
-from fourbar_validation.compare.nearby import shift_to
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, ErrorBound, Mask
 from fourbar_validation.engines.description import list_speeds
-from fourbar_validation.engines.exact import find_refusal
+from fourbar_validation.engines.exact import find_refusal, shift_to
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.loop import make_blank
 from fourbar_validation.engines.prediction import predict_about_mass_centre, predict_from_data, predict_in_world_axes

@@ -13,12 +13,13 @@ from fourbar.files import load
 from fourbar.mjcf import replace_loop, write_mjcf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
-from fourbar.studies.ratio import MOST, ratio
+from fourbar.studies.ratio import ratio
 from fourbar.writing import write_text
-from fourbar_validation.compare.tolerance import magnitude
+from fourbar_validation.compare.tolerance import magnitude, wrap_angle
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.places import MODELS, PROGRAM
-from fourbar_validation.report.machine import list_versions, name_machine
+from fourbar_validation.report.machine import describe_setup
+from fourbar_validation.report.templating import render
 from fourbar_validation.report.terminal import make_table
 
 SCENES = ("crank_rocker", "drag_link", "double_rocker", "gallery/bonnet_hinge", "gallery/landing_gear")
@@ -47,7 +48,7 @@ def simulate_lost(scene: Scene) -> list[Lost]:
     gear, written = ratio(scene), write_mjcf(scene)
     low, high = float(gear.theta_2[0]), float(gear.theta_2[-1])
     models = {"the loop": written}
-    for fit in (gear.fits[MOST - 1], gear.fits[0]):
+    for fit in (gear.fits[-1], gear.fits[0]):
         text = replace_loop(written, scene, fit.about, fit.joint_A, fit.theta_4)
         models[f"mimic joint, degree {fit.degree}"] = text
     return [_compare(name, text, scene, (low, high)) for name, text in models.items()]
@@ -63,8 +64,7 @@ def _compare(name: str, model: str, scene: Scene, ends: tuple[float, float]) -> 
         for each in PARTS
         if each in read
     }
-    off = read["theta_4"] - answer["theta_4"]
-    angle = float(np.abs(off - math.tau * np.rint(off / math.tau)).max())
+    angle = float(np.abs(wrap_angle(read["theta_4"] - answer["theta_4"])).max())
     return Lost(name, angle, parts, float(read["gap"].max()))
 
 
@@ -93,35 +93,7 @@ def command(scenes: tuple[Path, ...], out: Path | None) -> int:
             raise error if error.file else error.in_file(str(file)) from None
     Console().print(make_table(HEADS, rows))
     if out is not None:
-        write_text(out, _write_page(rows))
+        what = {"head": HEADS, "rows": rows, "program": PROGRAM, "setup": describe_setup()}
+        write_text(out, render("fourbar_validation.lab", "mimic.md.j2", **what))
         click.echo(f"written to {out}")
     return 0
-
-
-def _write_page(rows: list[list[str]]) -> str:
-    lines = ["| " + " | ".join(cells) + " |" for cells in (HEADS, ["---"] * 2 + ["---:"] * (len(HEADS) - 2), *rows)]
-    used = ", ".join(f"{name} {version}" for name, version in list_versions().items())
-    return ABOUT.format(program=PROGRAM) + "\n".join(lines) + f"\n\n{NOTES}\n{used}; {name_machine()}.\n"
-
-
-ABOUT = """\
-# What a mimic joint loses
-
-Where a simulator has no loop, a joint that follows another takes its place: theta_4 = P(theta_2), in URDF and SDF with
-a P of degree 1, in MuJoCo of degree 4 at most. `fourbar ratio SCENE` fits the polynomials and says what they miss;
-`fourbar mjcf SCENE --mimic -o FILE` writes the model, the coupler following by a polynomial of its own.
-
-`{program} cost --mimic [SCENE...]` simulates the loop and both models in MuJoCo over the range of the scene, and
-compares each instant with the free bodies (their own closure, thirteen equations) at the motion that happened: the
-greatest error of the angle, of the torque on the input and of the pin forces, those by their largest value there.
-
-"""
-NOTES = """\
-- The first ten timesteps, in which the joints settle, are left out.
-- The torque is lost first: an error of the angle is multiplied twice by derivation, and weights and inertia see the
-  wrong speeds. A polynomial that looks right in the viewer may have the motor wrong by two fifths.
-- The forces that the joints at O2, A and O4 carry are those of a mechanism that is open at B: nothing pushes from the
-  coupler to the output, so their errors do not fall with those of the angle. F43 does not exist.
-- A constraint torque on joint O4 does what the coupler's force would do; no bearing feels it.
-- Outside the range a polynomial leads anywhere: a crank that turns on and on needs the loop.
-"""

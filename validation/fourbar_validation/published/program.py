@@ -138,10 +138,8 @@ def make_equations(errors: ProgramErrors, inertias: tuple[float, float] | None =
 
     sum F = m A and sum M_G = I alpha of bars 2, 3, 4; F32 = -F23 and F34 = -F43.
 
-    Parameters
-    ----------
-    errors : which of the named errors to make.
-    inertias : I_G3, I_G4 as typed into the program, kg cm^2; left out: computed.
+    `errors`: which of the named errors to make.
+    `inertias`: I_G3, I_G4 as typed into the program, kg cm^2; left out: computed.
     """
     k = Kinematics()
     if errors.sign_in_acceleration_of_G3:

@@ -1,10 +1,10 @@
 """`python -m validation compare`, `accept` and `history`."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import chain, islice
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -35,7 +35,6 @@ FORMS: dict[str, Callable[[Differences], str]] = {
     "junit": render.write_junit,
 }
 """Forms in which the differences can be written, besides the text that is printed."""
-T = TypeVar("T")
 NAMED = 50
 """Names of a column that a message lists."""
 CHOICES = {"only": "scene", "engines": "engine", "quantity": "quantity"}
@@ -64,12 +63,15 @@ def report_differences(
     old: Path, new: Path, forms: dict[str, Path | None], chosen: dict[str, str | None] | None = None
 ) -> int:
     """Print the differences, write the forms wanted; 1 on a regression, or where nothing was compared."""
+    from rich.console import Console
+    from rich.progress import track
+
     before, after = open_run(old), open_run(new)
     names = find_renamed(before.about.scenes, after.about.scenes)
     keep = _is_chosen(chosen or {}, lambda column: chain(before.words(column), after.words(column)), names)
     engines = set(after.words("engine"))
     times = list_time_changes(merge_scenes(rename_scenes(before.times(), names), after.times()))
-    scenes = show_progress(after.scenes(keep))
+    scenes = track(after.scenes(keep), "comparing", console=Console(stderr=True), transient=True)
     result = compare_runs((before.about, before.scenes(keep)), (after.about, scenes), engines, times)
     unproven = [str(run.table) for run in (before, after) if not run.verified]
     result.notes += [f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing" for table in unproven]
@@ -78,16 +80,6 @@ def report_differences(
             write_text(path, FORMS[form](result))
     click.echo(render.write_text(result), nl=False)
     return result.status
-
-
-def show_progress(scenes: Iterable[T]) -> Iterator[T]:
-    """Pass them on, their number shown meanwhile where somebody looks."""
-    from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("comparing"), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        yield from progress.track(scenes)
 
 
 def _is_chosen(

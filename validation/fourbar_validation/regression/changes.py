@@ -186,9 +186,7 @@ def compare_runs(
 ) -> Differences:
     """Compare two runs by their scenes, in ascending order: only where both answer the same question.
 
-    Parameters
-    ----------
-    engines : those that have rows in the new run.
+    `engines`: those that have rows in the new run.
     """
     scenes = {each.scene: each for each in list_scene_changes(old[0].scenes, new[0].scenes)}
     names = find_renamed(old[0].scenes, new[0].scenes)

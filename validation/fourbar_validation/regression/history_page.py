@@ -48,7 +48,15 @@ def write_page(runs: Sequence[HistoryRun], found: Sequence[Step]) -> str:
     return render(
         "fourbar_validation.regression",
         "history.html.j2",
-        runs=[_list_cells(run, verdicts) for run in reversed(runs)],
+        runs=[
+            (
+                run.name,
+                *(_list_counts(run)[verdict] for verdict in verdicts),
+                ", ".join(f"{name} {version}" for name, version in run.about.versions.items()),
+                run.about.machine,
+            )
+            for run in reversed(runs)
+        ],
         headings=("date, commit", *verdicts, "versions", "machine"),
         steps=listed,
         pictures=pictures,
@@ -56,11 +64,6 @@ def write_page(runs: Sequence[HistoryRun], found: Sequence[Step]) -> str:
         more=len(changed) - len(rows),
         listed=ROWS_LISTED,
     )
-
-
-def _list_cells(run: HistoryRun, verdicts: Sequence[str]) -> tuple[object, ...]:
-    versions = ", ".join(f"{name} {version}" for name, version in run.about.versions.items())
-    return run.name, *(_list_counts(run)[verdict] for verdict in verdicts), versions, run.about.machine
 
 
 def _list_counts(run: HistoryRun) -> Counter[str]:

@@ -54,12 +54,9 @@ def _draw_answers(record: Record, solution: Solution) -> str:
 def _draw_picture(quantity: str, record: Record, solution: Solution, answers: list[Answer]) -> str:
     from matplotlib.figure import Figure
 
-    simulated = [
-        answer for answer in answers if choose_style(answer.engine).simulated and quantity in answer.quantities
-    ]
-    exact = [
-        answer for answer in answers if not choose_style(answer.engine).simulated and quantity in answer.quantities
-    ]
+    shown = [answer for answer in answers if quantity in answer.quantities]
+    simulated = [answer for answer in shown if choose_style(answer.engine).simulated]
+    exact = [answer for answer in shown if not choose_style(answer.engine).simulated]
     groups = [group for group in (simulated, exact) if group]
     figure = Figure(figsize=(4.3, 2.2 + 1.0 * len(groups)), layout="constrained")
     panels = figure.subplots(1 + len(groups), 1, sharex=True, height_ratios=[1.9, *[1.0] * len(groups)], squeeze=False)
@@ -126,15 +123,8 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     axes.yaxis.set_minor_locator(NullLocator())
     middle = int(np.flatnonzero(good)[np.count_nonzero(good) // 2])
-    axes.annotate(
-        "allowed",
-        (float(_choose_base(solution, None)[middle]), float(allowed[middle])),
-        xytext=(0, -9),
-        textcoords="offset points",
-        fontsize=7.5,
-        ha="center",
-        color=ALLOWED,
-    )
+    at = (float(_choose_base(solution, None)[middle]), float(allowed[middle]))
+    axes.annotate("allowed", at, (0, -9), textcoords="offset points", fontsize=7.5, ha="center", color=ALLOWED)
 
 
 def find_worst_of_segments(error: Array, phase: float) -> np.ndarray[Any, np.dtype[np.intp]]:

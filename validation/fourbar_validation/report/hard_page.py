@@ -13,7 +13,7 @@ from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, divide, find_condition, find_error, magnitude
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES
-from fourbar_validation.engines.limits import LIMITS, Boundary
+from fourbar_validation.engines.limits import LIMITS
 from fourbar_validation.engines.prediction import predict_in_world_axes
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.colours import choose_style
@@ -119,12 +119,7 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     for witness in HARD_WITNESSES:
         found = list_errors(approach.scene, quantity, witness)
         if found is not None and len(found[0]):
-            axes.loglog(
-                np.abs(found[0] - singular),
-                found[1],
-                label=witness.name,
-                **choose_style(witness.name).line,
-            )
+            axes.loglog(np.abs(found[0] - singular), found[1], label=witness.name, **choose_style(witness.name).line)
     axes.set_xlim(approach.distances[0] * 2, approach.distances[-1] / 2)
     axes.set_ylim(FLOOR, 1e3)
     axes.grid(visible=True, color=INK, alpha=0.2)
@@ -145,9 +140,5 @@ def write_page(svg: str) -> str:
         svg=shrink_svg(svg),
         source=base64.b64encode(svg.encode()).decode("ascii"),
         families=[(family.name, family.statement) for family in FAMILIES],
-        limits=[(each.engine, each.of.name, _write_boundary(each.of), each.of.reason) for each in LIMITS],
+        limits=[(of.engine, of.name, f"{of.boundary:g} {of.unit}".rstrip(), of.reason) for of in LIMITS],
     )
-
-
-def _write_boundary(of: Boundary) -> str:
-    return f"{of.boundary:g}" + (f" {of.unit}" if of.unit != "1" else "")

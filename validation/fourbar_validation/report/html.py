@@ -141,18 +141,13 @@ def write_markdown(summary: Summary) -> str:
 def _make_view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
     rows = sort_rows(scene.rows)
     cells = [Cell(line, *each) for line, each in enumerate(zip(rows, compute_shares(rows), strict=True), first_line)]
-    ranked = sorted(reversed(cells), key=_rank_engine)  # the last of a place stays, of equals the first
+    ranked = sorted(reversed(cells), key=lambda cell: (cell.row.compared, cell.used))  # of a place the last stays
     by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
     worst = {cell.row.engine: cell for cell in ranked}
     found = {cell.row.quantity for cell in cells}
     quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
     engines = _list_engines(cell.row for cell in cells)
     return SceneView(scene, cells, engines, quantities, by_place, worst, pictures.get(scene.name))
-
-
-def _rank_engine(cell: Cell) -> tuple[bool, float]:
-    """Put what was compared before what was not, then what used more of its allowance."""
-    return cell.row.compared, cell.used
 
 
 def _list_engines(rows: Any) -> list[str]:

@@ -37,6 +37,11 @@ def name_machine() -> str:
     return f"{_find_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}"
 
 
+def describe_setup() -> str:
+    """Name versions and machine, for the foot of a page."""
+    return ", ".join(f"{name} {version}" for name, version in list_versions().items()) + f"; {name_machine()}"
+
+
 def _find_processor() -> str:
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():

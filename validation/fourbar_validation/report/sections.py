@@ -2,6 +2,7 @@
 
 import base64
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from fourbar.writing import write_text
@@ -47,21 +48,15 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
         found.append(collect_hard_cases(hard, shrink_svg(svg)))
     elif results.is_file() and (out / HARD / PAGE).is_file():
         links = [(f"{HARD}/{name}", f"{HARD}/{name}") for name in (PAGE, "report.html")]
-        found.append(_read_hard_cases(read_columns(results), f"From the run in {HARD}/: {MUST}", [], links))
+        found.append(
+            replace(collect_hard_cases(read_columns(results)), text=f"From the run in {HARD}/: {MUST}", links=links)
+        )
     folders = sorted(path.parent for path in (out / COST).glob("*/cost.csv"))
     return [*found, *(_read_study(folder) for folder in folders[:MOST])]
 
 
 def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Section:
     """Of a run of the hard suite; `picture`: the inline SVG of `fourbar_validation.report.hard_page`."""
-    figures = [SectionFigure(ALT, CAPTION, svg=picture)] if picture else []
-    links = [("Limits of the engines, and the picture to download: " + PAGE, PAGE)]
-    return _read_hard_cases(rows, MUST.capitalize(), figures, links)
-
-
-def _read_hard_cases(
-    rows: Iterable[Row], text: str, figures: list[SectionFigure], links: list[tuple[str, str]]
-) -> Section:
     found = {family.name: Counts() for family in FAMILIES}
     scenes: dict[str, set[str]] = {family.name: set() for family in FAMILIES}
     for row in rows:
@@ -81,7 +76,9 @@ def _read_hard_cases(
         if scenes[family.name]
     ]
     headings = ("family", "scenes", *VERDICTS, "verdict", "what must happen")
-    return Section(HARD, "Hard cases", text, headings, table, figures, links, (1, 2 + len(VERDICTS)))
+    figures = [SectionFigure(ALT, CAPTION, svg=picture)] if picture else []
+    links = [("Limits of the engines, and the picture to download: " + PAGE, PAGE)]
+    return Section(HARD, "Hard cases", MUST.capitalize(), headings, table, figures, links, (1, 2 + len(VERDICTS)))
 
 
 def find_family(scene: str) -> str | None:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from heapq import nlargest
+from operator import attrgetter
 from statistics import median
 from typing import NamedTuple, TypeVar
 
@@ -29,6 +30,7 @@ from fourbar_validation.report.machine import list_versions, name_machine
 from fourbar_validation.report.record import Record
 
 T = TypeVar("T")
+ALLOWANCE = attrgetter("allowed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +110,7 @@ class Summary:
         self.failures += bad[: FAILURES_KEPT - len(self.failures)]
         compared, loose = _count_compared(scene.rows)
         self.pairs, self.loose = self.pairs + compared, self.loose + len(loose)
-        self._loosest = _keep_largest(LOOSEST_SHOWN, [*self._loosest, *loose], _write_allowance)
+        self._loosest = _keep_largest(LOOSEST_SHOWN, [*self._loosest, *loose], ALLOWANCE)
         for engine, reason in sorted(_list_left_out(scene)):
             kind = (engine, NUMBER.sub("#", reason))
             self._refusals[kind] += 1
@@ -151,7 +153,7 @@ class Summary:
         """How many quantities nobody judges tighter than degraded as predicted, and the worst, in one sentence."""
         if not self.loose:
             return ""
-        worst = nlargest(LOOSEST_SHOWN, self._loosest, key=_write_allowance)
+        worst = nlargest(LOOSEST_SHOWN, self._loosest, key=ALLOWANCE)
         named = ", ".join(f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})" for row in worst)
         return f'{self.loose} of {self.pairs} quantities of a scene are at best "{DEGRADED}"; the widest: {named}'
 
@@ -212,11 +214,9 @@ class Summary:
 
 def _list_left_out(scene: Record) -> set[tuple[str, str]]:
     """List what was not run, or refused to answer: (engine, reason)."""
-    found = {(row.engine, row.reason) for row in scene.rows if row.verdict == REFUSES}
-    for line in scene.left_out:
-        engine, _, reason = line.partition(": ")
-        found.add((engine, reason))
-    return found
+    left_out = (line.partition(": ") for line in scene.left_out)
+    refused = {(row.engine, row.reason) for row in scene.rows if row.verdict == REFUSES}
+    return refused | {(engine, reason) for engine, _, reason in left_out}
 
 
 def compute_shares(rows: Sequence[Row]) -> list[float]:
@@ -232,11 +232,7 @@ def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
         if row.compared:
             by_quantity.setdefault(row.quantity, []).append(row)
     loose = [of for of in by_quantity.values() if all(row.verdict == DEGRADED for row in of)]
-    return len(by_quantity), [min(of, key=_write_allowance) for of in loose]
-
-
-def _write_allowance(row: Row) -> float:
-    return row.allowed
+    return len(by_quantity), [min(of, key=ALLOWANCE) for of in loose]
 
 
 def _find_worst(rows: Sequence[Row]) -> list[Worst]:

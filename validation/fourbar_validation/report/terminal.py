@@ -54,8 +54,8 @@ def print_table(summary: Summary, out: Path) -> None:
     console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(clean_line(str(out)))}")
 
 
-def make_table(headings: Sequence[str], rows: Iterable[Sequence[str]], **options: Any) -> "Table":
-    """Make a table whose first column is words and whose others are numbers."""
+def make_table(headings: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1, **options: Any) -> "Table":
+    """Make a table whose first columns are words and whose others are numbers."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
     from rich.table import Table
@@ -63,7 +63,7 @@ def make_table(headings: Sequence[str], rows: Iterable[Sequence[str]], **options
     given: dict[str, Any] = {"box": SIMPLE_HEAD, "pad_edge": False}
     shown = Table(**(given | options))
     for index, heading in enumerate(headings):
-        shown.add_column(heading, justify="right" if index else "left", overflow="fold")
+        shown.add_column(heading, justify="left" if index < words else "right", overflow="fold")
     for row in rows:
         shown.add_row(*(escape(clean_line(cell)) for cell in row))
     return shown

@@ -47,13 +47,7 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
 )
 @click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
-@click.option(
-    "--error",
-    "wanted",
-    type=float,
-    metavar="E",
-    help="Simulate no more precisely than this relative error.",
-)
+@click.option("--error", "wanted", type=float, metavar="E", help="Simulate no more precisely than this relative error.")
 @click.option("--suite", "named", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
 @click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Of the random linkages; left out: 0.")
@@ -113,7 +107,7 @@ def command(
     """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
     from fourbar_validation.report.terminal import print_table
 
-    of_random = {"--random": count, "--seed": seed, "--type": types}
+    of_random: dict[str, Any] = {"--random": count, "--seed": seed, "--type": types}
     refuse_combinations(
         {"scenes": scenes or None, "--suite": named, "--against": against, "--python": python} | of_random
     )
@@ -132,12 +126,7 @@ def command(
 
         witnesses = adjust_witnesses(witnesses, wanted)
     if python is not None:
-        the_same = of_random | {
-            "--workers": workers,
-            "--engines": engines,
-            "--error": wanted,
-            "--time-limit": time_limit,
-        }
+        the_same = of_random | {"--workers": workers, "--engines": engines}
         the_same |= {"--error": wanted, "--time-limit": time_limit}
         the_same["--suite"] = named if named in (None, "hard") else os.path.abspath(named)
         passed_on = [*map(os.path.abspath, scenes), "--no-pictures", *(f"--witness={adapter}" for adapter in adapters)]

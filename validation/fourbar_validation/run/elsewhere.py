@@ -59,10 +59,10 @@ def run_to_end(
     return Ended(done.stdout, done.stderr, done.returncode not in fine, write_one_line(last))
 
 
-def start_harness(line: Sequence[object], *, variables: Mapping[str, str] | None = None, **how: Any) -> Ended:
+def start_harness(line: Sequence[object], **how: Any) -> Ended:
     """Run an interpreter that is to find this code, wherever it lies; for `how` see `run_to_end`."""
     with import_path() as path:
-        return run_to_end(line, variables={**(variables or {}), "PYTHONPATH": path}, **how)
+        return run_to_end(line, variables={"PYTHONPATH": path}, **how)
 
 
 def run_elsewhere(python: Path, arguments: Sequence[str], out: Path) -> Path:

@@ -45,8 +45,6 @@ STAGES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)
 """One quantity of each stage that a position may lack."""
 LARGE = 1e75
 """Numbers beyond this, or their squares, may leave the range of doubles in between: 1e300 in a product of four."""
-
-
 OfSome = Callable[[NDArray[np.intp]], Array]
 """A number of each of some positions."""
 IN_ONE_LINE = 32.0 * 2.0**-53
@@ -194,20 +192,15 @@ def _solve_exactly(question: Question) -> tuple[OfSome | None, OfSome | None]:
 
 
 def compare_status(
-    question: Question,
-    reference: Solution,
-    sines: OfSome | None = None,
-    solutions: OfSome | None = None,
+    question: Question, reference: Solution, sines: OfSome | None = None, solutions: OfSome | None = None
 ) -> Row:
     """Count where the formulas have a value and `reference` has none, or the reverse, where it has digits left.
 
     That a loop does not close is compared by itself where doubles can decide it.
 
-    Parameters
-    ----------
-    sines : sin(theta_4 - theta_3) in many digits at some positions, NaN where the loop does not close; near 0 it
-        decides whether they are singular. None: nothing is.
-    solutions : how many solutions loaded friction has at some positions.
+    `sines`: sin(theta_4 - theta_3) in many digits at some positions, NaN where the loop does not close; near 0 it
+    decides whether they are singular. None: nothing is.
+    `solutions`: how many solutions loaded friction has at some positions.
     """
     scene, formulas = question.scene, question.solution
     differ = np.zeros(len(formulas), dtype=bool)
@@ -226,7 +219,8 @@ def compare_status(
         in_line = reference.drive_condition < IN_ONE_LINE
         differ |= (formulas.status_code == OVERFLOW) & moves & in_line
         differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (reference.drive_condition > NEAR)
-    if sines is not None and len(near := np.flatnonzero(_mark_near(scene, formulas, reference))):
+    close = mark_touching(scene.linkage, formulas.theta_2) | (reference.condition < NEAR) | (formulas.condition < NEAR)
+    if sines is not None and len(near := np.flatnonzero(close)):  # where exact arithmetic has to decide
         sine = np.abs(sines(near))
         closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR
         differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes
@@ -242,12 +236,6 @@ def compare_status(
     if differ.any():
         reason = f"{wrong} positions differ, the first is {formulas.status[index]}; {reason}"
     return question.row("status", float(wrong) * differ, 0.0, reason, theta_2=formulas.theta_2)
-
-
-def _mark_near(scene: Scene, formulas: Solution, reference: Solution) -> Mask:
-    """Where bars 3 and 4 are so nearly in line that exact arithmetic has to decide, (n,)."""
-    close = mark_touching(scene.linkage, formulas.theta_2)
-    return np.asarray(close | (reference.condition < NEAR) | (formulas.condition < NEAR))
 
 
 def _mark_large(scene: Scene, reference: Solution) -> Mask:

@@ -71,7 +71,9 @@ def judge_for_report(name: str, scene: Scene, witnesses: Sequence[Witness] = WIT
     """
     shipped = draw or crc32(name.encode(errors="replace")) % OF_MANY == 0
     record = judge(name, scene, witnesses, order=draw, shipped=shipped)
-    record.rows = [name_output(row) if row.engine in record.output else row for row in record.rows]
+    for i, row in enumerate(record.rows):
+        if row.failed and row.engine in record.output:
+            record.rows[i] = replace(row, reason=f"{row.reason}; what it printed: {OUTPUT}")
     figure = None
     if draw:
         from fourbar_validation.report.figures import draw_scene_figure
@@ -81,18 +83,8 @@ def judge_for_report(name: str, scene: Scene, witnesses: Sequence[Witness] = WIT
     return record.kept(figure)
 
 
-def name_output(row: Row) -> Row:
-    """Say in a row that fails where to read what its engine printed."""
-    return replace(row, reason=f"{row.reason}; what it printed: {OUTPUT}") if row.failed else row
-
-
 def judge(
-    name: str,
-    scene: Scene,
-    witnesses: Sequence[Witness] = WITNESSES,
-    *,
-    order: bool = True,
-    shipped: bool = False,
+    name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, order: bool = True, shipped: bool = False
 ) -> Record:
     """Make every check of one scene.
 

@@ -122,10 +122,8 @@ class Question:
     ) -> Row:
         """Make a row of the formulas where the error is worst; NaN is beyond all.
 
-        Parameters
-        ----------
-        where : positions that are held to it; none of them: undecided.
-        theta_2 : of the errors; left out: of the command.
+        `where`: positions that are held to it; none of them: undecided.
+        `theta_2`: of the errors; left out: of the command.
         """
         if where is not None:
             error = np.where(where, error, 0.0)
@@ -139,12 +137,7 @@ class Question:
         )
 
     def record(self, rows: list[Row], seconds: float) -> Record:
-        """Make the record of the scene.
-
-        Parameters
-        ----------
-        seconds : that the formulas took.
-        """
+        """Make the record of the scene; `seconds`: that the formulas took."""
         answered = [self.answered[witness.name] for witness in self.witnesses if witness.name in self.answered]
         timings = [Timing(self.name, FORMULAS, "exact", len(self.solution), seconds), *self.timings]
         n = len(self.at.angle)

@@ -58,20 +58,12 @@ class Dialled:
             growth = ratio ** (1.0 / ORDER) if np.isfinite(ratio) else MOST_GROWTH
             growth = min(max(growth, LEAST_GROWTH), MOST_GROWTH)
             # a run has at least as many steps as it has positions to read
-            steps = max(steps, read_steps_per_revolution(answer)) * growth
+            made = float(answer.setting.rpartition(" ")[2].removesuffix("/rev"))  # of "RK4 628/rev"
+            steps = max(steps, made) * growth
             tc = min(tc * growth, LONGEST)
-        answer.evidence |= {
-            "wanted_error": self.error,
-            "expected_error": expected,
-            "steps_with_the_search": spent,
-            "runs": float(runs),
-        }
+        answer.evidence |= {"wanted_error": self.error, "expected_error": expected}
+        answer.evidence |= {"steps_with_the_search": spent, "runs": float(runs)}
         return answer
-
-
-def read_steps_per_revolution(answer: Answer) -> float:
-    """Read from what was simulated: "RK4 628/rev"."""
-    return float(answer.setting.rpartition(" ")[2].removesuffix("/rev"))
 
 
 def compute_expected_error(scene: Scene, answer: Answer) -> float:

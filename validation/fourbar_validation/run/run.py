@@ -110,7 +110,8 @@ def run(
             for number, scenes in enumerate(chunks):
                 records = [Record.restore(kept) for kept in store.read(number)]
                 for scene, each in zip(scenes, records, strict=True):
-                    each.rows = each.rows or [mark_missing(make_plain(suite.name(scene)))]
+                    name = make_plain(suite.name(scene))
+                    each.rows = each.rows or [Row.unmeasured(name, FORMULAS, "", "all", FAILS, "nothing was judged")]
                     summary.add(each)
                     times.write(write_csv((), list_timings(each)))
                     output.writelines(f"{each.name}: {engine}\n{text}\n\n" for engine, text in each.output.items())
@@ -148,11 +149,6 @@ def draft_file(path: Path) -> Iterator[TextIO]:
                 os.replace(draft, path)
         finally:
             draft.unlink(missing_ok=True)
-
-
-def mark_missing(scene: str) -> Row:
-    """Make the row of a scene that came back without any."""
-    return Row.unmeasured(scene, FORMULAS, "", "all", FAILS, "nothing was judged")
 
 
 def list_timings(record: Record) -> Iterator[list[str]]:

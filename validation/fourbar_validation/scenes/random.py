@@ -183,9 +183,7 @@ def _draw_springs(rng: np.random.Generator, linkage: FourBar, weight: float, ran
 def draw_uneven_lengths(rng: np.random.Generator, crank: Draw, coupler: Draw) -> tuple[Sequence[float], float]:
     """(ground, input, coupler, output), m, and an angle theta_2 - theta_1 at which they close, rad.
 
-    Parameters
-    ----------
-    crank, coupler : of the ground, and of the diagonal from A to O4 at that angle.
+    `crank` and `coupler`: of the ground, and of the diagonal from A to O4 at that angle.
     """
     d = float(rng.uniform(0.1, 1.0))
     a = d * crank(rng)
@@ -239,9 +237,7 @@ MACHINES = Ranges(
 def draw_random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
     """Draw random bars, loads, gravity and drive, at POSITIONS positions over the range the linkage can move.
 
-    Parameters
-    ----------
-    types : taken in turn; none of them: an uneven one.
+    `types`: taken in turn; none of them: an uneven one.
     """
     if not types:
         return draw_uneven_scene(seed, index)

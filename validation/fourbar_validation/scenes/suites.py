@@ -154,7 +154,8 @@ def read_suite(path: Path) -> Files:
         raise refuse(path.name, 'must be "hard" or a file that lists scenes: there is no such file')
     text = reading.read_text(path, "--suite", LARGEST_LIST)
     try:
-        entries = tomllib.loads(text).get("scenes") if path.suffix == ".toml" else _read_listed(text)
+        lines = [line.partition("#")[0].strip() for line in text.splitlines()]  # one entry each; # begins a comment
+        entries = tomllib.loads(text).get("scenes") if path.suffix == ".toml" else [line for line in lines if line]
     except (ValueError, RecursionError):  # no TOML
         raise refuse(path.name, "is no list of scenes") from None
     if not isinstance(entries, list) or not all(isinstance(entry, str) and entry for entry in entries):
@@ -170,9 +171,3 @@ def read_suite(path: Path) -> Files:
             raise refuse(entry, "names no file")
         files += result
     return read_scene_files(files)
-
-
-def _read_listed(text: str) -> list[str]:
-    """Read one entry per line; # begins a comment."""
-    lines = (line.partition("#")[0].strip() for line in text.splitlines())
-    return [line for line in lines if line]

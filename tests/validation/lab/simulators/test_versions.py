@@ -151,7 +151,7 @@ def test_a_scan_runs_every_version(monkeypatch: pytest.MonkeyPatch) -> None:
     judge_here(monkeypatch)
     tried: list[int] = []
     changes = {0: (1e-7, AGREES), 3: (1e-3, FAILS), 4: (1e-7, AGREES)}
-    found = versions.scan_versions(FROM_0_TO_31[:6], made_up(changes, set(), tried), 2)
+    found = list(versions.apply_each(made_up(changes, set(), tried), FROM_0_TO_31[:6], 2, seconds=None))
     assert sorted(tried) == list(range(6)) == [int(release.version) for release in found]
     assert [sentence.partition(":")[0] for sentence in versions_page.describe_changed(found)] == ["2 -> 3", "3 -> 4"]
 

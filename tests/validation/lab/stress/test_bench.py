@@ -15,7 +15,6 @@ from fourbar.quantities import UNKNOWNS
 from fourbar.solve import solve
 from fourbar_validation.cli import status as ended
 from fourbar_validation.lab.stress import against, bench, contenders
-from fourbar_validation.lab.stress.bench_picture import draw_bench
 from fourbar_validation.lab.stress.timed import make_command, make_example
 
 ROOT = Path(__file__).parents[4]
@@ -42,7 +41,7 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
     assert set(found.over_positions["NumPy"]) == {1000, 10_000}
     assert set(found.over_linkages["study, NumPy"]) == {1, 10, 100, 1000}
     assert set(found.over_linkages["one after the other"]) == {1, 10}
-    draw_bench(found.over_positions, found.over_linkages, tmp_path / "bench.svg")
+    contenders.draw_bench(found.over_positions, found.over_linkages, tmp_path / "bench.svg")
     picture = (tmp_path / "bench.svg").read_text()
     assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 15
 
@@ -191,5 +190,4 @@ def test_the_ratios_are_printed_whole_on_a_narrow_terminal(
     monkeypatch.setattr(bench, "against_revision", lambda *_: {"one position with error bars": row})
     assert ended(["bench", "--against", "HEAD"]) == HOLDS
     line = next(line for line in capsys.readouterr().out.splitlines() if "error bars" in line)
-    cells = [cell.strip() for cell in line.split("│")[1:7]]
-    assert cells == ["one position with error bars", "387.5", "1", "387.500", "375.250", "400.125"]
+    assert line.split()[-5:] == ["387.5", "1", "387.500", "375.250", "400.125"]

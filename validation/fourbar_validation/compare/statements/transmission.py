@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -37,7 +36,7 @@ def choose_places(linkage: FourBar) -> list[Place]:
     """Where an engine is looked at for it: at the extremes that are no limits, and in both strokes of bar 4."""
     strokes = _find_strokes(linkage)
     inner = [(theta_2, 1) for value, theta_2, collinear in _find_ends(linkage) if value != collinear]
-    return inner + ([] if strokes is None else [(theta_2, -1) for theta_2 in strokes.middles])
+    return inner + ([] if strokes is None else [(theta_2, -1) for theta_2 in strokes[1]])
 
 
 def compare_transmission(scene: Scene, seen: Seen, answer: Answer, predicted: Predicted | None) -> Iterator[Finding]:
@@ -141,21 +140,16 @@ def _compare_extremes(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
     yield Finding(abs(of.worst - smallest), EPS, of.theta_2_least, "smallest transmission angle")
 
 
-class _Strokes(NamedTuple):
-    """Bar 4 turns in one sense between its two limits on a branch, and in the other for the rest of the turn."""
+def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
+    """Find what bar 2 turns (rad) while bar 4 goes between its limits on a branch, and theta_2 amid that and the rest.
 
-    there: float
-    """rad of bar 2 in the first."""
-    middles: tuple[float, float]
-    """theta_2 amid each."""
-
-
-def _find_strokes(linkage: FourBar) -> _Strokes | None:
+    Bar 4 turns in the other sense for the rest of the turn.
+    """
     dead = [limit.theta_2 for limit in mobility.limit_positions(linkage, 4) if limit.branch == -1]
     if len(dead) != 2 or not mobility.turns_fully(linkage) or mobility.change_points(linkage):
         return None
     there = (dead[1] - dead[0]) % TURN
-    return _Strokes(there, (dead[0] + there / 2.0, dead[1] + (TURN - there) / 2.0))
+    return there, (dead[0] + there / 2.0, dead[1] + (TURN - there) / 2.0)
 
 
 def _compare_time_ratio(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
@@ -163,10 +157,11 @@ def _compare_time_ratio(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
     known = (strokes is None) == (ratio is None)
     yield Finding(float(not known), 0.0, theta_1, "whether there is a time ratio")
     if strokes is not None and ratio is not None:
-        one, other = (seen[(theta_2, -1)]["omega_4"] for theta_2 in strokes.middles)
-        place = strokes.middles[0]
+        there, middles = strokes
+        one, other = (seen[(theta_2, -1)]["omega_4"] for theta_2 in middles)
+        place = middles[0]
         yield Finding(float(not one * other < 0.0), 0.0, place, "bar 4 turns in both senses")
-        shorter, longer = sorted((strokes.there, TURN - strokes.there))
+        shorter, longer = sorted((there, TURN - there))
         # both angles are differences of two that were rounded
         yield Finding(
             abs(ratio / (longer / shorter) - 1.0), find_roundoff(linkage) * TURN / shorter, place, "time ratio"

@@ -1,6 +1,7 @@
 """A compiled MJCF as a closed loop: MuJoCo's own kinematics, assembly, velocities and pin forces."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -26,6 +27,20 @@ def load_force(model: mujoco.MjModel, data: mujoco.MjData, actuator: int) -> Arr
     site, frame = model.actuator_trnid[actuator]
     axes = data.site_xmat[frame if frame >= 0 else site].reshape(3, 3)
     return np.asarray(axes @ model.actuator_gear[actuator, :3] * data.actuator_force[actuator])
+
+
+def open_model(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Compile a text and evaluate it at keyframe 0."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def make_stepper(text: str) -> Callable[[int], None]:
+    """Make a function that steps a text on from its first keyframe, as often as wanted."""
+    return partial(mujoco.mj_step, *open_model(text))
 
 
 class ClosedLoop(Assembled):
@@ -96,8 +111,7 @@ class ClosedLoop(Assembled):
     def carried(self) -> dict[str, Array]:
         """Read the force of the parent on each bar and all that the bar carries, world axes, N.
 
-        That is cfrc_int, but MuJoCo counts the forces
-        of actuators on sites into it; they are taken out again. Those of tendons it keeps apart.
+        That is cfrc_int without the forces of actuators on sites, which MuJoCo counts into it, unlike those of tendons.
         """
         d = self.data
         on = {name: d.cfrc_int[body][3:5].copy() for name, body in self.body.items()}
@@ -170,10 +184,6 @@ class ClosedLoop(Assembled):
         else:
             self.data.qfrc_applied[TURNED_BY[drive_bar]] += size
 
-    def keeps_centre(self, name: str) -> bool:
-        """Tell whether the compiler left a bar's mass centre where the file has it, and not at the bar's origin."""
-        return int(self.model.body_sameframe[self.body[name]]) != int(mujoco.mjtSameFrame.mjSAMEFRAME_BODY)
-
     def bad(self) -> int:
         """Count warnings of a bad position, velocity or acceleration: each resets the data."""
         return sum(int(self.data.warning[kind].number) for kind in WARNINGS)
@@ -185,14 +195,10 @@ def solve_couple_elsewhere(
     """Solve for what accelerates the crank as before; None where it does not move the crank.
 
     That is a couple on bar 3 or 4, or the force of the actuator between the cylinder's two sites. The accelerations are
-    linear in it; two trials give it, and `light` is left at a third, to be read.
+    linear in it; two trials of the size of the crank's torque (T2, N m) give it, and `light`, the same linkage with a
+    light flywheel, is left at a third, to be read.
 
-    Parameters
-    ----------
-    loop : at the simulated state.
-    light : the same linkage with a light flywheel.
-    alpha_2 : what the flywheel's motor was given, rad/s^2.
-    crank_torque : T2 at that state, N m: the size of the trials.
+    `alpha_2`: what the flywheel's motor was given, rad/s^2.
     """
     d = light.data
     d.qpos[:], d.qvel[:] = loop.data.qpos[: d.qpos.size], loop.data.qvel[: d.qvel.size]  # a drive may have its own

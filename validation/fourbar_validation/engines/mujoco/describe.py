@@ -156,10 +156,7 @@ def _describe_options(model: mujoco.MjModel) -> Described:
         elif kept is not None:
             result[f"option.{name}"] = float(kept) if np.ndim(kept) == 0 else tuple(map(float, kept))
     result["option.meaninertia"] = float(model.stat.meaninertia)
-    for state, flags, prefix in (
-        ("off", mujoco.mjtDisableBit, "mjDSBL_"),
-        ("on", mujoco.mjtEnableBit, "mjENBL_"),
-    ):
+    for state, flags, prefix in (("off", mujoco.mjtDisableBit, "mjDSBL_"), ("on", mujoco.mjtEnableBit, "mjENBL_")):
         bits = getattr(option, "disableflags" if state == "off" else "enableflags")
         names = [name for name in flags.__members__ if name.startswith(prefix)]
         named = [name.removeprefix(prefix) for name in names if bits & int(flags.__members__[name])]

@@ -54,10 +54,8 @@ class Driven(ClosedLoop):
 class Actuated(Driven):
     """An actuator on O2: of speed alone, or a position servo whose target turns at omega, as `intvelocity`'s does.
 
-    Parameters
-    ----------
-    position : kp per (inertia omega^2); none: kv (omega - omega_2), without a control input, by the affine bias.
-    velocity : kv per (inertia omega).
+    `position`: kp per (inertia omega^2); none: kv (omega - omega_2), without a control input, by the affine bias.
+    `velocity`: kv per (inertia omega).
     """
 
     def __init__(self, mjcf: str, omega: float, position: float, velocity: float) -> None:

@@ -23,9 +23,7 @@ def find_topology(
 ) -> tuple[Topology, list[str]]:
     """Find the four-bar in a model; add a note on what was guessed. Names that are given, or in the file, stand.
 
-    Parameters
-    ----------
-    lengths : of ground, input, coupler and output in the scene, m: the guess that fits them best is taken.
+    `lengths`: of ground, input, coupler and output in the scene, m: the guess that fits them best is taken.
 
     Raises InputError in one line: why no three bodies fit.
     """

@@ -58,10 +58,8 @@ OF_THE_DATA = {
 def list_alarms(evidence: dict[str, float], size: float) -> list[str]:
     """Say what is wrong with a run.
 
-    Parameters
-    ----------
-    evidence : the worst of each residual over the run.
-    size : sum of the lengths, m.
+    `evidence`: the worst of each residual over the run.
+    `size`: sum of the lengths, m.
     """
     seen = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
     return [

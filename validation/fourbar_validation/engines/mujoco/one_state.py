@@ -33,7 +33,6 @@ class MujocoOneState:
     """Forward dynamics at each position by itself, at one impedance or extrapolated from several."""
 
     impedances: tuple[float, ...] = RUNGS
-    pad: float | None = None
     name: str = NAME
 
     def answer(self, scene: Scene, command: Command) -> Answer:
@@ -41,7 +40,7 @@ class MujocoOneState:
         began = time.perf_counter()
         setting = "extrapolated" if len(self.impedances) > 1 else f"d = {self.impedances[0]:g}"
         try:
-            rungs = [_compute_at_impedance(scene, command, d, self.pad) for d in self.impedances]
+            rungs = [_compute_at_impedance(scene, command, d) for d in self.impedances]
         except InputError as error:
             return Answer(NAME, setting, refusal=str(error))
         values, assembled = extrapolate(self.impedances, [rung for rung, _ in rungs]), rungs[0][1]
@@ -64,15 +63,11 @@ def extrapolate(impedances: tuple[float, ...], rungs: list[dict[str, Array]]) ->
     return {name: sum(w * rung[name] for w, rung in zip(weights, rungs, strict=True)) for name in rungs[0]}  # type: ignore[misc]
 
 
-def _compute_at_impedance(
-    scene: Scene, command: Command, d: float, pad: float | None
-) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+def _compute_at_impedance(scene: Scene, command: Command, d: float) -> tuple[dict[str, Array], NDArray[np.bool_]]:
     """Compute torque and pin forces at every position that assembles."""
     # no flywheel: the torque is on the driven bar itself
-    settings = Settings(timestep=1e-3, impedance=d, pad=pad, flywheel=0.0)
-    loop = ClosedLoop(write_mjcf(scene, settings, keyframe=False))
-
-    drive = name_driving(scene)
+    settings = Settings(timestep=1e-3, impedance=d, pad=None, flywheel=0.0)
+    loop, drive = ClosedLoop(write_mjcf(scene, settings, keyframe=False)), name_driving(scene)
 
     def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
         loop.set_state(unwind(scene, q), omega_2)

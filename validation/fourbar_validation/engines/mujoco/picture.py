@@ -50,7 +50,7 @@ def draw(texts: dict[str, str]) -> dict[str, str]:
     import matplotlib.image
     import mujoco
 
-    from fourbar_validation.engines.mujoco.stepping import open_model
+    from fourbar_validation.engines.mujoco.closed_loop import open_model
 
     drawn = {}
     for name, text in texts.items():

@@ -18,8 +18,6 @@ NAME = "mujoco-forward"
 TIME_CONSTANT_STEPS = 2.0
 """Of the loop's closure, in timesteps. Through change points the closure takes energy out: 1e-6 of it in ten seconds at
 1 ms with 2, three hundred times as much with 10."""
-
-
 FRICTION = (mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF, mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON)
 
 

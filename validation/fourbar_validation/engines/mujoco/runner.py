@@ -1,7 +1,6 @@
 """The one runner through time: a model is stepped from the state it is in and read at stated instants."""
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
 
 import mujoco
 
@@ -48,14 +47,6 @@ class Stepper:
         return bool(self.data.time < self.time * (1.0 - 1e-6))
 
 
-class Reading(NamedTuple):
-    """The driving torque and the pin forces at one state."""
-
-    torque: float | None
-    """N m, or a cylinder's force, N; None where it does not move the input."""
-    forces: dict[str, Array]
-
-
 class SimulatedRun:
     """One segment of positions at a prescribed motion; `light` is the model that a drive elsewhere is read from."""
 
@@ -84,13 +75,16 @@ class SimulatedRun:
         """Step on to the step nearest to a position."""
         self.stepper.to(self.motion_segment.seconds(index))
 
-    def read(self) -> Reading:
-        """Read torque and pin forces of the state that was last forwarded."""
+    def read(self) -> tuple[float | None, dict[str, Array]]:
+        """Read the torque (N m, or a cylinder's force, N) and the pin forces of the state that was last forwarded.
+
+        The torque is None where it does not move the input.
+        """
         torque = self.loop.crank_torque()
         if self.light is None:
-            return Reading(torque, self.loop.forces())
+            return torque, self.loop.forces()
         couple = solve_couple_elsewhere(self.loop, self.light, self.scene.drive_bar, self.loop.given(), torque)
-        return Reading(couple, self.light.forces())
+        return couple, self.light.forces()
 
 
 def find_assembled(position: Assembler, command: Command, order: Iterable[int]) -> list[Found]:

@@ -4,11 +4,10 @@ Cost is counted in steps of the recommended RK4 model; a step of another integra
 CPU time relative to that, measured once, interleaved.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from statistics import median
-from typing import NamedTuple
 
 from fourbar.mjcf import Settings
 from fourbar_validation.advise.advise import MOST_STEPS
@@ -22,15 +21,6 @@ TIME_CONSTANTS = (3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 120.0, 300.0)
 FIRST_ORDER = ("Euler", "implicit", "implicitfast", "discrete")
 FIRST_ORDER_TIME_CONSTANTS = (2.0, 3.0, 6.0, 12.0)
 ROUNDS, STEPS = 15, 400
-
-
-class Cheapest(NamedTuple):
-    """The cheapest that serves."""
-
-    settings: Settings
-    steps: int
-    cost: float
-    """Recommended RK4 steps per run."""
 
 
 def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
@@ -48,47 +38,36 @@ def change_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
     return replace(settings, integrator=integrator, pad=settings.pad if pads else None)
 
 
-def find_cheapest(setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]) -> Cheapest | None:
-    """Try every integrator, with and without pads, over time constants and steps; None where nothing serves."""
-    best: Cheapest | None = None
+def find_cheapest(setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]) -> float | None:
+    """Try every integrator, with and without pads, over time constants and steps: the least cost of a run that serves.
+
+    In recommended RK4 steps; None where nothing serves.
+    """
+    best: float | None = None
     for kind, ratio in costs.items():
         fourth_order = kind[0] == "RK4"
         for tc in TIME_CONSTANTS if fourth_order else FIRST_ORDER_TIME_CONSTANTS:
-            most = MOST_STEPS if best is None else best.cost / ratio
+            most = MOST_STEPS if best is None else best / ratio
             if not fourth_order and best is not None and not _serves(setup, kind, tc, most / FINE, error):
                 continue  # not even with as many steps as the best costs
             steps = _find_least_steps(setup, kind, tc, most, error)
-            if steps is not None:
-                cost = steps * ratio
-                if best is None or cost < best.cost:
-                    best = Cheapest(_make_settings(setup, kind, tc, steps), steps, cost)
+            if steps is not None and (best is None or steps * ratio < best):
+                best = steps * ratio
     return best
 
 
 def _find_least_steps(setup: TrialSetup, kind: tuple[str, bool], tc: float, most: float, error: float) -> int | None:
     """Find the least steps of the ladder, fewer than `most`, that serve."""
-    for n in _climb_ladder(FEWEST_STEPS, COARSE, most):
+    n = FEWEST_STEPS
+    while n < most:
         if _serves(setup, kind, tc, n, error):
-            for finer in (n / FINE**2, n / FINE):
-                if _serves(setup, kind, tc, finer, error):
-                    return int(finer + 0.5)
-            return int(n + 0.5)
+            finer = (each for each in (n / FINE**2, n / FINE) if _serves(setup, kind, tc, each, error))
+            return int(next(finer, n) + 0.5)
+        n *= COARSE
     return None
 
 
-def _climb_ladder(start: float, ratio: float, most: float) -> Iterator[float]:
-    n = start
-    while n < most:
-        yield n
-        n *= ratio
-
-
-def _make_settings(setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float) -> Settings:
-    """Set the number of steps of the run."""
-    per_run = setup.steps(make_settings(1000.0, tc)) / 1000.0
-    return change_kind(kind, make_settings(steps / per_run, tc))
-
-
 def _serves(setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float, error: float) -> bool:
-    trial = setup.try_out(_make_settings(setup, kind, tc, steps))
+    per_run = setup.steps(make_settings(1000.0, tc)) / 1000.0
+    trial = setup.try_out(change_kind(kind, make_settings(steps / per_run, tc)))
     return judge_trial(setup.scene, trial).worst <= error

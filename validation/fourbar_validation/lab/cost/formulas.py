@@ -10,7 +10,6 @@ from fourbar.effects import Actions
 from fourbar.effects.actions import list_bodies
 from fourbar.evaluation.case import Case, change_numbers, compute_state
 from fourbar.formulas.arithmetic import cross
-from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
@@ -72,14 +71,15 @@ def solve_thirteen_equations(scene: Scene, at: Command) -> Quantities:
     """Solve thirteen equations per position, with kinematics by the formulas."""
     if any(effect.loaded_pins for effect in scene.effects):
         raise NotImplementedError("friction that depends on the pin forces is not linear in them")
-    x = thirteen.solve_thirteen(_make_bodies(scene, compute_state(scene, at)), scene.drive_bar)
+    x = thirteen.solve_thirteen(make_bodies(scene, at), scene.drive_bar)
     columns = {name: getattr(thirteen, name) for name in PIN_FORCES}
     return {"torque": x[:, thirteen.TORQUE], **{name: x[:, k : k + 2] for name, k in columns.items()}}
 
 
-def _make_bodies(scene: Scene, state: State) -> thirteen.FreeBodies:
-    """Set up the free bodies with what acts on them, moments about the mass centres."""
-    n, parts = len(state.theta_2), list_bodies(scene.linkage, scene.effects)
+def make_bodies(scene: Scene, at: Command) -> thirteen.FreeBodies:
+    """Set up the free bodies with what acts on them, moments about the mass centres, by our kinematics."""
+    state, parts = compute_state(scene, at), list_bodies(scene.linkage, scene.effects)
+    n = len(state.theta_2)
     actions = Actions(state, parts)
     for term in (*scene.loads, *scene.effects):
         term.act(actions, state)

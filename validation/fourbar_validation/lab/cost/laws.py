@@ -24,10 +24,7 @@ JUMP = 10.0
 """An error so many times larger than at either of the two coarser settings is no part of a law, where it has met no
 floor: between neighbours of a ladder the laws here change it by 10 or less, and downwards."""
 FIRST_ORDER, FOURTH_ORDER = 1.0, 4.0
-EXPECTED_ORDER = {
-    **dict.fromkeys(("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER),
-    "RK4": FOURTH_ORDER,
-}
+EXPECTED_ORDER = dict.fromkeys(("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER) | {"RK4": FOURTH_ORDER}
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +96,7 @@ def find_steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint
     least = find_floor(points, quantity)
     if least is None:
         return None
-    beyond = [point for point in _list_by_steps(points) if getattr(point, quantity) > least / FLOORED]
-    return next(point for point in _list_by_steps(points) if point not in beyond)
+    return next(point for point in _list_by_steps(points) if getattr(point, quantity) <= least / FLOORED)
 
 
 def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
@@ -159,11 +155,8 @@ def _measure_leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) 
 
 def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
     """RK4's floor at a time constant of k steps goes as k^-4, whatever the timestep."""
-    floors = {}
-    for tc in (3.0, 10.0, 30.0, 100.0):
-        least = find_floor(curves.get(f"RK4, pads, tc = {tc:g} h", ()), quantity)
-        if least is not None:
-            floors[tc] = least
+    ladders = ((tc, curves.get(f"RK4, pads, tc = {tc:g} h", ())) for tc in (3.0, 10.0, 30.0, 100.0))
+    floors = {tc: least for tc, points in ladders if (least := find_floor(points, quantity)) is not None}
     name = "floor of RK4 in tc/h"
     if len(floors) < FEWEST:
         return ErrorLaw(name, quantity, math.nan, math.inf, -FOURTH_ORDER, len(floors))

@@ -74,10 +74,8 @@ def trace_steps(
 ) -> Curve:
     """Make a curve over the timestep.
 
-    Parameters
-    ----------
-    held : a part of a revolution at which the closure's time constant is held in seconds, so that the timestep alone
-        changes; None: it is so many steps as in the settings.
+    `held`: a part of a revolution at which the closure's time constant is held in seconds, so that the timestep alone
+    changes; None: it is so many steps as in the settings.
     """
 
     def at(n: float) -> Settings:
@@ -126,10 +124,7 @@ def _vary_softness() -> list[Curve]:
 
     def by_tc(name: str, impedance: float) -> Curve:
         return trace(
-            name,
-            "tc = {:g} h",
-            TIME_CONSTANTS,
-            lambda tc: replace(PLAIN, impedance=impedance, time_constant_steps=tc),
+            name, "tc = {:g} h", TIME_CONSTANTS, lambda tc: replace(PLAIN, impedance=impedance, time_constant_steps=tc)
         )
 
     pads = (Spot("no pads" if f is None else f"pads {f:g}", replace(BEST, pad=f), None, f or 1.0) for f in PADS)

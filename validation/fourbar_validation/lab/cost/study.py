@@ -91,12 +91,11 @@ class CostStudy:
         self.units: dict[str, Callable[[], list[CostPoint]]] = {
             "formulas": self._time_formulas,
             "inverse": self._time_inverse,
+            "one state": self._time_one_state,
+            "Pinocchio forward": self._time_pinocchio_forward,
+            "recommended": self._try_recommended,
+            **{curve.name: partial(self._try_curve, curve) for curve in design_curves(scene)},
         }
-        self.units["one state"] = self._time_one_state
-        self.units["Pinocchio forward"] = self._time_pinocchio_forward
-        self.units["recommended"] = self._try_recommended
-        for curve in design_curves(scene):
-            self.units[curve.name] = lambda curve=curve: self._try_curve(curve)  # type: ignore[misc]
 
     def __len__(self) -> int:
         return len(self.units)
@@ -174,15 +173,10 @@ class CostStudy:
         setup, spots = self.setup(), []
         for required in REQUIRED:
             advice = advise(self.scene, required, setup)
+            settings = advice.best.settings
             if advice.reached:
-                spots.append(
-                    Spot(
-                        f"required {required:g}: tc = {advice.best.settings.time_constant_steps:.3g} h",
-                        advice.best.settings,
-                        None,
-                        required,
-                    )
-                )
+                label = f"required {required:g}: tc = {settings.time_constant_steps:.3g} h"
+                spots.append(Spot(label, settings, None, required))
             else:
                 self.left_out.append(f"recommended: {advice.reason}")
         return self._try_spots("recommended", tuple(spots), setup)
@@ -198,16 +192,13 @@ class CostStudy:
         setting_value: float = math.nan,
     ) -> CostPoint:
         """Make a point of a method that answers each position by itself."""
-        per_revolution = self._count_positions_per_revolution()
+        span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
+        per_revolution = 2.0 * math.pi / span * max(len(self.command.theta_2) - 1, 1)
         reference, (seconds, scatter) = self._time_rk4_step(), summarise_timings(times)
         cost = seconds / n * per_revolution
         return CostPoint(
             name, kind, label, setting_value, n, per_revolution, *found, cost, seconds / n, cost / reference, scatter
         )
-
-    def _count_positions_per_revolution(self) -> float:
-        span = float(np.ptp(self.command.theta_2)) or 2.0 * math.pi
-        return 2.0 * math.pi / span * max(len(self.command.theta_2) - 1, 1)
 
     def _time_rk4_step(self) -> float:
         try:
@@ -239,19 +230,14 @@ class CostStudy:
 
     def _time_answer(self, curve: str, engine: Engine, label: str = "", setting_value: float = math.nan) -> CostPoint:
         """Time an engine that answers each position."""
-        import time
-
-        times = []
-        for _ in range(ANSWERS):
-            began = time.process_time()
-            answer = engine.answer(self.scene, self.command)
-            times.append(time.process_time() - began)
+        answer = engine.answer(self.scene, self.command)
         if answer.refusal is not None:
             raise LimitError(f"{engine.name}: {answer.refusal}")
         assert answer.assembled is not None
         rows = np.flatnonzero(answer.assembled)
         at = self.command._replace(angle=self.command.theta_2[rows], branch=self.command.branch[rows])
         result = compute_errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
+        times = [time_call(partial(engine.answer, self.scene, self.command)) for _ in range(ANSWERS)]
         return self._make_point(
             curve, EXACT, label or engine.name, result, times, len(self.command.theta_2), setting_value
         )
@@ -300,10 +286,7 @@ def _time_interleaved(
     clocks: list[Callable[[int], float]], reference: Callable[[int], float], steps: list[int]
 ) -> tuple[list[tuple[float, float]], float]:
     """Time the steps, and their scatter over rounds; all take turns, so that a slow spell hits all of them."""
-
-    def per_step(clock: Callable[[int], float], n: int) -> float:
-        return clock(n) / n
-
-    every = zip((reference, *clocks), (TIMED_STEPS, *steps), strict=True)
-    base, *times = time_in_turns(dict(enumerate(partial(per_step, *each) for each in every)), ROUNDS).values()
-    return [summarise_timings(kept) for kept in times], median(base)
+    every = list(zip((reference, *clocks), (TIMED_STEPS, *steps), strict=True))
+    times = time_in_turns({number: partial(clock, n) for number, (clock, n) in enumerate(every)}, ROUNDS)
+    base, *rest = ([each / n for each in times[number]] for number, (_, n) in enumerate(every))
+    return [summarise_timings(kept) for kept in rest], median(base)

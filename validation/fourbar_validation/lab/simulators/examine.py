@@ -15,6 +15,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.compare.tolerance import find_error, magnitude
+from fourbar_validation.lab.simulators.releases import LOOK
 from fourbar_validation.run.elsewhere import run_to_end, start_harness
 
 SIMULATORS = {
@@ -92,9 +93,8 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Ex
         if python is None:
             found.left_out[name] = "not installed under any --python"
             continue
-        done = start_harness(
-            [python, "-m", "fourbar_validation.lab.simulators.work", module, file.absolute()], seconds=seconds
-        )
+        line = [python, "-m", "fourbar_validation.lab.simulators.work", module, file.absolute()]
+        done = start_harness(line, seconds=seconds)
         if done.why:
             found.left_out[name] = done.why
             continue
@@ -184,10 +184,4 @@ def compute_errors(scene: Scene, reading: dict[str, Any]) -> dict[str, float]:
 
 
 def _has(python: Path, library: str) -> bool:
-    look = (
-        "import importlib.util, sys\n"
-        f"try: found = importlib.util.find_spec({library!r})\n"
-        "except ModuleNotFoundError: found = None\n"
-        "sys.exit(found is None)"
-    )
-    return not run_to_end([python, "-c", look]).why
+    return not run_to_end([python, "-c", LOOK.format(library)]).failed

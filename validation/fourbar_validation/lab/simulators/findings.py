@@ -11,7 +11,7 @@ from textwrap import dedent
 import click
 
 from fourbar.errors import DependencyError, InputError
-from fourbar_validation.lab.simulators.releases import CACHE, install_version
+from fourbar_validation.lab.simulators.releases import CACHE, LOOK, install_version
 from fourbar_validation.places import CHECKOUT
 from fourbar_validation.run.elsewhere import Ended, run_to_end
 
@@ -20,7 +20,6 @@ FIELDS = ("Engine", "With", "Expected", "Found", "Since", "Until", "Reported")
 """Of a script's docstring, after its first sentence; Engine: the name for pip, in brackets what is imported."""
 MENDED = "mended"
 """What a script says at its end, with exit status 1, where the finding no longer holds."""
-LOOK = "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or sys.exit(1)"
 
 
 @dataclass(frozen=True, slots=True)

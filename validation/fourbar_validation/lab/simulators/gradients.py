@@ -12,8 +12,7 @@ from fourbar.scene import Scene
 from fourbar.studies.keys import command_key, list_entries, read_place, replace_numbers
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
-from fourbar_validation.engines.mujoco.stepping import open_model
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 from fourbar_validation.lab.simulators.motion import start
 from fourbar_validation.lab.simulators.mujoco_c import text
 

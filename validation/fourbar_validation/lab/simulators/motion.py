@@ -90,10 +90,8 @@ def run_through(
 ) -> Readings:
     """Simulate a turn in so many steps.
 
-    Parameters
-    ----------
-    advance : so many steps further, by the clock; what it returns is read.
-    clock : of the processor; of a GPU that of the wall.
+    `advance`: so many steps further, by the clock; what it returns is read.
+    `clock`: of the processor; of a GPU that of the wall.
     """
     found, done = Readings(setting, steps), 0
     for stop in turn(scene, steps)[1]:

@@ -11,9 +11,8 @@ from fourbar.mjcf import SIMULATORS, write_mjcf
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 from fourbar_validation.engines.mujoco.drives import remove_attributes
-from fourbar_validation.engines.mujoco.stepping import open_model
 from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through, start, turn
 
 VERSION = mujoco.__version__

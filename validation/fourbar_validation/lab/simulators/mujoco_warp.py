@@ -8,7 +8,7 @@ import numpy as np
 import warp
 
 from fourbar.scene import Scene
-from fourbar_validation.engines.mujoco.stepping import open_model
+from fourbar_validation.engines.mujoco.closed_loop import open_model
 from fourbar_validation.lab.simulators import gradients
 from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through
 from fourbar_validation.lab.simulators.mujoco_c import reading, states_of, text

@@ -21,6 +21,8 @@ MODULES = {extra: module for module, extra in EXTRA.items() if extra != "exact"}
 LISTED = "Available versions:"
 """What pip's list begins with; the newest comes first."""
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-versions"
+LOOK = "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or sys.exit(1)"
+"""For an interpreter: fails where a module is not installed."""
 DONE = "installed"
 """In the folder of a version that was installed wholly."""
 

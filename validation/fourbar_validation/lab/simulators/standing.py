@@ -80,6 +80,12 @@ def command(
             found.left_out[f"the two newest releases of {engine}"] = say_error(error)
     chart = draw_work_precision(found)
     examined_versions = dict.fromkeys(f"{line.simulator} {line.version}" for line in found.lines)
+    lists = {
+        "What had to be changed, and what it ran on": [
+            f"{name} ({found.devices[name]}): {what}" for name, what in found.changed.items()
+        ],
+        "Not examined": [f"{name}: {why}" for name, why in found.left_out.items()],
+    }
     page = {
         "title": given.title,
         "made": f"{name_machine()}; {', '.join(examined_versions)}",
@@ -91,7 +97,7 @@ def command(
             ("Apart: settings not meant for the simulator", list_groups(found, apart=True)),
         ],
         "differentiated": lay_out_derivatives(found),
-        "lists": [(heading, texts) for heading, texts in _read_lists(found).items() if texts],
+        "lists": [(heading, texts) for heading, texts in lists.items() if texts],
         "findings": run_findings(interpreters, time_limit),
         "svg": shrink_svg(chart),
     }
@@ -118,14 +124,6 @@ def lay_out_derivatives(found: Examination) -> dict[str, Any] | None:
         rows.append([f"{line.simulator} {line.version}", line.how, *cells])
     by = [key if key == "torque" else f"by {key}" for key in columns]
     return {"text": DIFFERENTIATED, "head": ["simulator", "how", *by], "rows": rows} if rows else None
-
-
-def _read_lists(found: Examination) -> dict[str, list[str]]:
-    changed = [f"{name} ({found.devices[name]}): {what}" for name, what in found.changed.items()]
-    return {
-        "What had to be changed, and what it ran on": changed,
-        "Not examined": [f"{name}: {why}" for name, why in found.left_out.items()],
-    }
 
 
 def write_size(error: float) -> str:

@@ -19,7 +19,7 @@ from fourbar_validation.engines.workers import apply_each
 from fourbar_validation.lab.simulators.releases import CACHE, Release, find_module, install_version, list_released
 from fourbar_validation.lab.simulators.versions_page import describe_changed, write_files
 from fourbar_validation.places import MODELS
-from fourbar_validation.regression.change import Change, Kind
+from fourbar_validation.regression.change import Kind
 from fourbar_validation.regression.changes import compare_rows
 from fourbar_validation.regression.history import HistoryRun
 from fourbar_validation.regression.record import read_run
@@ -75,7 +75,7 @@ def command(
     timing = next(iter(scenes), TIMED).absolute()
 
     there = partial(_attempt, arguments, witnesses, timing, (engine, cache, more), out / "runs")
-    found = bisect_versions(chosen, there) if bisect else scan_versions(chosen, there, jobs)
+    found = bisect_versions(chosen, there) if bisect else list(apply_each(there, chosen, jobs, seconds=None))
     if sum(release.run is not None for release in found) < 2:
         reasons = "; ".join(f"{release.version}: {release.why}" for release in found if release.run is None)
         raise DependencyError(f"fewer than two versions of {engine} can be judged: {reasons}")
@@ -140,11 +140,6 @@ def print_times(file: str, *names: str) -> None:
     click.echo(json.dumps(least))
 
 
-def scan_versions(versions: Sequence[str], attempt: Try, jobs: int) -> list[Release]:
-    """Run every version, `jobs` at a time."""
-    return list(apply_each(attempt, versions, jobs, seconds=None))
-
-
 def bisect_versions(versions: Sequence[str], attempt: Try) -> list[Release]:
     """Run the versions that it takes to find those between which something changed.
 
@@ -167,7 +162,8 @@ def bisect_versions(versions: Sequence[str], attempt: Try) -> list[Release]:
         low, high = open_ends.pop()
         before, after = at(low), at(high)
         assert before is not None and after is not None
-        changes = _find_changes(before, after)
+        found = compare_rows((before.about, before.rows), (after.about, after.rows)).changes
+        changes = [change for change in found if change.kind not in NO_CHANGE]
         if kinds is None:
             verdicts = any(change.kind in OF_VERDICTS for change in changes)
             kinds = OF_VERDICTS if verdicts else tuple(kind for kind in Kind if kind not in NO_CHANGE)
@@ -177,8 +173,3 @@ def bisect_versions(versions: Sequence[str], attempt: Try) -> list[Release]:
         if (middle := nearest(inner)) is not None:
             open_ends += [(low, middle), (middle, high)]
     return [tried[index] for index in sorted(tried)]
-
-
-def _find_changes(before: HistoryRun, after: HistoryRun) -> list[Change]:
-    found = compare_rows((before.about, before.rows), (after.about, after.rows))
-    return [change for change in found.changes if change.kind not in NO_CHANGE]

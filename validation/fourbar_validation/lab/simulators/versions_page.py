@@ -5,6 +5,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from fourbar_validation.compare.rows import FAILS, REFUSES, write_csv
 from fourbar_validation.lab.simulators.examine import TORQUE_AND_FORCES
 from fourbar_validation.lab.simulators.releases import Release
@@ -58,22 +60,15 @@ def list_lines(found: Sequence[Release]) -> list[dict[str, Any]]:
         run = release.run
         for engine in dict.fromkeys(row.engine for row in run.rows):
             rows = [row for row in run.rows if row.engine == engine]
-            errors = {
-                name: max(
-                    (row.error for row in rows if row.quantity == name and row.compared), default=None, key=_sort_last
-                )
-                for name in TORQUE_AND_FORCES
-            }
+            errors: dict[str, float | None] = {}
+            for name in TORQUE_AND_FORCES:
+                of = [row.error for row in rows if row.quantity == name and row.compared]
+                errors[name] = float(np.max(of)) if of else None  # NaN where one is
             counted = {"compared": sum(row.compared for row in rows)}
             counted |= {verdict: sum(row.verdict == verdict for row in rows) for verdict in (FAILS, REFUSES)}
             times = {CLOCK: release.seconds.get(engine)}
             made.append({"version": release.version, "engine": engine, "why": "", **errors, **counted, **times})
     return made
-
-
-def _sort_last(error: float) -> float:
-    """Sort NaN as the greatest."""
-    return math.inf if math.isnan(error) else error
 
 
 COLUMNS = ("version", "engine", *TORQUE_AND_FORCES, "compared", FAILS, REFUSES, CLOCK, "why")

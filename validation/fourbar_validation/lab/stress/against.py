@@ -8,12 +8,14 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
 from fourbar.errors import DependencyError, FourBarError, InputError
 from fourbar.quantities import ANGLES, UNKNOWNS
+from fourbar_validation.lab.stress.timed import time_in_turns
 from fourbar_validation.places import find_checkout
 from fourbar_validation.run.elsewhere import run_to_end
 
@@ -39,16 +41,12 @@ def time_against(revision: str, positions: int, rounds: int, tree: Path | None =
     tree = find_checkout("bench --against") if tree is None else tree
     with tempfile.TemporaryDirectory(prefix="fourbar-") as folder:
         unpack(revision, tree, Path(folder))
-        pairs = []
-        for number in range(rounds):
-            turn = [(tree, "this tree"), (Path(folder), revision)]
-            if number % 2:  # who goes second finds a warmer machine
-                turn.reverse()
-            times = {name: time_actions(where, name, positions) for where, name in turn}
-            pairs.append((times["this tree"], times[revision]))
+        trees = {"this tree": tree, revision: Path(folder)}
+        clocks = {name: partial(time_actions, where, name, positions) for name, where in trees.items()}
+        both = time_in_turns(clocks, rounds).values()
     rows = {}
-    for name in pairs[0][0]:
-        ours, theirs = ([times[name] for times in side] for side in zip(*pairs, strict=True))
+    for name in next(iter(both))[0]:
+        ours, theirs = ([times[name] for times in side] for side in both)
         ratios = [a / b for a, b in zip(ours, theirs, strict=True)]
         rows[name] = Ratio(median(ours), median(theirs), median(ratios), min(ratios), max(ratios))
     return rows

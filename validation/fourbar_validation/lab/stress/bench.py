@@ -8,44 +8,40 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import click
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Gravity
 from fourbar.errors import BROKEN, FAILED, HOLDS
 from fourbar.evaluation.case import BLOCK
 from fourbar.formulas.mobility import choose_range
-from fourbar.linkage import MOVING_BARS, Bar, FourBar
+from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import ANGLES, UNKNOWNS
-from fourbar.scene import Command, Scene
 from fourbar.show.plot.style import format_of
 from fourbar.solve import solve
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.lab.cost.formulas import make_bodies
 from fourbar_validation.lab.stress.against import ONE_THREAD
 from fourbar_validation.lab.stress.against import time_against as against_revision
-from fourbar_validation.lab.stress.bench_picture import Times, draw_bench
 from fourbar_validation.lab.stress.contenders import (
     POSITIONS,
     STUDY,
+    Times,
     collect_loops,
+    draw_bench,
     time_interleaved,
     time_linkages,
     time_positions,
 )
-from fourbar_validation.lab.stress.speed_limits import JUDGED_BY_SYSTEMS, LIMITS
-from fourbar_validation.lab.stress.timed import LINKAGE, allocate, make_command, make_example, time_call
-from fourbar_validation.published.thirteen import FreeBodies, solve_thirteen
+from fourbar_validation.lab.stress.timed import allocate, make_command, make_example, time_call
+from fourbar_validation.published.thirteen import solve_thirteen
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.terminal import make_table
 from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 Array = NDArray[np.float64]
 
@@ -61,7 +57,69 @@ ALONE = 20
 """Calls of one position each."""
 PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
+ALL, COMPILED, ANGLES_ALONE = "formulas, all 11 unknowns", "the same compiled", "positions only"
+SYSTEM, FLOOR = "13x13 assembled and solved", "floor: tangent, root, two arctan"
+FORCES, BARS, ONE = "solve to forces, points too", "solve with error bars", "one position to forces"
 JUDGED = "a scene judged by the exact engines"
+
+
+class SpeedLimit(NamedTuple):
+    """Limit of a row of the table, and why; a ratio, which holds with and without AVX-512."""
+
+    sign: str
+    bound: float
+    reason: str
+    of: str = ""
+    over: str = ""
+    """The rows whose ratio it is."""
+
+    def holds(self, measured: float) -> bool:
+        """Compare a measured number with the limit; NaN does not hold."""
+        return measured >= self.bound if self.sign == ">=" else measured <= self.bound
+
+
+LIMITS = {
+    "13x13 / formulas": SpeedLimit(
+        ">=", 5.0, "closed formulas are worth several times the system that they eliminate", SYSTEM, ALL
+    ),
+    "formulas / positions only": SpeedLimit(
+        ">=", 3.0, "who asks for two angles does not pay for nine more unknowns", ALL, ANGLES_ALONE
+    ),
+    "positions only / floor": SpeedLimit(
+        "<=", 6.0, "the rest of two angles is arithmetic on arrays of a block", ANGLES_ALONE, FLOOR
+    ),
+    "solve to forces / formulas": SpeedLimit(
+        "<=", 2.0, "new arrays and the points come on top, no second evaluation", FORCES, ALL
+    ),
+    "solve with error bars / to forces": SpeedLimit(
+        "<=", 25.0, "the forces are evaluated 15 times, all that is computed changed in its last digit", BARS, FORCES
+    ),
+    "one position / 13x13 solved": SpeedLimit(
+        "<=", 70.0, "some hundred steps of Python, and no array", ONE, "13x13 solved, 1000 at once"
+    ),
+    "one position with error bars / to forces": SpeedLimit(
+        "<=", 4.5, "the evaluations run as one batch of short arrays", "one position with error bars", ONE
+    ),
+    "numpy / compiled": SpeedLimit(">=", 1.2, "who installs numba gains by it on one core", ALL, COMPILED),
+    "compiled / C": SpeedLimit(
+        "<=", 1.5, "the blocks, statuses and copies around the compiled loop stay small", COMPILED, "C, all"
+    ),
+    "compiled error bars / forces": SpeedLimit(
+        "<=",
+        6.0,
+        "fourteen more evaluations, which share the tangent and the writing",
+        "compiled with error bars",
+        "compiled to forces, points too",
+    ),
+    "study of linkages / positions": SpeedLimit("<=", 2.0, "a member is a column of the same arrays as a position"),
+    "growth from 1000 positions on": SpeedLimit("<=", 1.3, "the work is linear in the positions: blocks fit the cache"),
+    "memory beyond the result, MB": SpeedLimit("<=", 50.0, "work space is that of a block, not of the sweep"),
+    "a judged scene / 13x13": SpeedLimit(
+        "<=", 26_000.0, "65 ms where a system takes 2.5 us: a million scenes a night on 20 cores", JUDGED, SYSTEM
+    ),
+    "import fourbar / import numpy": SpeedLimit("<=", 1.0, "it loads numpy alone, and less than that of its own"),
+}
+"""By the name of the row."""
 
 
 class Measured(NamedTuple):
@@ -71,22 +129,6 @@ class Measured(NamedTuple):
     over_positions: Times
     over_linkages: Times
     not_run: dict[str, str]
-
-
-def make_bodies(scene: Scene, at: Command) -> FreeBodies:
-    """Make the right-hand sides of the 13x13 system from the kinematics; not part of what is timed."""
-    s = solve(scene, "acceleration", at=at)
-    gravity = np.array(next((effect.vector for effect in scene.effects if isinstance(effect, Gravity)), (0.0, 0.0)))
-    first = {2: np.zeros_like(s.A), 3: s.A, 4: np.full_like(s.A, (LINKAGE.ground, 0.0))}
-    second = {2: s.A, 3: s.B, 4: s.B}
-    bars = {k: scene.linkage.bar(k) for k in MOVING_BARS}
-    centre = {k: getattr(s, f"G{k}") for k in MOVING_BARS}
-    return FreeBodies(
-        {k: np.ascontiguousarray(first[k] - centre[k]) for k in MOVING_BARS},
-        {k: np.ascontiguousarray(second[k] - centre[k]) for k in MOVING_BARS},
-        {k: np.ascontiguousarray(bars[k].mass * (getattr(s, f"a_G{k}") - gravity)) for k in MOVING_BARS},
-        {k: bars[k].moment_of_inertia * getattr(s, f"alpha_{k}") for k in MOVING_BARS},
-    )
 
 
 def import_cost() -> float:
@@ -139,7 +181,6 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
         format_of(picture)
     if against is not None:
         return print_comparison(against, positions, rounds)
-    from rich.box import HEAVY_HEAD
     from rich.console import Console
 
     if any(os.environ.get(name) != "1" for name in ONE_THREAD):
@@ -155,16 +196,19 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
     for what, measured in result.rows.items():
         limit = LIMITS.get(what)
         if limit is None:
-            rows.append((what, f"{measured:.1f} {'ms' if what == JUDGED else 'ns/position'}"))
+            rows.append((what, f"{1e-6 * measured:.1f} ms" if what == JUDGED else f"{measured:.1f} ns/position"))
             continue
         holds = limit.holds(measured)
         rows.append((what, f"{measured:.2f}", f"{limit.sign} {limit.bound:g}", "holds" if holds else "fails"))
         broken += [] if holds else [f"{what}: {limit.reason}"]
     console = Console()
     title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {name_machine()}"
-    console.print(make_table(("what", "measured", "needed", ""), rows, title=title, box=HEAVY_HEAD))
+    console.print(make_table(("what", "measured", "needed", ""), rows, title=title))
     for title, times in ((OVER_POSITIONS, result.over_positions), (OVER_LINKAGES, result.over_linkages)):
-        console.print(_make_table(title, times))
+        counts = sorted({n for own in times.values() for n in own})
+        head = ["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)]
+        each = [[who, *(f"{own[n]:.4g}" if n in own else "" for n in counts)] for who, own in times.items()]
+        console.print(make_table(head, each, title=title))
     for who, reason in result.not_run.items():
         click.echo(f"not run: {who}: {reason}")
     if picture is not None:
@@ -174,18 +218,8 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
     return FAILED if broken else HOLDS
 
 
-def _make_table(title: str, times: Times) -> "Table":
-    """Lay out one row for each contender, one column for each count."""
-    from rich.box import HEAVY_HEAD
-
-    counts = sorted({n for own in times.values() for n in own})
-    rows = [[who, *(f"{own[n]:.4g}" if n in own else "" for n in counts)] for who, own in times.items()]
-    return make_table(["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)], rows, title=title, box=HEAVY_HEAD)
-
-
 def print_comparison(revision: str, positions: int, rounds: int) -> int:
     """Print this tree's times over those of a revision; a measurement without limits."""
-    from rich.box import HEAVY_HEAD
     from rich.console import Console
     from rich.markup import escape
 
@@ -196,7 +230,7 @@ def print_comparison(revision: str, positions: int, rounds: int) -> int:
     title = f"CPU ms of a call in this tree and at {escape(revision)}, and their ratio; "
     title += f"{positions} positions, one core, medians of {rounds} pairs in turns; {name_machine()}"
     head = ("what", "ours", "theirs", "ratio", "least", "most")
-    Console().print(make_table(head, rows, title=title, box=HEAVY_HEAD))
+    Console().print(make_table(head, rows, title=title))
     return HOLDS
 
 
@@ -206,61 +240,41 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     limits, swing = make_example(WITH_LIMITS), make_command(positions, *choose_range(WITH_LIMITS))
     everything, angles = allocate(UNKNOWNS, at), allocate(ANGLES, at)
     batch, solved = min(positions, THIRTEEN_BATCH), make_command(min(positions, SOLVED))
-    bodies = make_bodies(scene, make_command(batch))
+    bodies, many = make_bodies(scene, make_command(batch)), len(solved.theta_2)
     alone, rng = make_example(theta_2=1.0), np.random.default_rng(0)
     systems, right = rng.random((1000, 13, 13)), rng.random((1000, 13, 1))
     peers = collect_loops()
-    actions: dict[str, Callable[[], object]] = {
-        "formulas, all 11 unknowns": lambda: solve(scene, at=at, out=everything, compiled=False),
-        "the same compiled": lambda: solve(scene, at=at, out=everything, compiled=True),
-        "positions only": lambda: solve(scene, at=at, out=angles),
-        "13x13 assembled and solved": lambda: solve_thirteen(bodies, 2),
-        "floor: tangent, root, two arctan": make_floor(at.theta_2, angles),
-        "input between limits: all": lambda: solve(limits, at=swing, out=everything, compiled=False),
-        "input between limits: positions only": lambda: solve(limits, at=swing, out=angles),
-        "solve to forces, points too": lambda: solve(scene, "force", at=solved, compiled=False),
-        "solve with error bars": lambda: solve(scene, "error", at=solved, compiled=False),
-        "compiled to forces, points too": lambda: solve(scene, "force", at=solved, compiled=True),
-        "compiled with error bars": lambda: solve(scene, "error", at=solved, compiled=True),
-        "13x13 solved, 1000 at once": lambda: np.linalg.solve(systems, right),
-        "one position to forces": lambda: [solve(alone) for _ in range(ALONE)],
-        "one position with error bars": lambda: [solve(alone, "error") for _ in range(ALONE)],
+    actions: dict[str, tuple[int, Callable[[], object]]] = {
+        ALL: (positions, lambda: solve(scene, at=at, out=everything, compiled=False)),
+        ANGLES_ALONE: (positions, lambda: solve(scene, at=at, out=angles)),
+        SYSTEM: (batch, lambda: solve_thirteen(bodies, 2)),
+        FLOOR: (positions, make_floor(at.theta_2, angles)),
+        "input between limits: all": (positions, lambda: solve(limits, at=swing, out=everything, compiled=False)),
+        "input between limits: positions only": (positions, lambda: solve(limits, at=swing, out=angles)),
+        FORCES: (many, lambda: solve(scene, "force", at=solved, compiled=False)),
+        BARS: (many, lambda: solve(scene, "error", at=solved, compiled=False)),
+        "13x13 solved, 1000 at once": (len(systems), lambda: np.linalg.solve(systems, right)),
+        ONE: (ALONE, lambda: [solve(alone) for _ in range(ALONE)]),
+        "one position with error bars": (ALONE, lambda: [solve(alone, "error") for _ in range(ALONE)]),
     }
-    out = np.zeros((15, positions))
+    if "compiled" in peers.here:
+        actions |= {
+            COMPILED: (positions, lambda: solve(scene, at=at, out=everything, compiled=True)),
+            "compiled to forces, points too": (many, lambda: solve(scene, "force", at=solved, compiled=True)),
+            "compiled with error bars": (many, lambda: solve(scene, "error", at=solved, compiled=True)),
+        }
     if "C" in peers.here:
-        actions["C, all"] = partial(peers.here["C"], at.theta_2, out)
-    if "compiled" in peers.not_run:
-        actions = {name: action for name, action in actions.items() if "compiled" not in name}
-    times = time_interleaved(actions, rounds)
-    counts = {"13x13 assembled and solved": batch}
-    to_stages = ["solve to forces, points too", "solve with error bars"]
-    to_stages += ["compiled to forces, points too", "compiled with error bars"]
-    counts |= dict.fromkeys(to_stages, len(solved.theta_2))
-    counts |= {"13x13 solved, 1000 at once": len(systems)}
-    counts |= dict.fromkeys(("one position to forces", "one position with error bars"), ALONE)
-    rows = {name: 1e9 * value / counts.get(name, positions) for name, value in times.items()}
+        actions["C, all"] = (positions, partial(peers.here["C"], at.theta_2, np.zeros((15, positions))))
+    times = time_interleaved({name: action for name, (_, action) in actions.items()}, rounds)
+    rows = {name: 1e9 * times[name] / count for name, (count, _) in actions.items()}
     by_positions = time_positions(peers.here, largest, rounds)
     by_linkages = time_linkages(positions, rounds, compiled="compiled" in peers.here)
     cost, most = by_positions["NumPy"], max(by_linkages[STUDY])
-    everything_ns, forces = rows["formulas, all 11 unknowns"], rows["solve to forces, points too"]
-    if "compiled" in peers.here:
-        rows["numpy / compiled"] = everything_ns / rows["the same compiled"]
-        rows["compiled error bars / forces"] = rows["compiled with error bars"] / rows["compiled to forces, points too"]
-        if "C" in peers.here:
-            rows["compiled / C"] = rows["the same compiled"] / rows["C, all"]
     exact = [witness for witness in WITNESSES if not witness.through_time]
     if not any(witness.missing() for witness in exact):
-        rows[JUDGED] = time_judging(exact, max(1, positions // PER_SCENE))
-        rows[JUDGED_BY_SYSTEMS] = rows[JUDGED] * 1e6 / rows["13x13 assembled and solved"]
+        rows[JUDGED] = 1e9 * time_judging(exact, max(1, positions // PER_SCENE))
+    rows |= {name: rows[row.of] / rows[row.over] for name, row in LIMITS.items() if {row.of, row.over} <= rows.keys()}
     rows |= {
-        "13x13 / formulas": rows["13x13 assembled and solved"] / everything_ns,
-        "formulas / positions only": everything_ns / rows["positions only"],
-        "positions only / floor": rows["positions only"] / rows["floor: tangent, root, two arctan"],
-        "solve to forces / formulas": forces / everything_ns,
-        "solve with error bars / to forces": rows["solve with error bars"] / forces,
-        "one position / 13x13 solved": rows["one position to forces"] / rows["13x13 solved, 1000 at once"],
-        "one position with error bars / to forces": rows["one position with error bars"]
-        / rows["one position to forces"],
         "study of linkages / positions": by_linkages[STUDY][most] / by_linkages[POSITIONS][most],
         "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
         "memory beyond the result, MB": measure_memory(min(positions, 1_000_000)),
@@ -270,8 +284,8 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
 
 
 def time_judging(witnesses: list[Witness], scenes: int) -> float:
-    """Time the check of a random scene as `run` does it, nothing drawn: median CPU time in ms."""
+    """Time the check of a random scene as `run` does it, nothing drawn: median CPU time in s."""
     suite = Random(scenes + 1, 0, tuple(DrawnType))
     each = (partial(judge_for_report, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
     times = [time_call(action) for action in each]
-    return 1e3 * median(times[1:])  # the first one imports the engines
+    return median(times[1:])  # the first one imports the engines

@@ -1,22 +1,41 @@
-"""Who evaluates the positions of one linkage, and the linkages of one position: their times, side by side."""
+"""Who evaluates the positions of one linkage, and the linkages of one position: their times and their picture."""
 
+import ctypes
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar import vary
 from fourbar.errors import DependencyError, say_install
 from fourbar.quantities import UNKNOWNS, VECTORS
+from fourbar.show.plot.style import apply_style, format_of, save
 from fourbar.solve import solve
 from fourbar.studies.function import function
-from fourbar_validation.lab.stress.bench_picture import Times
-from fourbar_validation.lab.stress.in_c import Loop, compile_loop
 from fourbar_validation.lab.stress.timed import make_command, make_example, time_call, time_in_turns
+from fourbar_validation.report.machine import name_machine
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+Times = dict[str, dict[int, float]]
+"""ns for each, by who and by how many."""
+Loop = Callable[[Array, Array], None]
+"""Writes theta_3, theta_4, omega_3, omega_4, alpha_3, alpha_4, F12, F32, F43, F14 (two rows each) and the torque at n
+angles into an array (15, n)."""
+SOURCE = Path(__file__).with_name("bench_loop.c")
+FLAGS = ("-O3", "-march=native")
+LOOKS = (("#0072B2", "o"), ("#D55E00", "s"), ("#1a1a1a", "^"), ("#007A5A", "v"), ("#8A3B78", "D"))
+"""Colours and marks in the order of the contenders."""
 AT_ONCE = 1_000_000
 """Positions of a call: more are evaluated in pieces of this many, so that their memory is bounded (150 MB)."""
 SHORTEST = 200_000
@@ -24,8 +43,6 @@ SHORTEST = 200_000
 MOST_LINKAGES = 100_000
 MOST_LOOPED = 1000
 """Linkages that are solved one after the other: beyond them the cost of one no longer changes."""
-
-
 STUDY, POSITIONS, LOOPED = "study, NumPy", "one linkage, as many positions", "one after the other"
 
 
@@ -36,9 +53,9 @@ class Peers(NamedTuple):
     not_run: dict[str, str]
 
 
-def time_interleaved(actions: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
-    """Time the actions in turn: the median of each, the first round apart."""
-    clocks = {name: partial(time_call, action) for name, action in actions.items()}
+def time_interleaved(actions: Mapping[str, Callable[[], object]], rounds: int, calls: int = 1) -> dict[str, float]:
+    """Time a call of each action in turn, in CPU seconds: the median, the first round apart."""
+    clocks = {name: partial(time_call, action, calls) for name, action in actions.items()}
     return {name: median(times[1:]) for name, times in time_in_turns(clocks, rounds + 1).items()}
 
 
@@ -99,24 +116,35 @@ def _make_library_loop(name: str) -> Loop | str:
     return call
 
 
+def compile_loop() -> Loop | str:
+    """Compile the loop; the reason where that fails."""
+    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    if compiler is None:
+        return "no C compiler is installed"
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder) / "loop.so"
+        line = [compiler, *FLAGS, "-fPIC", "-shared", str(SOURCE), "-o", str(library), "-lm"]
+        made = subprocess.run(line, capture_output=True, encoding="utf-8", errors="replace", check=False)
+        if made.returncode != 0:
+            return f"{compiler} fails: {(made.stderr.strip().splitlines() or ['without a word'])[0]}"
+        loop = ctypes.CDLL(str(library)).loop
+    pointer = ctypes.POINTER(ctypes.c_double)
+
+    def call(theta_2: Array, out: Array) -> None:
+        loop(ctypes.c_long(len(theta_2)), theta_2.ctypes.data_as(pointer), out.ctypes.data_as(pointer))
+
+    return call
+
+
 def time_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
     """Time a position, in ns, for 1000, 10 000, ... of them, into arrays that are there."""
     times: Times = {name: {} for name in peers}
     for n in [10**k for k in range(3, 9) if 10**k <= largest]:
-        theta_2, out = make_command(min(n, AT_ONCE)).theta_2, np.zeros((15, min(n, AT_ONCE)))
-        calls = max(1, SHORTEST // n, n // AT_ONCE)
-        evaluated = calls * len(theta_2)
-
-        def repeated(loop: Loop, theta_2: Any = theta_2, out: Any = out, calls: int = calls) -> Callable[[], None]:
-            def action() -> None:
-                for _ in range(calls):
-                    loop(theta_2, out)
-
-            return action
-
-        own = {name: repeated(loop) for name, loop in peers.items()}
-        for name, value in time_interleaved(own, rounds if n <= AT_ONCE else 1).items():
-            times[name][n] = 1e9 * value / evaluated
+        at_once, calls = min(n, AT_ONCE), max(1, SHORTEST // n, n // AT_ONCE)
+        theta_2, out = make_command(at_once).theta_2, np.zeros((15, at_once))
+        own = {name: partial(loop, theta_2, out) for name, loop in peers.items()}
+        for name, value in time_interleaved(own, rounds if n <= AT_ONCE else 1, calls).items():
+            times[name][n] = 1e9 * value / at_once
     return times
 
 
@@ -125,33 +153,48 @@ def time_linkages(largest: int, rounds: int, *, compiled: bool) -> Times:
     scene = make_example(theta_2=1.0)
     times: Times = {STUDY: {}, POSITIONS: {}, LOOPED: {}}
     times |= {"study, compiled": {}} if compiled else {}
+
+    def study(lengths: Any, compiled: bool) -> None:
+        solve(vary(scene, {"lengths.coupler": lengths}), compiled=compiled)
+
+    def looped(lengths: Any) -> None:
+        for length in lengths.tolist():
+            linkage = replace(scene.linkage, coupler=replace(scene.linkage.coupler, length=length))
+            solve(replace(scene, linkage=linkage))
+
     for m in [10**k for k in range(6) if 10**k <= min(largest, MOST_LINKAGES)]:
         lengths = np.linspace(0.24, 0.26, m)
-        calls = max(1, MOST_LOOPED // m)
-        at = make_command(m)
-
-        def study(compiled: bool, lengths: Any = lengths, calls: int = calls) -> None:
-            for _ in range(calls):
-                solve(vary(scene, {"lengths.coupler": lengths}), compiled=compiled)
-
-        def positions(at: Any = at, calls: int = calls) -> None:
-            for _ in range(calls):
-                solve(scene, at=at, compiled=False)
-
-        def looped(lengths: Any = lengths, calls: int = calls) -> None:
-            for _ in range(calls):
-                for length in lengths.tolist():
-                    linkage = replace(scene.linkage, coupler=replace(scene.linkage.coupler, length=length))
-                    solve(replace(scene, linkage=linkage))
-
         actions: dict[str, Callable[[], object]] = {
-            STUDY: lambda study=study: study(False),  # type: ignore[misc]
-            POSITIONS: positions,
+            STUDY: partial(study, lengths, False),
+            POSITIONS: partial(solve, scene, at=make_command(m), compiled=False),
         }
         if compiled:
-            actions["study, compiled"] = lambda study=study: study(True)  # type: ignore[misc]
+            actions["study, compiled"] = partial(study, lengths, True)
         if m <= MOST_LOOPED:
-            actions[LOOPED] = looped
-        for name, value in time_interleaved(actions, rounds).items():
-            times[name][m] = 1e9 * value / (calls * m)
+            actions[LOOPED] = partial(looped, lengths)
+        for name, value in time_interleaved(actions, rounds, max(1, MOST_LOOPED // m)).items():
+            times[name][m] = 1e9 * value / m
     return times
+
+
+def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
+    """Draw both growths on logarithmic axes into a file."""
+    kind = format_of(path)
+    with apply_style():
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(8.4, 4.0), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        _draw_panel(left, over_positions, "ns per position, every unknown", "positions")
+        _draw_panel(right, over_linkages, "ns per linkage, every force at one position", "linkages")
+        figure.supxlabel(f"One core: {name_machine()}", size=6.8, x=0.012, ha="left", parse_math=False)
+        save(figure, path, kind)
+
+
+def _draw_panel(axes: "Axes", times: Times, title: str, over: str) -> None:
+    for (who, own), (colour, mark) in zip(times.items(), LOOKS, strict=False):
+        axes.loglog(list(own), list(own.values()), color=colour, marker=mark, ms=3.5, lw=1.1, label=who)
+    axes.set_title(title)
+    axes.set_xlabel(over)
+    axes.set_ylabel("ns")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.2), ncols=2)

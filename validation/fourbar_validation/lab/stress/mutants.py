@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import click
 import numpy as np
@@ -24,15 +23,6 @@ PIECES = (
     *("<script>alert(1)</script>", "</mujoco>", "${x}", "{{x}}", "%s%n", "steps = 99999999999999999999"),
 )
 """What is put into files: the syntax itself, numbers at the edge, and text that other formats would run."""
-
-
-@dataclass(frozen=True, slots=True)
-class FileFailure:
-    """An input that ended in anything but a scene or one line."""
-
-    index: int
-    what: str
-    text: str
 
 
 def mutate_files(seed: int, indices: Sequence[int], originals: Sequence[str]) -> Iterator[tuple[int, str]]:
@@ -72,8 +62,8 @@ def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> st
             return text[:at] + str(int(rng.integers(10))) + text[at + 1 :]
 
 
-def try_out(index: int, text: str) -> FileFailure | None:
-    """Read a mutated file and evaluate what it describes."""
+def try_out(text: str) -> str:
+    """Read a mutated file and evaluate what it describes: what it ended in but a scene or one line, or nothing."""
     start = time.perf_counter()
     try:
         scene = loads(text, "mutant.toml")
@@ -83,14 +73,13 @@ def try_out(index: int, text: str) -> FileFailure | None:
                 solve(scene, find_last_stage(scene), at=at)
     except FourBarError as error:
         if "\n" in str(error):
-            return FileFailure(index, f"more than one line: {error}", text)
+            return f"more than one line: {error}"
     except MemoryError:
         pass  # more positions than there is memory for: stated as such by the command line
     except Exception as error:
-        return FileFailure(index, f"{type(error).__name__}: {error}", text)
-    if time.perf_counter() - start > HANG:
-        return FileFailure(index, f"took {time.perf_counter() - start:.1f} s", text)
-    return None
+        return f"{type(error).__name__}: {error}"
+    took = time.perf_counter() - start
+    return f"took {took:.1f} s" if took > HANG else ""
 
 
 @click.command()
@@ -103,9 +92,8 @@ def fuzz_files(count: int, seed: int) -> int:
     originals = [file.read_text(encoding="utf-8") for file in list_model_files()]
     failed = 0
     for index, text in track(mutate_files(seed, range(count), originals), total=count, description="mutants"):
-        trouble = try_out(index, text)
-        if trouble is not None:
+        if what := try_out(text):
             failed += 1
-            click.echo(f"mutant {trouble.index}: {trouble.what}\n{trouble.text!r}")
+            click.echo(f"mutant {index}: {what}\n{text!r}")
     click.echo(f"{count} mutated scene files, {failed} of them ended in a traceback or a hang")
     return 1 if failed else 0

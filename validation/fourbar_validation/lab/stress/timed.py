@@ -4,7 +4,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from fourbar import Bar, FourBar, Gravity, Motion, Scene, solve
 from fourbar.scene import Command
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
 """Crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, uniform bars."""
@@ -45,12 +46,12 @@ def time_call(action: Callable[[], object], calls: int = 1) -> float:
     return (time.process_time() - start) / calls
 
 
-def time_in_turns(clocks: Mapping[Any, Callable[[], float]], rounds: int) -> dict[Any, list[float]]:
-    """Read the clocks in turns, so that a slow spell hits all of them."""
-    times: dict[Any, list[float]] = {name: [] for name in clocks}
-    for _ in range(rounds):
-        for name, clock in clocks.items():
-            times[name].append(clock())
+def time_in_turns(clocks: Mapping[Any, Callable[[], T]], rounds: int) -> dict[Any, list[T]]:
+    """Read the clocks in turns, there and back: a slow spell hits all, and none always finds a warmer machine."""
+    times: dict[Any, list[T]] = {name: [] for name in clocks}
+    for number in range(rounds):
+        for name in list(clocks)[:: -1 if number % 2 else 1]:
+            times[name].append(clocks[name]())
     return times
 
 

@@ -85,7 +85,10 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
     if not exact or _is_held(scene, values):
         tally.no_torque += 1
         return
-    moves = {name: _moves(by, numbers) for name, by in exact.items()}
+    moves = {  # sum |x_i dy/dx_i|
+        name: math.fsum(abs(number * float(by[key][0].mid())) for key, number in numbers.items())
+        for name, by in exact.items()
+    }
     if np.isnan(found["sin_mu"]).any() and is_untold(values["sin_mu"], moves["sin_mu"]):
         tally.untold += 1
         return
@@ -104,8 +107,3 @@ def _is_held(scene: Scene, values: Values) -> bool:
     """Whether dry friction holds a pin at rest, so that torque and pin forces have no derivative."""
     dry = [PINS[pin] for term in scene.effects if isinstance(term, Friction) for pin, f in term.torques if f]
     return any(not abs(values.get(f"omega_{j}", 0) - values.get(f"omega_{i}", 0)) > 0 for i, j in dry)
-
-
-def _moves(slopes: dict[str, tuple[Any, float]], numbers: dict[str, float]) -> float:
-    """Compute sum |x_i dy/dx_i|."""
-    return math.fsum(abs(number * float(slopes[key][0].mid())) for key, number in numbers.items())

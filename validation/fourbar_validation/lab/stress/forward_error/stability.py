@@ -2,7 +2,6 @@
 
 import math
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -94,13 +93,7 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
 
 
 def run(
-    family: str,
-    samples: range,
-    seed: int = 0,
-    bar: int = 2,
-    library: str = "numpy",
-    *,
-    derivatives: bool = False,
+    family: str, samples: range, seed: int = 0, bar: int = 2, library: str = "numpy", *, derivatives: bool = False
 ) -> Tally:
     """Judge some samples of a family; each depends on the family, the seed and its number alone.
 
@@ -143,12 +136,6 @@ def _run(seed: int, bar: int, library: str, derivatives: bool, task: tuple[str, 
     return run(*task, seed, bar, library, derivatives=derivatives)
 
 
-def make_chunks(samples: int) -> Iterator[range]:
-    """Divide the sample numbers into tasks."""
-    for start in range(0, samples, CHUNK):
-        yield range(start, min(start + CHUNK, samples))
-
-
 @click.command()
 @click.option("--samples", default=FULL, show_default=True, type=click.IntRange(1), help="Samples per family.")
 @click.option("--family", "families", multiple=True, type=click.Choice(list(FAMILIES)), help="Only these (repeatable).")
@@ -167,12 +154,12 @@ def stability(
     samples: int, families: tuple[str, ...], seed: int, bar: int, library: str, derivatives: bool, jobs: int
 ) -> int:
     """Measure the error of every output against 50-digit arithmetic, and whether the error bars hold."""
-    from rich.box import HEAVY_HEAD
     from rich.console import Console
     from rich.progress import track
 
     chosen = families or tuple(FAMILIES)
-    tasks = [(family, part) for family in chosen for part in make_chunks(samples)]
+    parts = [range(start, min(start + CHUNK, samples)) for start in range(0, samples, CHUNK)]
+    tasks = [(family, part) for family in chosen for part in parts]
     results = apply_each(partial(_run, seed, bar, library, derivatives), tasks, jobs, seconds=None)
     tallies = {family: Tally() for family in chosen}
     for (family, _), tally in track(zip(tasks, results, strict=True), "samples", total=len(tasks)):
@@ -192,7 +179,7 @@ def stability(
     console = Console()
     of = ", of derivatives by every number" if derivatives else ""
     title = f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}, {library}{of}"
-    console.print(make_table(("output", *chosen), rows, title=title, box=HEAVY_HEAD))
+    console.print(make_table(("output", *chosen), rows, title=title))
     for family, tally in tallies.items():
         for name, (part, sample) in tally.worst.items():
             if part > 1.0:

@@ -17,8 +17,6 @@ from fourbar_validation.run.elsewhere import run_to_end
 
 SECONDS = 300
 """A fault with which the harness takes longer than this ends the run as a failure would; it takes some ten."""
-
-
 Failing = dict[str, list[str]]
 """By test scene: the rows that fail."""
 

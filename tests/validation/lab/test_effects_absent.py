@@ -17,7 +17,7 @@ import fourbar
 from fourbar import effects
 from fourbar.effects import FILE_OF, Friction, Viscous
 from fourbar.mjcf import write_mjcf
-from fourbar_validation.engines.mujoco.stepping import open_model
+from fourbar_validation.engines.mujoco.closed_loop import open_model
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker

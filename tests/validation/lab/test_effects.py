@@ -7,15 +7,16 @@ import pytest
 
 from fourbar.errors import BROKEN, HOLDS
 from fourbar_validation.cli import status
-from fourbar_validation.lab.effects import cost, table
-from fourbar_validation.lab.effects.work import DEFAULT_FLAGS, simulated
+from fourbar_validation.engines import witnesses
+from fourbar_validation.lab import effects
+from fourbar_validation.lab.effects import DEFAULT_FLAGS
 
 SAVED = 0.08
 """Part of the time of a step that the flags of the bare scene must save; they save some 0.2."""
 
 
 def test_the_bare_scene_steps_faster_than_with_default_flags() -> None:
-    works = {effect: simulated(effect) for effect in ("none", DEFAULT_FLAGS)}
+    works = {effect: effects.prepare_simulation(effect) for effect in ("none", DEFAULT_FLAGS)}
     best = dict.fromkeys(works, float("inf"))
     for _ in range(100):  # by turns, a millisecond each: the least is free of what else the machine does
         for effect, work in works.items():
@@ -29,17 +30,19 @@ def test_a_workload_with_twice_the_work_costs_twice_as_much(monkeypatch: pytest.
     def prepare(effect: str) -> object:
         return lambda amount: sum(range((1 + (effect == "twice")) * 1000 * amount))
 
-    monkeypatch.setitem(table.ENGINES, "formulas", prepare)
-    measured = table.measure("formulas", "twice", 5)
+    monkeypatch.setitem(effects.ENGINES, "formulas", prepare)
+    measured = effects.measure("formulas", "twice", 5)
     assert 1.5 < measured.median < 2.5 and measured.low <= measured.median <= measured.high and measured.seconds > 0.0
 
 
 def test_the_table_has_a_row_for_each_effect_and_flag(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(table, "measure", lambda engine, effect: table.EffectCost(engine, effect, 2e-6, 1.1, 1.2, 1.25))
+    monkeypatch.setattr(
+        effects, "measure", lambda engine, effect: effects.EffectCost(engine, effect, 2e-6, 1.1, 1.2, 1.25)
+    )
     assert status(["cost", "--effects", "--only", "pin_friction", "-o", str(tmp_path / "effects.md")]) == HOLDS
-    text = (tmp_path / "effects.md").read_text()
+    text = (tmp_path / "effects.md").read_text().replace("\\", "")
     assert "| none | 2 us | 2 us | 2 us | 2 us |" in text
     assert "| pin_friction | +20 % [+10, +25] | no counterpart | +20 % [+10, +25] | +20 % [+10, +25] |" in text
     assert "| none, island left on |  | +20 % [+10, +25] |  |  |" in text and "written to" in capsys.readouterr().out
@@ -48,6 +51,6 @@ def test_the_table_has_a_row_for_each_effect_and_flag(
 def test_an_engine_that_is_missing_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(cost, "find_missing", lambda _: "mujoco is not installed")
+    monkeypatch.setattr(witnesses, "find_missing", lambda _: "mujoco is not installed")
     assert status(["cost", "--effects", "--engines", "formulas,mujoco-inverse"]) == BROKEN
     assert capsys.readouterr().err == "error: mujoco-inverse: mujoco is not installed\n"

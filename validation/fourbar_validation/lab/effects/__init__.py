@@ -1,1 +1,0 @@
-"""What each effect costs in each engine."""
