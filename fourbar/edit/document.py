@@ -19,8 +19,6 @@ from fourbar.scene.motion_law import ENDS
 Path = Sequence[str | int]
 WORDS = {"branch": [*BRANCHES], "through": ["sign", "follow"], "frame": ["world", "bar"], "ends": [*ENDS]}
 """Entries that are one of a few words."""
-IN_LINE = ("points", "tolerances")
-"""Tables whose entries take one line each; so do the effects."""
 LONGEST_TEXT = 10_000
 """Characters of one entry."""
 
