@@ -34,9 +34,7 @@ MOST_STEPS = 100_000_000
 def require(key: str, value: object, unit: str = "1", *, positive: bool = False, at_least_zero: bool = False) -> float:
     """Return the value as a float, or raise an InputError that says what is allowed.
 
-    Parameters
-    ----------
-    unit : of the number; a text like "48 cm" is converted to it. "1": there is none, and no text is read.
+    `unit`: of the number; a text like "48 cm" is converted to it. "1": there is none, and no text is read.
     """
     allowed = "a finite number"
     if positive:

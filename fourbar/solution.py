@@ -301,9 +301,7 @@ def _replace_nans(plain: Any) -> Any:
 def unwrap(angles: Array) -> None:
     """Make angles in [-pi, pi] continuous along a sweep, in place: the first in (-pi, pi]; NaN is stepped over.
 
-    Parameters
-    ----------
-    angles : (n,), or (m, n) for as many sweeps.
+    `angles`: (n,), or (m, n) for as many sweeps.
     """
     if angles.shape[-1] < 2 or (np.ptp(angles) < np.pi and not (angles[..., 0] == -np.pi).any()):
         return

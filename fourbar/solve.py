@@ -144,10 +144,8 @@ def find_requested(
 ) -> tuple[int, KeysView[str]]:
     """Return the number of the last stage evaluated, and the names of the quantities; an InputError as of `solve`.
 
-    Parameters
-    ----------
-    shape : of the positions.
-    at : the command; of a bar other than the input theta_2 and sin_mu, whose sign is the branch, are found too.
+    `shape`: of the positions. `at`: the command; of a bar other than the input theta_2 and sin_mu, whose sign is the
+    branch, are found too.
     """
     if out is None:
         if stage is None:

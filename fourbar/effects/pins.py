@@ -11,9 +11,7 @@ from fourbar.linkage import PINS, require
 def require_number(key: str, value: object, number: tuple[str, str]) -> float:
     """Return a number of an effect as a float, or raise an InputError.
 
-    Parameters
-    ----------
-    number : its unit and bound, as of `OF_EFFECT`.
+    `number`: its unit and bound, as of `OF_EFFECT`.
     """
     unit, bound = number
     return require(key, value, unit, positive=bound == POSITIVE, at_least_zero=bound == AT_LEAST_ZERO)

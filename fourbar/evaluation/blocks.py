@@ -98,10 +98,8 @@ def keep(
 ) -> None:
     """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so.
 
-    Parameters
-    ----------
-    seen : whether what is no number has its status already.
-    shape : of the part of the arrays; None: that of what was evaluated.
+    `seen`: whether what is no number has its status already. `shape`: of the part of the arrays; None: that of what was
+    evaluated.
     """
     codes, values, _ = found
     if not seen:

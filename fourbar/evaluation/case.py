@@ -143,9 +143,7 @@ class Case(NamedTuple):
     ) -> State:
         """Positions and, where more than they is wanted, motion.
 
-        Parameters
-        ----------
-        at : in the order in which the path reads the loop.
+        `at`: in the order in which the path reads the loop.
         """
         k = NO_MOTION
         if moving:

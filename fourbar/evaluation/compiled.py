@@ -249,9 +249,7 @@ def scatter(
 ) -> None:
     """Compute the error bars of positions that `run` has evaluated; for the parameters see there.
 
-    Parameters
-    ----------
-    signs : (evaluations, numbers).
+    `signs`: (evaluations, numbers).
     """
     n, turns = len(tangents), len(of_theta_2) > 0
     scalars[10 * BLOCK :] = 0.0

@@ -50,9 +50,7 @@ class Loads(NamedTuple):
     def with_force(self, force: Any, at: Any, turns: bool, factor: Any = 1.0, size: Any = 1.0) -> "Loads":
         """One force more, times a factor, with its arm from the mass centre, both complex and in the same frame.
 
-        Parameters
-        ----------
-        size : of the terms of the factor.
+        `size`: of the terms of the factor.
         """
         force, size = factor * force, size * np.abs(force)
         moment = cross(at, force)

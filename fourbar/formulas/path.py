@@ -207,10 +207,7 @@ def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Numbe
 def find_smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
     """Return the root's sign on a path that runs smoothly through change points: there cos h or sin h changes its sign.
 
-    Parameters
-    ----------
-    psi : independent angle less that of the ground, rad, not wrapped.
-    sign : +1 or -1, a constant of the path.
+    `psi`: independent angle less that of the ground, rad, not wrapped. `sign`: +1 or -1, a constant of the path.
     """
     k, s = np.cos(0.5 * psi), np.sin(0.5 * psi)
     at_stretched = np.where(np.equal(lengths.E1, 0.0) & (k < 0.0), -1.0, 1.0)

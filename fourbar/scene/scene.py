@@ -186,9 +186,7 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
 def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = None) -> Command:
     """Command what the scene's motion commands at other places: angles, strokes, or of a law times.
 
-    Parameters
-    ----------
-    branch : at each of them; left out: the scene's, which may follow its smooth path.
+    `branch`: at each of them; left out: the scene's, which may follow its smooth path.
     """
     motion, bar, time, lever = scene.motion, scene.motion.bar, None, None
     angle = places

@@ -53,9 +53,7 @@ def locate_between(scene: Scene, solution: Solution) -> Between | None:
 
     None where nothing stands between the positions: of a released motion, a list of angles, positions alone.
 
-    Parameters
-    ----------
-    solution : of the scene's positions, or of its sweep in rising order, to the stage "force".
+    `solution`: of the scene's positions, or of its sweep in rising order, to the stage "force".
     """
     motion = scene.motion
     if motion.free is not None or isinstance(motion.angle, np.ndarray) or solution.F12 is None or len(solution) < 2:

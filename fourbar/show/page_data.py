@@ -55,10 +55,7 @@ def collect_live_data(
 ) -> dict[str, Any]:
     """Collect what the page's script draws, columns as arrays, without tolerances, pictures and the file.
 
-    Parameters
-    ----------
-    signs : the branches of a sweep; left out: the scene's.
-    stage : the last one evaluated; left out: as of `solve`.
+    `signs`: the branches of a sweep; left out: the scene's. `stage`: the last one evaluated; left out: as of `solve`.
     """
     linkage, motion = scene.linkage, scene.motion
     shown = (

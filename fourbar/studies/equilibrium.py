@@ -182,9 +182,7 @@ def _prove_zeros(curve: CircuitCurve, idle: Array) -> Zeros | None:
     Between two change points, where signs of psi and mu tell the ways of moving apart, Q may be zero throughout: a load
     on a bar that rests in one of them. There none is looked for.
 
-    Parameters
-    ----------
-    idle : samples in which Q is nothing.
+    `idle`: samples in which Q is nothing.
     """
     try:
         from flint import arb, ctx
