@@ -42,7 +42,7 @@ def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     d, a, b, c = read_lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
     unit = "" if all(ratios) else " m"
-    print_to((write_type_json(linkage) if as_json else "\n".join(write_type(linkage, unit))) + "\n", out)
+    print_to(write_type_json(linkage) if as_json else "\n".join([*write_type(linkage, unit), ""]), out)
 
 
 @click.command()

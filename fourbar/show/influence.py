@@ -3,16 +3,16 @@
 A table and one JSON object of it are what `fourbar analyze --sensitivity` prints.
 """
 
-import json
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES
 from fourbar.show.tables import make_plain_table
-from fourbar.solution import find_unit, null_nan
+from fourbar.solution import find_unit
 from fourbar.studies.derivatives import Sensitivity
+from fourbar.writing import write_object
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -108,19 +108,15 @@ def rank_numbers(found: Sensitivity, names: list[str]) -> list[str]:
 
 def write_json(found: Sensitivity) -> str:
     """One object, SI and rad: d(quantity)/d(key) over the positions, vectors as [x, y], null where there is none."""
-    document: dict[str, Any] = {
-        "schema": SCHEMA,
-        "title": found.solution.title,
-        "drive_bar": found.solution.drive_bar,
-        "status": found.status,
-        "theta_2": found.solution.theta_2.tolist(),
-        "keys": {
-            key: {"value": None if math.isnan(number) else number, "unit": entry.unit}
+    return write_object(
+        SCHEMA,
+        title=found.solution.title,
+        drive_bar=found.solution.drive_bar,
+        status=found.status,
+        theta_2=found.solution.theta_2,
+        keys={
+            key: {"value": number, "unit": entry.unit}
             for (key, entry), number in zip(found.keys.items(), found.numbers.tolist(), strict=True)
         },
-        "by": {
-            name: {key: null_nan(row) for key, row in zip(found.keys, rows, strict=True)}
-            for name, rows in found.by.items()
-        },
-    }
-    return json.dumps(document, allow_nan=False) + "\n"
+        by={name: dict(zip(found.keys, rows, strict=True)) for name, rows in found.by.items()},
+    )

@@ -19,8 +19,9 @@ from fourbar.show.duty import compute_energies
 from fourbar.show.plot.style import choose_length_unit
 from fourbar.show.plot.view import is_over_time, list_sweep, set_branch
 from fourbar.show.tolerances import collect_tolerances
-from fourbar.solution import SI, Array, Conversion, Solution, null_nan
+from fourbar.solution import SI, Array, Conversion, Solution
 from fourbar.solve import solve
+from fourbar.writing import null_nan
 
 MAX_ROWS = 1441
 """Positions embedded in a page: a quarter of a degree over a full turn; a finer sweep is thinned out evenly."""

@@ -1,13 +1,12 @@
 """What `fourbar ratio` prints: the loop as a gear, and what polynomials in its place miss."""
 
-import json
 import math
-from typing import Any
 
 import numpy as np
 
 from fourbar.show.tables import make_plain_table, write_table
 from fourbar.studies.ratio import Fit, GearRatio
+from fourbar.writing import write_object
 
 SCHEMA = "fourbar-ratio/1"
 ROWS = 36
@@ -65,12 +64,4 @@ def _write_number(value: float) -> str:
 
 def write_json(title: str, found: GearRatio) -> str:
     """One object, SI and rad."""
-
-    def fit(each: Fit) -> dict[str, Any]:
-        errors = {name: getattr(each, name)._asdict() for name in ("angle", "speed", "torque")}
-        return {**each._asdict(), **errors}
-
-    arrays = ("theta_2", "omega_ratio", "torque_ratio", "reflected_inertia", "torque")
-    columns = {name: [x if math.isfinite(x) else None for x in getattr(found, name).tolist()] for name in arrays}
-    document = {"schema": SCHEMA, "title": title, **columns, "fits": [fit(each) for each in found.fits]}
-    return json.dumps(document, allow_nan=False) + "\n"
+    return write_object(SCHEMA, title=title, **found._asdict())
