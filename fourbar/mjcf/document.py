@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from fourbar.effects.numbers import ROWS
-from fourbar.errors import InputError, LimitError, NotAssembledError
+from fourbar.errors import InputError, LimitError, NotAssembledError, clean_line
 from fourbar.formulas.mobility import change_points, choose_range
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.appearance import add_appearance
@@ -81,7 +81,7 @@ def write_mjcf(
     for term in (*scene.effects, *scene.loads):
         find_row(term).add(term, model)
     armature = size_flywheel(scene, settings)
-    root = ET.Element("mujoco", model=make_plain(scene.title) or "four-bar")
+    root = ET.Element("mujoco", model=clean_line(scene.title) or "four-bar")
     for line in _write_comments(scene, drive, reader):
         root.append(ET.Comment(f" {line} "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
@@ -251,8 +251,3 @@ def _compute_span(linkage: FourBar) -> float:
     """Width of the range that the input can turn through, rad."""
     least, most = choose_range(linkage)
     return min(abs(most - least), 2.0 * math.pi)
-
-
-def make_plain(title: str) -> str:
-    """Return a title that XML can hold: every character that does not print becomes a blank."""
-    return "".join(character if character.isprintable() else " " for character in title).strip()

@@ -3,9 +3,10 @@
 import json
 import math
 
+from fourbar.errors import clean_line
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.assembly import PARENT, assemble, write_comment
-from fourbar.mjcf.document import Start, make_plain
+from fourbar.mjcf.document import Start
 from fourbar.scene import Scene
 
 
@@ -83,7 +84,7 @@ def PhysicsScene "physics"
 }}
 
 def Xform "four_bar" (
-    doc = {json.dumps(make_plain(scene.title) or "four-bar", ensure_ascii=False)}
+    doc = {json.dumps(clean_line(scene.title) or "four-bar", ensure_ascii=False)}
     prepend apiSchemas = ["PhysicsArticulationRootAPI"]
 )
 {{

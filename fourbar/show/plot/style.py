@@ -2,7 +2,6 @@
 
 import io
 import math
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, expect, say_install
+from fourbar.errors import DependencyError, InputError, clean_line, expect, say_install
 from fourbar.quantities import PIN_FORCES
 from fourbar.solution import SI, Array, Conversion, find_unit_in
 from fourbar.writing import write_bytes
@@ -97,12 +96,9 @@ def render_figure(figure: "Figure", file_format: str) -> bytes:
     return buffer.getvalue()
 
 
-CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
-
-
 def shorten_text(text: str, width: int) -> str:
     """Shorten a stranger's text to one line of at most `width` characters."""
-    line = " ".join(CONTROL.sub(" ", text).split())
+    line = clean_line(text)
     return line if len(line) <= width else line[: width - 1].rstrip() + "…"
 
 
