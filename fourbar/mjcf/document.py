@@ -1,8 +1,10 @@
 """Scene -> MJCF text: the closed loop, a drive at omega_2 and alpha_2, and a keyframe to start from."""
 
 import math
+import tomllib
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from importlib.resources import files
+from typing import Any, Literal, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -14,13 +16,14 @@ from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.effects import find_row, unwind
 from fourbar.mjcf.model import Model, join, make_constant_motor, make_motor, make_servo, require_carriable
-from fourbar.mjcf.notes import NOTES
 from fourbar.mjcf.settings import FULL_TURN, RECIPE, Settings, WindowMotion, fit_pad
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command, require_input
 from fourbar.solution import Array
 from fourbar.solve import solve
 
+NOTES: dict[str, Any] = tomllib.loads(files("fourbar.mjcf").joinpath("notes.toml").read_text(encoding="utf-8"))
+"""What the model files say of themselves in comments: how they start, and where their numbers stand."""
 AT_REST = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""
 SETTLING = 2.0
