@@ -16,7 +16,7 @@ from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.show.acting import Symbol, list_acting
 from fourbar.show.duty import compute_energies
-from fourbar.show.plot.style import choose_length_unit
+from fourbar.show.plot.style import choose_unit
 from fourbar.show.plot.view import is_over_time, list_sweep, set_branch
 from fourbar.show.tolerances import collect_tolerances
 from fourbar.solution import SI, Array, Conversion, Solution
@@ -68,7 +68,7 @@ def collect_live_data(
     if not closes.any():
         raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
     shown["start"] = int(closes.argmax()) if shown["start"] is None else shown["start"]
-    factor, unit = choose_length_unit(max(linkage.lengths), units)
+    factor, unit = choose_unit(max(linkage.lengths), "m", units)
     return {
         "lengths": list(linkage.lengths),
         "theta_1": linkage.ground_angle,

@@ -118,16 +118,6 @@ def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[floa
     return 1.0 / PREFIXES[-1][0], PREFIXES[-1][1] + unit
 
 
-def choose_length_unit(largest: float, units: Conversion = SI) -> tuple[float, str]:
-    """Lengths in the unit stated, else in km, m, mm or µm by the largest."""
-    if "m" in units:
-        return choose_unit(largest, "m", units)
-    for size, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm")):
-        if largest >= size:
-            return 1.0 / size, unit
-    return 1e6, "µm"
-
-
 def find_greatest(*values: Array) -> float:
     """Largest finite magnitude, or 0."""
     flat = np.concatenate([np.abs(np.ravel(value)) for value in values])

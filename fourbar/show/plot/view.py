@@ -13,7 +13,7 @@ from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.scene import Command, Scene, command, command_at, default_places
-from fourbar.show.plot.style import choose_length_unit, choose_unit
+from fourbar.show.plot.style import choose_unit
 from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve
 
@@ -105,7 +105,7 @@ class Axis(NamedTuple):
 def axis_of(scene: Scene, at: Command, units: Conversion) -> Axis:
     """Make the axis of what is commanded."""
     if at.stroke is not None:
-        factor, unit = choose_length_unit(max(scene.linkage.lengths), units)
+        factor, unit = choose_unit(max(scene.linkage.lengths), "m", units)
         return Axis("stroke", "stroke", f" {unit}", factor, factor * at.stroke)
     return Axis(f"θ{'₀₁₂₃₄'[at.bar]}", rf"$\{at.commanded}$", "°", math.degrees(1.0), np.degrees(at.angle))
 
