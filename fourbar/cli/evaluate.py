@@ -1,4 +1,4 @@
-"""The commands that evaluate a linkage (classify, new, analyze) and what may vary of it (tolerance, extremes)."""
+"""The commands that evaluate a linkage, what may vary of it, at rest, and what can take the place of its loop."""
 
 import shutil
 import sys
@@ -10,6 +10,7 @@ import click
 from fourbar.cli.given import (
     FILE,
     is_bare,
+    json_option,
     open_scene,
     or_out_option,
     print_to,
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("lengths", nargs=4, metavar="D A B C")
-@click.option("--json", "as_json", is_flag=True, help="One object, SI and radians, every digit.")
+@json_option
 @or_out_option
 def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     """Name a linkage by its bar lengths (ground, input, coupler, output), and say what turns and how far.
@@ -154,7 +155,7 @@ def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
 @scene_argument
 @click.option("--samples", type=int, metavar="N", help="Linkages that are tried; left out: 8192.")
 @click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Of the quasi-random samples.")
-@click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
+@json_option
 @units_option
 @click.option("-o", "--out", type=FILE, metavar="PLOT", help="Draw the bands: svg, png or pdf.")
 def tolerance(
@@ -196,7 +197,7 @@ def _refuse_units_of_json(as_json: bool, units: "Conversion") -> None:
 @click.option(
     "--quantity", "quantities", multiple=True, metavar="NAME", help="torque or drive_force, F12 .. F14, transmission."
 )
-@click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
+@json_option
 @units_option
 @or_out_option
 def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: "Conversion", out: Path | None) -> None:
@@ -216,3 +217,35 @@ def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: "Co
         own = {**DEGREES, **units}
         text = write_table(stated.title, shown.write_heading(stated, found, own), shown.make_table(found, own))
     print_to(text, out)
+
+
+@click.command()
+@scene_argument
+@json_option
+@or_out_option
+def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
+    """Find where a linkage stays by itself, stable or not, how fast it swings there, and what holds it elsewhere."""
+    from fourbar.show import equilibrium as shown
+    from fourbar.show.progress import show_running
+    from fourbar.studies.equilibrium import equilibrium as found
+
+    with open_scene(scene) as described, show_running("the boxes are halved"):
+        result = found(described)
+    print_to((shown.write_json if as_json else shown.write_tables)(described.title, result), out)
+
+
+@click.command()
+@scene_argument
+@click.option(
+    "--degree", type=int, default=4, show_default=True, metavar="N", help="Of the highest polynomial, 1 to 4."
+)
+@json_option
+@or_out_option
+def ratio(scene: Path, degree: int, as_json: bool, out: Path | None) -> None:
+    """Show omega_4/omega_2, torque ratio and reflected inertia, and the polynomial of a mimic joint with its errors."""
+    from fourbar.show import ratio as shown
+    from fourbar.studies.ratio import ratio as found
+
+    with open_scene(scene) as described:
+        result = found(described, degree)
+    print_to((shown.write_json if as_json else shown.write_tables)(described.title, result), out)

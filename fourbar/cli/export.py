@@ -17,11 +17,11 @@ from fourbar.cli.given import (
     show_waiting,
     units_option,
 )
-from fourbar.cli.rest import replace_loop
 from fourbar.errors import InputError
 
 if TYPE_CHECKING:
     from fourbar.mjcf.document import Drive
+    from fourbar.scene import Scene
     from fourbar.solution import Conversion
 
 without_loads_option = click.option(
@@ -130,13 +130,13 @@ def mjcf(
             raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
         with open_scene(scene) as described:
             text = writer.write_mjcf_for(described, simulator, drive)
-            print_to(replace_loop(text, described) if mimic else text, out)
+            print_to(_replace_loop(text, described) if mimic else text, out)
         return
     assert lengths is not None
     speed = {} if omega is None else {"omega": read_number("--omega", omega, "rad/s")}
     made = writer.make_scene(*read_lengths(lengths), **speed)
     text = writer.write_mjcf_for(made, simulator, drive)
-    print_to(replace_loop(text, made) if mimic else text, out)
+    print_to(_replace_loop(text, made) if mimic else text, out)
     for line in writer.list_defaults(made):
         click.echo(line)
 
@@ -164,3 +164,12 @@ def usd(scene: Path, without_loads: bool, out: Path) -> None:
 
     with open_scene(scene) as described:
         print_to(written(described, without_loads=without_loads), out)
+
+
+def _replace_loop(model: str, scene: "Scene") -> str:
+    """Give MJCF text joints that follow the input by the best polynomials that MuJoCo holds."""
+    from fourbar.mjcf import replace_loop
+    from fourbar.studies.ratio import ratio as found
+
+    best = found(scene).fits[-1]
+    return replace_loop(model, scene, best.about, best.joint_A, best.theta_4)

@@ -29,6 +29,7 @@ def _read_units(context: click.Context, parameter: click.Parameter, text: str) -
 scene_argument = click.argument("scene", type=FILE)
 out_option = click.option("-o", "--out", type=FILE, required=True, metavar="FILE")
 or_out_option = click.option("-o", "--out", type=FILE, metavar="FILE", help="Write it to FILE instead of printing it.")
+json_option = click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
 units_option = click.option(
     "--units",
     default="SI",
