@@ -4,7 +4,7 @@ A table and one JSON object of it are what `fourbar analyze --sensitivity` print
 """
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,24 +18,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 SCHEMA = "fourbar-sensitivity/1"
-HUNDREDTH, DEGREE = 0.01, math.radians(1.0)
-
-
-class Influence(NamedTuple):
-    """Of one number on one quantity, where it is largest."""
-
-    key: str
-    change: float
-    """In the quantity's unit, signed; of a vector that is no force the length of its change."""
-    theta_2: float
-    """rad."""
-
-
-def choose_step(found: Sensitivity, key: str) -> float:
-    """Choose the change of a number that the influences are for: 1 % of it, of an angle 1 deg."""
-    if found.keys[key].unit == "rad":
-        return DEGREE
-    return HUNDREDTH * abs(float(found.numbers[list(found.keys).index(key)]))
 
 
 def list_shown(found: Sensitivity) -> list[str]:
@@ -43,22 +25,6 @@ def list_shown(found: Sensitivity) -> list[str]:
     own = [point.name for point in found.scene.points]
     drive = [name for name in (COUPLE.value, LINE.value) if name in found.by]
     return [*((*drive, *PIN_FORCES) if drive else ("theta_3", "theta_4")), *own]
-
-
-def list_influences(found: Sensitivity, quantity: str) -> list[Influence]:
-    """Of every number on a quantity, the largest first; those without any are left out."""
-    value, rows = found.value(quantity), []
-    for key in found.keys:
-        change = choose_step(found, key) * found.of(quantity, key)
-        if quantity in PIN_FORCES:  # of the magnitude
-            with np.errstate(all="ignore"):
-                change = np.sum(value * change, axis=-1) / np.hypot(*value.T)
-        elif change.ndim == 2:
-            change = np.hypot(*change.T)
-        if np.isfinite(change).any():
-            worst = int(np.nanargmax(np.abs(change)))
-            rows.append(Influence(key, float(change[worst]), float(found.solution.theta_2[worst])))
-    return sorted((row for row in rows if row.change != 0.0), key=lambda row: -abs(row.change))
 
 
 def find_largest(found: Sensitivity, quantity: str) -> float:
@@ -74,7 +40,7 @@ def write_heading(found: Sensitivity) -> list[str]:
         "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude",
     ]
     for name in list_shown(found):
-        own = list_influences(found, name)
+        own = found.influences(name)
         angles = [row for row in own if found.keys[row.key].unit == "rad"]
         most = [rows[0] for rows in ([row for row in own if row not in angles], angles) if rows]
         if most:
@@ -90,7 +56,7 @@ def write_heading(found: Sensitivity) -> list[str]:
 def make_table(found: Sensitivity) -> "Table":
     """List a row for each number that matters, those first that change any quantity most against its largest value."""
     names = list_shown(found)
-    by = {name: {row.key: row.change for row in list_influences(found, name)} for name in names}
+    by = {name: {row.key: row.change for row in found.influences(name)} for name in names}
     rows = [["largest value", *(f"{find_largest(found, name):.4g}" for name in names)]]
     rows += [[key, *(f"{by[name].get(key, 0.0):.3g}" for name in names)] for key in rank_numbers(found, names)]
     return make_plain_table(["", *(f"{name}\n{find_unit(name)}" for name in names)], rows, left=("",))
@@ -101,7 +67,7 @@ def rank_numbers(found: Sensitivity, names: list[str]) -> list[str]:
     share: dict[str, float] = {}
     for name in names:
         size = find_largest(found, name)
-        for row in list_influences(found, name):
+        for row in found.influences(name):
             share[row.key] = max(share.get(row.key, 0.0), abs(row.change) / size if size > 0.0 else 0.0)
     return sorted(share, key=lambda key: -share[key])
 
