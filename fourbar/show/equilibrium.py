@@ -8,7 +8,7 @@ import numpy as np
 from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import read_drive
-from fourbar.show.tables import MOST_ROWS, make_plain_table, write_table
+from fourbar.show.tables import MOST_ROWS, make_plain_table, write_cells, write_table
 from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
 from fourbar.writing import write_object
@@ -53,17 +53,12 @@ def _write_holding(found: Equilibria) -> tuple[list[str], Any]:
     drive = read_drive(at)
     values, low, high = drive.values, getattr(at, drive.keys.low), getattr(at, drive.keys.high)
     assert values is not None
-    index = range(0, len(at), -(-len(at) // MOST_ROWS))
     heads, columns = ["theta_2 (deg)", f"{drive.name} ({drive.unit})"], [np.degrees(at.theta_2), values]
     if low is not None and high is not None:
         heads, columns = [heads[0], f"from ({drive.unit})", f"to ({drive.unit})"], [columns[0], low, high]
-    rows = [
-        [
-            *(_write_number(column[i]) for column in columns),
-            MOVES[int(found.moves[i])] if at.status_code[i] not in (NOT_ASSEMBLED, SINGULAR) else at.status[i],
-        ]
-        for i in index
-    ]
+    still = np.isin(at.status_code, (NOT_ASSEMBLED, SINGULAR))
+    released = [status if no else MOVES[move] for status, no, move in zip(at.status, still, found.moves, strict=True)]
+    rows = list(zip(*map(write_cells, columns), released, strict=True))[:: -(-len(at) // MOST_ROWS)]
     on = "" if at.drive is not None else f" on bar {at.drive_bar}"
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
     if np.isfinite(values).any():
@@ -92,10 +87,6 @@ def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
 
 def _write_degrees(angle: float) -> str:
     return f"{math.degrees(angle):.4f}"
-
-
-def _write_number(value: float) -> str:
-    return f"{value:.6g}" if math.isfinite(value) else "-"
 
 
 def write_json(title: str, found: Equilibria) -> str:

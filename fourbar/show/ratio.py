@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from fourbar.show.tables import make_plain_table, write_table
+from fourbar.show.tables import make_plain_table, write_cells, write_table
 from fourbar.studies.ratio import Fit, GearRatio
 from fourbar.writing import write_object
 
@@ -16,9 +16,7 @@ ROWS = 36
 def write_tables(title: str, found: GearRatio) -> str:
     """Write both tables, and the numbers to copy."""
     columns = (np.degrees(found.theta_2), found.omega_ratio, found.torque_ratio, found.reflected_inertia)
-    rows = [
-        [_write_number(of[i]) for of in columns] for i in range(0, len(columns[0]), max(1, len(columns[0]) // ROWS))
-    ]
+    rows = list(zip(*map(write_cells, columns), strict=True))[:: max(1, len(found.theta_2) // ROWS)]
     heads = ("theta_2 (deg)", "omega_4/omega_2", "torque on 4 by that on 2", "reflected inertia (kg m^2)")
     text = write_table(title, [], make_plain_table(heads, rows))
     most = float(np.abs(found.torque).max())
@@ -56,10 +54,6 @@ def _write_elements(fits: tuple[Fit, ...]) -> list[str]:
         f'MJCF   <joint joint1="O4" joint2="O2" polycoef="{poly}"/>',
         f"       where O2 reads theta_2 - {best.about!r}; `fourbar mjcf SCENE --mimic -o FILE` writes the whole model",
     ]
-
-
-def _write_number(value: float) -> str:
-    return f"{value:.6g}" if math.isfinite(value) else "-"
 
 
 def write_json(title: str, found: GearRatio) -> str:

@@ -235,7 +235,7 @@ def list_columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, l
     def add(name: str, unit: str, values: Array | None) -> None:
         assert values is not None
         label, factor = find_unit_in(unit, units)
-        shown[f"{name}\n{label}"] = _write_cells(values * factor, ".4f" if unit == "rad" else ".6g")
+        shown[f"{name}\n{label}"] = write_cells(values * factor, ".4f" if unit == "rad" else ".6g")
 
     if solution.time is not None:
         add("time", "s", solution.time)
@@ -257,7 +257,7 @@ def list_columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, l
     for name in ("stroke", "stroke_speed", *(f"{kind}_{bar}" for kind in ("omega", "alpha") for bar in sought)):
         if getattr(solution, name) is not None:
             add(name, UNITS[name], getattr(solution, name))
-    shown["sin mu\n"] = _write_cells(solution.sin_mu)
+    shown["sin mu\n"] = write_cells(solution.sin_mu)
     if solution.time is None and drive.values is not None and drive.error is not None:
         shown[f"digits\nof {drive.symbol[0]}"] = _count_digits(drive.values, drive.error)
     return shown
@@ -286,7 +286,7 @@ def make_table(
     return make_plain_table(kept, rows[::every] + last, gap=GAP - 1), left_out
 
 
-def _write_cells(values: Array, form: str = ".6g") -> list[str]:
+def write_cells(values: Array, form: str = ".6g") -> list[str]:
     """Six digits, or another form; a dash where there is no value."""
     return [format(value, form) if math.isfinite(value) else "-" for value in values.tolist()]
 
@@ -296,4 +296,4 @@ def _count_digits(torque: Array, error: Array) -> list[str]:
     with np.errstate(all="ignore"):
         digits = np.clip(np.floor(np.log10(np.abs(torque) / error)), 0, MOST_DIGITS)
     known = np.isfinite(torque) & np.isfinite(error)
-    return _write_cells(np.where(known, np.where(error == 0.0, MOST_DIGITS, digits), np.nan))
+    return write_cells(np.where(known, np.where(error == 0.0, MOST_DIGITS, digits), np.nan))

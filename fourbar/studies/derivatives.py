@@ -116,10 +116,13 @@ class Sensitivity:
 
     def influences(self, quantity: str) -> list[Influence]:
         """List what the numbers change a quantity by, a pin force in its magnitude, the largest first."""
-        part, rows = f"|{quantity}|" if quantity in PIN_FORCES else quantity, []
+        value, rows = self.value(quantity), []
         for (key, entry), number in zip(self.keys.items(), self.numbers.tolist(), strict=True):
-            change = (DEGREE if entry.unit == "rad" else HUNDREDTH * abs(number)) * self.of(part, key)
-            if change.ndim == 2:
+            change = (DEGREE if entry.unit == "rad" else HUNDREDTH * abs(number)) * self.of(quantity, key)
+            if quantity in PIN_FORCES:
+                with np.errstate(all="ignore"):
+                    change = np.sum(value * change, axis=-1) / np.hypot(*value.T)
+            elif change.ndim == 2:
                 change = np.hypot(*change.T)
             if np.isfinite(change).any():
                 worst = int(np.nanargmax(np.abs(change)))

@@ -24,7 +24,7 @@ from fourbar.show.plot.style import (
     shorten_text,
 )
 from fourbar.show.plot.transmission import draw_transmission
-from fourbar.show.plot.view import View, choose_common_position, is_over_time, make_view, set_branch, where_in_words
+from fourbar.show.plot.view import View, choose_common_position, is_over_time, make_view, set_branch
 from fourbar.show.tables import static
 from fourbar.solution import SI, Conversion, require_units
 
@@ -88,15 +88,7 @@ def _draw_hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
     del labels
     panels = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
     for axes, name in zip(panels, FORCE_COLOURS, strict=True):
-        hodograph.draw_hodograph(axes, shown, (name,))
-
-
-def _draw_free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    here = shown.here
-    if not np.isfinite(here.F12).all():  # type: ignore[arg-type]
-        where = where_in_words(here)
-        raise InputError("figure", "freebody", f"needs forces, which have no value at {where}: {here.status[0]}")
-    freebody.draw_free_bodies(figure, shown, labels)
+        hodograph.draw_hodograph(axes, shown, name)
 
 
 FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
@@ -111,7 +103,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "hodograph": (_draw_hodographs, (6.4, 6.6), True),
     "energy": (_draw_single(curves.draw_energy), (5.6, 3.2), True),
     "transmission": (_draw_single(draw_transmission), (5.6, 3.2), False),
-    "freebody": (_draw_free_bodies, (9.6, 4.6), True),
+    "freebody": (freebody.draw_free_bodies, (9.6, 4.6), True),
     "sensitivity": (studies.draw_influences, (9.6, 3.6), True),
 }
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import list_bodies
+from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
@@ -26,7 +27,7 @@ from fourbar.show.plot.style import (
     write_quantity,
 )
 from fourbar.show.plot.symbols import place_of, split_components
-from fourbar.show.plot.view import Recorder, View, take_one
+from fourbar.show.plot.view import Recorder, View, take_one, where_in_words
 from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
@@ -107,6 +108,9 @@ def _collect_actions(view: View) -> Iterator[tuple[str, Recorder]]:
 
 def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     """Draw the three bars, each freed from its pins, with arrows to one scale, over the couples."""
+    if not np.isfinite(view.here.F12).all():  # type: ignore[arg-type]
+        reason = f"needs forces, which have no value at {where_in_words(view.here)}: {view.here.status[0]}"
+        raise InputError("figure", "freebody", reason)
     freed = [(v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS]  # those of this view first
     panels, below = figure.subplots(2, 3, height_ratios=[PANEL, LINE * max(len(couples) for *_, couples in freed)])
     biggest = max((abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0)
