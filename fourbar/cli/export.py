@@ -7,12 +7,12 @@ import click
 
 from fourbar.cli.given import (
     FILE,
+    is_bare,
     open_scene,
     out_option,
     print_to,
     read_lengths,
     read_number,
-    require_unit,
     scene_argument,
     show_waiting,
     units_option,
@@ -50,7 +50,8 @@ def plot(
     """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
     from fourbar.show.plot import draw
 
-    require_unit("--position", position)
+    if position is not None and is_bare(position):  # it may have been meant in any unit
+        raise InputError("--position", position, f'the unit is missing; did you mean "{position} deg"?')
     with open_scene(scene) as described, show_waiting(described):
         unit = "rad" if described.motion.stroke is None else "m"
         at = None if position is None else read_number("--position", position, unit)

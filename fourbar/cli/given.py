@@ -107,12 +107,6 @@ def read_number(key: str, text: str, unit: str, *, positive: bool = False) -> fl
             raise InputError(key, text, f"{error}; must be a number in {unit}, or one with a unit") from None
 
 
-def require_unit(key: str, text: str | None) -> None:
-    """InputError for a bare number: it may have been meant in any unit."""
-    if text is not None and is_bare(text):
-        raise InputError(key, text, f'the unit is missing; did you mean "{text} deg"?')
-
-
 def print_to(text: str, out: Path | None) -> None:
     """To standard output, or to a file, whole or not at all."""
     from fourbar.writing import write_text

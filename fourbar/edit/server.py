@@ -303,11 +303,7 @@ class Nothing(RequestHandler):
 def edit(path: Path, exports: Path, port: int = 0, *, browse: bool = True) -> None:
     """Open a scene in the workbench, and serve it until all pages have gone.
 
-    Parameters
-    ----------
-    path : the scene file; a new one is begun where it does not exist.
-    exports : the folder that exports and reports go to.
-    port : 0: any that is free.
+    A file that does not exist is begun; exports and reports go to the folder `exports`; port 0: any that is free.
     """
 
     async def run() -> None:

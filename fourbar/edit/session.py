@@ -177,10 +177,6 @@ def _hash_text(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _set(session: Session, asked: dict[str, Any]) -> None:
-    session.change(lambda of: of.set(asked["path"], str(asked["value"])), str(asked.get("gesture", "")))
-
-
 def _add(session: Session, asked: dict[str, Any]) -> None:
     part, name = list_offers()["parts"][int(asked["part"])], str(asked.get("name", ""))
     path = [name if step == "" else step for step in part["at"]]
@@ -250,16 +246,10 @@ def _save(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"note": f"saved {session.path.name}", "saved": True}
 
 
-def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    return {"note": "wrote " + str(session.exports.write(session.now.scene, str(asked["format"]), session.units))}
-
-
-def _list_bodies(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    return {"bodies": session.exports.free_bodies(session.now.scene, float(asked["position"]), session.units)}
-
-
 ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] = {
-    "set": _set,
+    "set": lambda session, asked: session.change(
+        lambda of: of.set(asked["path"], str(asked["value"])), str(asked.get("gesture", ""))
+    ),
     "add": _add,
     "remove": _remove,
     "drag": _drag,
@@ -270,8 +260,12 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
     "refer": _refer,
     "units": _list_units,
     "save": _save,
-    "export": _export,
-    "bodies": _list_bodies,
+    "export": lambda session, asked: {
+        "note": f"wrote {session.exports.write(session.now.scene, str(asked['format']), session.units)}"
+    },
+    "bodies": lambda session, asked: {
+        "bodies": session.exports.free_bodies(session.now.scene, float(asked["position"]), session.units)
+    },
     "hello": lambda session, asked: session.greeting() | {"refer": True},
 }
 """What a page can ask for."""

@@ -61,10 +61,6 @@ class Loads(NamedTuple):
             return more._replace(turning=more.turning + force, of_turning=more.of_turning + size)
         return more._replace(world=more.world + force, of_world=more.of_world + size)
 
-    def with_couple(self, couple: Any, factor: Any, size: Any) -> "Loads":
-        """One couple more, likewise."""
-        return self._replace(couple=self.couple + factor * couple, of_couple=self.of_couple + size * np.abs(couple))
-
 
 def can_carry(case: Case) -> bool:
     """Whether the loop can evaluate a case."""
@@ -93,7 +89,9 @@ def pack_numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2:
             if term.force is not None:
                 force, at = polar(*term.force), polar(*term.at)
                 loads[term.bar] = loads[term.bar].with_force(force, at, term.frame == "bar", factor, size)
-            loads[term.bar] = loads[term.bar].with_couple(term.moment, factor, size)
+            own, moment = loads[term.bar], term.moment
+            own = own._replace(couple=own.couple + factor * moment, of_couple=own.of_couple + size * np.abs(moment))
+            loads[term.bar] = own
     of_loads = [
         number
         for load in loads.values()

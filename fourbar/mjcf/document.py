@@ -64,7 +64,10 @@ def write_mjcf(
     LimitError : an effect or the motion has no counterpart in MJCF.
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
-    _require_carried(scene)
+    require_input(scene, "the drive of an MJCF")
+    if scene.motion.law is not None:
+        raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
+    require_carriable(scene.linkage)
     cylinder = scene.drive
     if scene.motion.free is not None:
         drive, cylinder = "none", None
@@ -106,14 +109,6 @@ def write_mjcf(
         ET.SubElement(frame, "key", name="start", qpos=join(*start.qpos), qvel=join(*start.qvel))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
-
-
-def _require_carried(scene: Scene) -> None:
-    """LimitError or InputError for what of a motion, a drive or a linkage MJCF does not carry."""
-    require_input(scene, "the drive of an MJCF")
-    if scene.motion.law is not None:
-        raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
-    require_carriable(scene.linkage)
 
 
 def _write_comments(scene: Scene, drive: Drive, reader: str) -> list[str]:

@@ -22,7 +22,7 @@ def write_sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None, 
     Parameters
     ----------
     reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
-    start : the assembled state to stand in; None: that of `at_start`.
+    start : the assembled state to stand in; None: that of `find_start`.
     without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
 
     Raises

@@ -24,9 +24,7 @@ OWN_MOTORS = ("genesis", "newton")
 def write_mjcf_for(scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel") -> str:
     """Write the MJCF text of a scene for one simulator, its comments naming where torque and pin force are read.
 
-    Raises
-    ------
-    InputError : no such simulator, or a motor for one that does not take it; else as `write_mjcf`.
+    Raises InputError for no such simulator, or a motor for one that does not take it, and as `write_mjcf` does.
     """
     if simulator not in SIMULATORS:
         raise InputError("simulator", simulator, f"must be one of {', '.join(SIMULATORS)}")

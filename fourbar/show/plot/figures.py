@@ -138,11 +138,10 @@ class Drawing:
         with apply_style():
             return render_figure(self.figure, "svg").decode("utf-8")
 
-    def save(self, path: str | Path, file_format: str | None = None) -> None:
+    def save(self, path: str | Path) -> None:
         """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
         with apply_style():
-            kind = format_of(path, file_format)
-            save(self.figure, Path(path), kind)
+            save(self.figure, Path(path), format_of(path))
 
 
 def draw_figure(
@@ -183,21 +182,10 @@ def _look_between(shown: View) -> None:
         )
 
 
-def draw(
-    scene: Scene, path: str | Path, figure: str = "overview", *, file_format: str | None = None, **options: Any
-) -> None:
-    """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
-
-    Parameters
-    ----------
-    path : the file; its ending says which of svg, png and pdf is meant.
-    file_format : svg, png or pdf where the path's ending does not say it.
-    figure, options : those of `draw_figure`.
-
-    Raises as `draw_figure` does, and InputError for another format.
-    """
-    format_of(path, file_format)
-    draw_figure(scene, figure, **options).save(path, file_format)
+def draw(scene: Scene, path: str | Path, figure: str = "overview", **options: Any) -> None:
+    """Draw a figure of a scene, as `draw_figure` does, into a file; the same scene gives the same bytes."""
+    format_of(path)
+    draw_figure(scene, figure, **options).save(path)
 
 
 def _compose(painter: Painter, size: tuple[float, float], views: list[View]) -> "Figure":

@@ -69,11 +69,10 @@ def apply_style() -> Iterator[None]:
         yield
 
 
-def format_of(path: str | Path, file_format: str | None = None, formats: tuple[str, ...] = FORMATS) -> str:
-    """Return the format given, or the one that a file's ending names; InputError where it is none of `formats`."""
+def format_of(path: str | Path, formats: tuple[str, ...] = FORMATS) -> str:
+    """Return the format that a file's ending names; InputError where it is none of `formats`."""
     expect("path", path, str, Path)
-    expect("file_format", file_format, str, type(None))
-    kind = (file_format or Path(path).suffix.removeprefix(".")).lower()
+    kind = Path(path).suffix.removeprefix(".").lower()
     if kind not in formats:
         raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in formats))
     return kind
