@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
-from fourbar.linkage import require
+from fourbar.linkage import POSITIVE, require
 from fourbar.quantities import NOT_ASSEMBLED, OF_LINE, PIN_FORCES, STATUS_NAMES, UNITS, Quantities, is_scalar
 from fourbar.writing import (
     describe_extent,
@@ -252,7 +252,7 @@ def require_units(units: object) -> Conversion:
     if not isinstance(units, Mapping) or not plain or not all(isinstance(name, str) for name, _ in units.values()):
         raise InputError("units", units, 'must be as fourbar.units makes them, like fourbar.units("mm N.mm")')
     for _, factor in units.values():
-        require("units", factor, positive=True)
+        require("units", factor, "1", POSITIVE)
     return units
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fourbar.errors import InputError
+from fourbar.linkage import ANY, POSITIVE, require
 
 if TYPE_CHECKING:
     from fourbar.scene import Scene
@@ -80,7 +81,7 @@ def show_waiting(scene: "Scene") -> Iterator[None]:
 def read_lengths(texts: tuple[str, ...]) -> list[float]:
     """Ground, input, coupler and output, m."""
     names = ("ground", "input", "coupler", "output")
-    return [read_number(f"length of {name}", text, "m", positive=True) for name, text in zip(names, texts, strict=True)]
+    return [read_number(f"length of {name}", text, "m", POSITIVE) for name, text in zip(names, texts, strict=True)]
 
 
 def is_bare(text: str) -> bool:
@@ -92,19 +93,9 @@ def is_bare(text: str) -> bool:
     return True
 
 
-def read_number(key: str, text: str, unit: str, *, positive: bool = False) -> float:
+def read_number(key: str, text: str, unit: str, bound: str = ANY) -> float:
     """Read a number of the command line: bare in SI, or with a unit."""
-    from fourbar.linkage import require
-
-    try:
-        return require(key, float(text), positive=positive)
-    except ValueError:
-        from fourbar.quantities.units import UnitError, to_si
-
-        try:
-            return require(key, to_si(text, unit), positive=positive)
-        except UnitError as error:
-            raise InputError(key, text, f"{error}; must be a number in {unit}, or one with a unit") from None
+    return require(key, float(text) if is_bare(text) else text, unit, bound)
 
 
 def print_to(text: str, out: Path | None) -> None:

@@ -3,18 +3,9 @@
 from typing import Any, Self
 
 from fourbar.effects.effect import Effect
-from fourbar.effects.numbers import AT_LEAST_ZERO, OF_EFFECT, POSITIVE, ROWS
+from fourbar.effects.numbers import OF_EFFECT, ROWS
 from fourbar.errors import InputError, expect
 from fourbar.linkage import PINS, require
-
-
-def require_number(key: str, value: object, number: tuple[str, str]) -> float:
-    """Return a number of an effect as a float, or raise an InputError.
-
-    `number`: its unit and bound, as of `OF_EFFECT`.
-    """
-    unit, bound = number
-    return require(key, value, unit, positive=bound == POSITIVE, at_least_zero=bound == AT_LEAST_ZERO)
 
 
 class PinRows(Effect):
@@ -39,6 +30,6 @@ class PinRows(Effect):
             if pin not in PINS or pin in found:
                 raise InputError(f"{key}.{pin}", row[1:], f"the pins are {', '.join(PINS)}, each once")
             given = zip(numbers.items(), values, strict=True)
-            checked = (require_number(f"{key}.{pin}.{name}".rstrip("."), value, of) for (name, of), value in given)
+            checked = (require(f"{key}.{pin}.{name}".rstrip("."), value, *of) for (name, of), value in given)
             found[pin] = (pin, *checked)
         object.__setattr__(self, ROWS[self.key], tuple(found[pin] for pin in PINS if pin in found))

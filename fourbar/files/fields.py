@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from fourbar.errors import InputError
+from fourbar.linkage import ANY, is_within
 from fourbar.quantities.units import UnitError, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -61,21 +62,18 @@ class Reader:
             raise self.refuse(key, value, "must be a finite number without a unit")
         return float(value)
 
-    def quantity(
-        self, key: str, value: object, unit: str, *, positive: bool = False, at_least_zero: bool = False
-    ) -> float:
+    def quantity(self, key: str, value: object, unit: str, bound: str = ANY) -> float:
         """Read a number with a unit, in `unit`; of unit "1" one without."""
         if unit == "1":
             return self.number(key, value)
-        bound = " > 0" if positive else " >= 0" if at_least_zero else ""
-        wanted = f'must be a finite number{bound} with a unit, like "1 {unit}"'
+        wanted = f'must be {bound} with a unit, like "1 {unit}"'
         if not isinstance(value, str):
             raise self.refuse(key, value, wanted)
         try:
             number = to_si(value, unit)
         except UnitError as error:
             raise self.refuse(key, value, f"{error}; {wanted}") from None
-        if (positive and number <= 0.0) or (at_least_zero and number < 0.0):
+        if not is_within(number, bound):
             raise self.refuse(key, value, wanted)
         return number
 

@@ -20,7 +20,7 @@ from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.pictures import Picture
 from fourbar.files.scene_text import BARS, BRANCHES
 from fourbar.files.tolerances import read_tolerances
-from fourbar.linkage import BAR_NAMES, MOST_STEPS, Bar, FourBar
+from fourbar.linkage import AT_LEAST_ZERO, BAR_NAMES, MOST_STEPS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import COMMANDS, ENDS, Law
@@ -145,9 +145,7 @@ def _read_pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Pic
 
 def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     lengths = read.table("lengths", top.get("lengths", {}), (*BAR_NAMES.values(), "ground_angle"))
-    length = {
-        name: read.quantity(f"lengths.{name}", lengths.get(name), "m", positive=True) for name in BAR_NAMES.values()
-    }
+    length = {name: read.quantity(f"lengths.{name}", lengths.get(name), "m", POSITIVE) for name in BAR_NAMES.values()}
     tables = read.table("bars", top.get("bars", {}), BARS)
     bars = {name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name]) for name in BARS}
     angle = read.quantity("lengths.ground_angle", lengths.get("ground_angle", "0 rad"), "rad")
@@ -156,10 +154,10 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
 
 def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
     entry = read.table(key, value, ("mass", "inertia", "centre", "picture"))
-    mass = read.quantity(f"{key}.mass", entry.get("mass", "0 kg"), "kg", at_least_zero=True)
+    mass = read.quantity(f"{key}.mass", entry.get("mass", "0 kg"), "kg", AT_LEAST_ZERO)
     inertia = centre = None
     if "inertia" in entry:
-        inertia = read.quantity(f"{key}.inertia", entry["inertia"], "kg m^2", at_least_zero=True)
+        inertia = read.quantity(f"{key}.inertia", entry["inertia"], "kg m^2", AT_LEAST_ZERO)
     elif not math.isfinite(mass * length * length):
         raise read.refuse(f"{key}.mass", entry.get("mass"), "must leave the inertia m L^2/12 a finite number")
     if "centre" in entry:
@@ -195,7 +193,7 @@ def _read_motion(read: Reader, value: object) -> Motion:
     given[acceleration] = read.quantity(f"motion.{acceleration}", entry.get(acceleration, none), f"{unit}/s^2")
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
-        duration = read.quantity("motion.free.duration", released.get("duration"), "s", positive=True)
+        duration = read.quantity("motion.free.duration", released.get("duration"), "s", POSITIVE)
         given["free"] = Free(duration, read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS))
     if "law" in entry:
         given["law"] = _read_law(read, entry["law"])

@@ -141,7 +141,8 @@ class Drawing:
     def save(self, path: str | Path) -> None:
         """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
         with apply_style():
-            save(self.figure, Path(path), format_of(path))
+            kind = format_of(path)
+            save(self.figure, Path(path), kind)
 
 
 def draw_figure(
