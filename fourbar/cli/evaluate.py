@@ -3,7 +3,6 @@
 import shutil
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -20,9 +19,7 @@ from fourbar.cli.given import (
     units_option,
 )
 from fourbar.errors import InputError, NotAssembledError
-
-if TYPE_CHECKING:
-    from fourbar.solution import Conversion
+from fourbar.solution import DEGREES, Conversion
 
 
 @click.command()
@@ -90,7 +87,7 @@ def analyze(
     as_json: bool,
     as_csv: str | None,
     degrees: bool | None,
-    units: "Conversion",
+    units: Conversion,
     sensitivity: bool,
     every: int | None,
     out: Path | None,
@@ -104,7 +101,7 @@ def analyze(
     from fourbar.show.between import locate_between
     from fourbar.show.duty import write_motor
     from fourbar.show.tables import print_tables
-    from fourbar.solution import DEGREES, write_csv, write_json
+    from fourbar.solution import write_csv, write_json
     from fourbar.solve import find_last_stage, solve
 
     if as_json and as_csv:
@@ -158,15 +155,12 @@ def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
 @json_option
 @units_option
 @click.option("-o", "--out", type=FILE, metavar="PLOT", help="Draw the bands: svg, png or pdf.")
-def tolerance(
-    scene: Path, samples: int | None, seed: int, as_json: bool, units: "Conversion", out: Path | None
-) -> None:
+def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units: Conversion, out: Path | None) -> None:
     """Show what the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
     from fourbar.show.progress import show_running
     from fourbar.show.tables import write_table
-    from fourbar.solution import DEGREES
     from fourbar.studies.spread import SAMPLES, tolerances
 
     _refuse_units_of_json(as_json, units)
@@ -187,7 +181,7 @@ def tolerance(
         print_to(write_table(stated.title, shown.write_heading(found, own), shown.make_table(found, own)), None)
 
 
-def _refuse_units_of_json(as_json: bool, units: "Conversion") -> None:
+def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
     if as_json and units:
         raise click.UsageError("--json is SI and radians, every digit; --units is of the table")
 
@@ -200,12 +194,11 @@ def _refuse_units_of_json(as_json: bool, units: "Conversion") -> None:
 @json_option
 @units_option
 @or_out_option
-def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: "Conversion", out: Path | None) -> None:
+def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: Conversion, out: Path | None) -> None:
     """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
     from fourbar.show import extremes as shown
     from fourbar.show.progress import show_running
     from fourbar.show.tables import write_table
-    from fourbar.solution import DEGREES
     from fourbar.studies.enclosure import extremes as proven
 
     _refuse_units_of_json(as_json, units)

@@ -18,11 +18,11 @@ from fourbar.cli.given import (
     units_option,
 )
 from fourbar.errors import InputError
+from fourbar.scene import Scene
+from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
     from fourbar.mjcf.document import Drive
-    from fourbar.scene import Scene
-    from fourbar.solution import Conversion
 
 without_loads_option = click.option(
     "--without-loads", is_flag=True, help="Leave the loads out: the form has none, your program applies them."
@@ -45,7 +45,7 @@ without_loads_option = click.option(
 @click.option("--dimensions", is_flag=True, help="Write the lengths of the bars at them.")
 @units_option
 def plot(
-    scene: Path, out: Path, figure: str, position: str | None, branches: str, dimensions: bool, units: "Conversion"
+    scene: Path, out: Path, figure: str, position: str | None, branches: str, dimensions: bool, units: Conversion
 ) -> None:
     """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
     from fourbar.show.plot import draw
@@ -76,7 +76,7 @@ def plot(
 @click.option("--vectors", is_flag=True, help="With arrows of velocity and acceleration at the points.")
 @units_option
 def animate(
-    scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, vectors: bool, units: "Conversion"
+    scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, vectors: bool, units: Conversion
 ) -> None:
     """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""
     from fourbar.show.animate import write
@@ -167,7 +167,7 @@ def usd(scene: Path, without_loads: bool, out: Path) -> None:
         print_to(written(described, without_loads=without_loads), out)
 
 
-def _replace_loop(model: str, scene: "Scene") -> str:
+def _replace_loop(model: str, scene: Scene) -> str:
     """Give MJCF text joints that follow the input by the best polynomials that MuJoCo holds."""
     from fourbar.mjcf import replace_loop
     from fourbar.studies.ratio import ratio as found

@@ -3,16 +3,13 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from fourbar.errors import InputError
 from fourbar.linkage import ANY, POSITIVE, require
-
-if TYPE_CHECKING:
-    from fourbar.scene import Scene
-    from fourbar.solution import Conversion
+from fourbar.scene import Scene
+from fourbar.solution import Conversion
 
 MOST_POSITIONS = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
@@ -21,7 +18,7 @@ FILE = click.Path(path_type=Path)
 KEYS_OF_A_SCENE = ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
 
 
-def _read_units(context: click.Context, parameter: click.Parameter, text: str) -> "Conversion":
+def _read_units(context: click.Context, parameter: click.Parameter, text: str) -> Conversion:
     from fourbar.show.units import units
 
     return units(text)
@@ -41,7 +38,7 @@ units_option = click.option(
 
 
 @contextmanager
-def open_scene(path: Path) -> Iterator["Scene"]:
+def open_scene(path: Path) -> Iterator[Scene]:
     """Read the scene of a file; InputError where it cannot be printed, or not to the file of -o.
 
     The output is looked at before anything is solved, which may take minutes. Mistakes that show only then name the
@@ -66,7 +63,7 @@ def open_scene(path: Path) -> Iterator["Scene"]:
 
 
 @contextmanager
-def show_waiting(scene: "Scene") -> Iterator[None]:
+def show_waiting(scene: Scene) -> Iterator[None]:
     """Show in a terminal that a long free motion, which takes minutes, is running."""
     if scene.motion.free is None:
         yield

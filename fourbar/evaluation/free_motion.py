@@ -10,12 +10,13 @@ import cmath
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, list_bodies
+from fourbar.effects.effect import Effect
 from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, say_install
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, drive_sine, find_smooth_branch, prepare_path
@@ -25,9 +26,6 @@ from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command
 from fourbar.solution import Array
-
-if TYPE_CHECKING:
-    from fourbar.effects import Effect
 
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
 """Tolerances of a step of DOP853: below them a long fast motion errs by its round-off."""
@@ -126,7 +124,7 @@ def _compute_sines(at: Position) -> dict[int, float]:
 
 def release(
     linkage: FourBar,
-    terms: "Iterable[Effect]",
+    terms: Iterable[Effect],
     theta: float,
     omega: float,
     branch: int,
@@ -167,7 +165,7 @@ class _Run:
     def __init__(
         self,
         linkage: FourBar,
-        terms: "tuple[Effect, ...]",
+        terms: tuple[Effect, ...],
         theta: float,
         omega: float,
         branch: int,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.mobility import MARGIN, choose_range, find_limit_angles, follow_smooth_path
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
@@ -16,7 +17,7 @@ from fourbar.scene.tolerance import Tolerance
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, LinearDrive, Load
+    from fourbar.effects import LinearDrive, Load
     from fourbar.files.pictures import Picture
 
 
@@ -65,8 +66,6 @@ class Scene:
 
             object.__setattr__(self, "motion", replace(self.motion))
             object.__setattr__(self.motion, "bar", find_triangle(self.linkage, self.drive).bar)
-        from fourbar.effects.effect import Effect
-
         many = {"loads": Effect, "effects": Effect, "pictures": object, "points": Point, "tolerances": Tolerance}
         for name, each_kind in many.items():
             expect(name, getattr(self, name), tuple, list)
