@@ -9,6 +9,7 @@ from collections.abc import Container
 from contextlib import suppress
 from dataclasses import dataclass
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +93,15 @@ def require_numbers(
     return array.astype(float)
 
 
+def require_pair(key: str, value: Any, unit: str) -> tuple[float, float]:
+    """Return a pair (size in a unit, angle in rad) as floats, or raise an InputError."""
+    try:
+        size, angle = value
+    except (TypeError, ValueError):
+        raise InputError(key, value, "must be a pair (size, angle)") from None
+    return require(key, size, unit), require(key, angle, "rad")
+
+
 def require_bar(key: str, value: object) -> int:
     """Return the number of a moving bar, or raise an InputError."""
     return require_whole(key, value, MOVING_BARS, "must be 2, 3 or 4")
@@ -126,11 +136,7 @@ class Bar:
         if self.inertia is not None:
             set_field(self, "inertia", require("inertia", self.inertia, "kg m^2", AT_LEAST_ZERO))
         if self.centre is not None:
-            try:
-                r, phi = self.centre
-            except (TypeError, ValueError):
-                raise InputError("centre", self.centre, "must be a pair (distance, angle)") from None
-            set_field(self, "centre", (require("centre", r, "m"), require("centre", phi, "rad")))
+            set_field(self, "centre", require_pair("centre", self.centre, "m"))
 
     @property
     def moment_of_inertia(self) -> float:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fourbar.errors import InputError
-from fourbar.linkage import BAR_NAMES, require, require_whole
+from fourbar.linkage import BAR_NAMES, require_pair, require_whole
 from fourbar.quantities import UNITS
 
 LETTERS = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_")
@@ -36,12 +36,7 @@ class Point:
             raise InputError(self.key, self.name, "is the name of a quantity; a point needs another")
         bar = require_whole(f"{self.key}.bar", self.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
         object.__setattr__(self, "bar", bar)
-        try:
-            r, phi = self.from_pin
-        except (TypeError, ValueError):
-            raise InputError(f"{self.key}.from_pin", self.from_pin, "must be a pair (distance, angle)") from None
-        ends = tuple(require(f"{self.key}.from_pin", number, unit) for number, unit in ((r, "m"), (phi, "rad")))
-        object.__setattr__(self, "from_pin", ends)
+        object.__setattr__(self, "from_pin", require_pair(f"{self.key}.from_pin", self.from_pin, "m"))
 
     @property
     def key(self) -> str:

@@ -1,6 +1,6 @@
 """A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages requested."""
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from fourbar.files.pictures import Picture
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Scene:
     """A linkage and everything that is stated about it; two that state the same are equal.
 
@@ -90,14 +90,6 @@ class Scene:
             raise InputError("drive.bar", self.drive_bar, "a drive acts on a bar or along a line: bar, or from and to")
         assert isinstance(drive, LinearDrive)
         drive.require_stroke(self.linkage)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Scene):
-            return NotImplemented
-        return all(getattr(self, each.name) == getattr(other, each.name) for each in fields(self))
-
-    def __hash__(self) -> int:
-        return hash((self.title, self.drive_bar, self.motion))
 
     @property
     def counts_turns(self) -> bool:
