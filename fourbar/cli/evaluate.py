@@ -120,8 +120,8 @@ def analyze(
             f"{scene}: motion.{described.motion.names[0]}: the linkage assembles at none of the positions requested"
         )
     if as_json:
-        found = locate_between(described, solution)
-        text = write_json(solution, shown, motor=write_motor(solution, shown, found and found.solution))
+        located = locate_between(described, solution).solution
+        text = write_json(solution, shown, motor=write_motor(solution, shown, located))
     elif as_csv:
         text = write_csv(solution, shown, as_csv)
     else:

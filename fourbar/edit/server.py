@@ -125,10 +125,7 @@ class Workbench:
         try:
             self.session.keep()
         except OSError as error:
-            asyncio.run_coroutine_threadsafe(self._note(f"the state file cannot be written: {error}"), self.loop)
-
-    async def _note(self, text: str) -> None:
-        self.tell({"note": text})
+            self.loop.call_soon_threadsafe(self.tell, {"note": f"the state file cannot be written: {error}"})
 
     async def _settle(self) -> None:
         """Send the error bars, unless something has changed again."""

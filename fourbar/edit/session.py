@@ -108,15 +108,6 @@ class Session:
 
     # ---- what a page asks for ----------------------------------------------------------------
 
-    def greeting(self) -> dict[str, Any]:
-        """Describe what does not change with the state, to a page that has come."""
-        return {
-            "offers": list_offers(),
-            "file": self.path.name,
-            "exports": str(self.exports.folder),
-            "kept": [*self.kept],
-        }
-
     def answer(self, *, settled: bool = False) -> dict[str, Any]:
         """Describe the present state."""
         return {
@@ -266,6 +257,6 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
     "bodies": lambda session, asked: {
         "bodies": session.exports.free_bodies(session.now.scene, float(asked["position"]), session.units)
     },
-    "hello": lambda session, asked: session.greeting() | {"refer": True},
+    "hello": lambda session, asked: {"offers": list_offers(), "file": session.path.name, "refer": True},
 }
 """What a page can ask for."""

@@ -302,7 +302,7 @@ class _Run:
                 if rested:
                     t_new = self._find_root(brentq, dense, lambda y: float(y[1]), solver.t_old, t_new)
                     new = np.array([dense(t_new)[0], 0.0, dense(t_new)[2]])
-                if not self.follow and self._is_past(new):
+                if not self.follow and self.branch * self._compute_sine(new) < 0.0:  # through their common line
                     stopped = t_new = self._find_root(brentq, dense, self._compute_sine, solver.t_old, t_new)
                     new = dense(t_new)
                 report(t_new, dense)
@@ -340,10 +340,6 @@ class _Run:
     def _compute_sine(self, y: Array) -> float:
         """sin(theta_4 - theta_3), or that of the bar that was released: zero at its limits."""
         return _compute_sines(self.reading.at(float(y[0]))[0])[self.bar]
-
-    def _is_past(self, y: Array) -> bool:
-        """Whether the two other moving bars have gone through their common line."""
-        return self.branch * self._compute_sine(y) < 0.0
 
     def _make_row(self, y: Array) -> tuple[float, ...]:
         """theta_2, omega_2, alpha_2, branch, and the independent angle with all that belongs to it, of one instant."""

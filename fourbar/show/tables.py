@@ -121,19 +121,19 @@ def write_heading(scene: Scene, solution: Solution, units: Conversion = DEGREES)
             f"t = {solution.stopped_at:.6g} s, where bars 3 and 4 are in line"
         )
     of_drive = read_drive(solution)
-    if scene.motion.speed is None and of_drive.values is None and _is_acted_on(scene):
+    acted_on = scene.loads or scene.effects or any(bar.mass > 0.0 for bar in scene.linkage.moving)
+    if scene.motion.speed is None and of_drive.values is None and acted_on:
         lines.append(f"positions only, since {omega} is left out; {static(scene)}")
     found = locate_between(scene, solution)
-    if found is not None and found.reversals:
+    if found.reversals:
         unit = UNITS[solution.commanded]
         where = ", ".join(f"{write_value(place, unit, units)} ({pin})" for place, pin in found.reversals)
         lines.append(f"dry friction reverses, and the pin forces jump, at {solution.commanded} = {where}")
     if scene.motion.free is None and of_drive.values is not None and np.isfinite(of_drive.values).any():
-        peak = solution if found is None else found.solution
-        values = read_drive(peak).values
+        values = read_drive(found.solution).values
         assert values is not None
         worst = int(np.nanargmax(np.abs(values)))
-        where = write_value(peak.theta_2[worst], "rad", units)
+        where = write_value(found.solution.theta_2[worst], "rad", units)
         most = f"largest {of_drive.name}{_remark_grid(solution, found, of_drive.keys.value)}"
         lines.append(f"{most} {write_value(values[worst], of_drive.unit, units)} at theta_2 = {where}")
         if solution.stroke is not None:
@@ -142,28 +142,22 @@ def write_heading(scene: Scene, solution: Solution, units: Conversion = DEGREES)
         lines += _warn(scene, solution, units)
         lines += _write_motor(solution, units, found)
     if solution.F12 is not None and np.isfinite(solution.F12).any():
-        loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
-        peaks = loads if found is None else {pin: bearing_load(found.solution, pin) for pin in PIN_FORCE}
-        parts = [
-            f"{pin} {write_value(x.largest, 'N', units)} at {write_value(x.where, 'rad', units)}"
-            for pin, x in peaks.items()
-        ]
-        rms = [f"{pin} {write_value(load.rms, 'N', units)}" for pin, load in loads.items()]
+        peaks = ((pin, bearing_load(found.solution, pin)) for pin in PIN_FORCE)
+        parts = [f"{p} {write_value(x.largest, 'N', units)} at {write_value(x.where, 'rad', units)}" for p, x in peaks]
+        rms = [f"{pin} {write_value(bearing_load(solution, pin).rms, 'N', units)}" for pin in PIN_FORCE]
         most = f"largest pin loads{_remark_grid(solution, found, *PIN_FORCES)}"
         lines += [f"{most}: " + ", ".join(parts), "RMS pin loads: " + ", ".join(rms)]
     return lines
 
 
-def _remark_grid(solution: Solution, found: Between | None, *names: str) -> str:
+def _remark_grid(solution: Solution, found: Between, *names: str) -> str:
     """Say that a largest value is that of the positions alone, where between them there may be a larger one."""
-    if len(solution) == 1 or (found is not None and not found.growing.intersection(names)):
-        return ""
-    return " of these positions"
+    return " of these positions" if len(solution) > 1 and found.growing.intersection(names) else ""
 
 
-def _write_motor(solution: Solution, units: Conversion, found: Between | None) -> list[str]:
+def _write_motor(solution: Solution, units: Conversion, found: Between) -> list[str]:
     """Write what the drive delivers, for the choice of a motor."""
-    duty = motor_duty(solution, None if found is None else found.solution)
+    duty = motor_duty(solution, found.solution)
     if duty is None or len(solution) == 1:
         return []
     rms = f"RMS torque {write_value(duty.rms_torque, 'N m', units)}" if duty.rms_torque is not None else ""
@@ -184,11 +178,6 @@ def static(scene: Scene) -> str:
     """Say what asks for forces where a scene states positions alone."""
     unit, what = ("rad/s", "torque") if scene.motion.stroke is None else ("m/s", "force")
     return f'{scene.motion.names[1]} = "0 {unit}" gives the static {what} and pin forces'
-
-
-def _is_acted_on(scene: Scene) -> bool:
-    """Whether anything in the scene would need a torque."""
-    return bool(scene.loads or scene.effects or any(bar.mass > 0.0 for bar in scene.linkage.moving))
 
 
 def write_value(number: float, unit: str, units: Conversion) -> str:

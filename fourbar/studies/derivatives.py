@@ -176,7 +176,9 @@ def sensitivity(scene: Scene) -> Sensitivity:
         raise InputError(theta, scene.motion.angle, "has no sensitivities: the limit moves with the lengths")
     at, solution, known = command(scene), solve(scene), list_entries(scene)
     moving = at.speed is not None
-    known = {key: entry for key, entry in known.items() if moving or _is_of_position(key)}
+    if not moving:  # positions depend on these alone
+        of_positions = ("lengths", "points", "drive")
+        known = {key: own for key, own in known.items() if key.startswith(of_positions) or ".centre." in key}
     keys = {theta: SceneNumber((), OF_SCENE[scene.motion.names[0]])} | known
     most = np.nan if at.stroke is None else float(at.stroke.max())
     numbers = [most if key == theta else read_place(scene, entry.place) for key, entry in keys.items()]
@@ -210,11 +212,6 @@ def sensitivity(scene: Scene) -> Sensitivity:
     for name in set(forces) & set(names):
         by[name][:, status != STATUS_NAMES[OK]] = np.nan
     return Sensitivity(scene, solution, keys, np.array(numbers, dtype=float), status.tolist(), by)
-
-
-def _is_of_position(key: str) -> bool:
-    """Whether positions depend on a number; the rest comes in with the motion."""
-    return key.startswith(("lengths", "points", "drive")) or ".centre." in key
 
 
 class _Directed(Gravity):

@@ -172,8 +172,7 @@ def draw_figure(
 
 def _look_between(shown: View) -> None:
     """Add what stands between the positions of the sweep: jumps are drawn where they are, peaks to their height."""
-    if (found := locate_between(shown.scene, shown.sweep)) is None:
-        return
+    found = locate_between(shown.scene, shown.sweep)
     shown.sweep = found.solution
     if found.reversals:
         axis = shown.axis

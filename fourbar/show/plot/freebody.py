@@ -161,7 +161,8 @@ def _draw_one(
     for arrow in arrows:
         size = abs(arrow.force)
         if size < SHOWN * biggest:
-            short.append(f"{_write_plainly(arrow.text)} = {write_quantity(size, 'N', view.units)}")
+            plain = re.sub(r"[$_{}]", "", arrow.text.replace("\\,", " ")).replace("-", "−")
+            short.append(f"{plain} = {write_quantity(size, 'N', view.units)}")
             continue
         draw_plate(axes, bar, (0.0j, arrow.at, along), labels)
         foot, tip = split_components(arrow.at), split_components(arrow.at + scale * arrow.force)
@@ -196,11 +197,6 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
     axes.set_axis_off()
     look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45, "color": INK if lines else MUTED}
     axes.text(0.0, 1.0, "\n".join(lines) or "no couples", transform=axes.transAxes, **look)
-
-
-def _write_plainly(text: str) -> str:
-    """Write a typeset name in plain letters, for the caption."""
-    return re.sub(r"[$_{}]", "", text.replace("\\,", " ")).replace("-", "−")
 
 
 def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:
