@@ -30,8 +30,6 @@ NO_NUMBERS = (bool, str, bytes, complex)
 A_BRANCH = "must be +1 (open) or -1 (crossed)"
 MOST_STEPS = 100_000_000
 """Intervals of any motion or curve."""
-
-
 ANY, AT_LEAST_ZERO, POSITIVE = "a finite number", "a finite number >= 0", "a finite number > 0"
 """Bounds of a number, as errors say them."""
 

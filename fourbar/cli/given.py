@@ -13,7 +13,6 @@ from fourbar.solution import Conversion
 
 MOST_POSITIONS = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
-
 FILE = click.Path(path_type=Path)
 KEYS_OF_A_SCENE = ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
 

@@ -18,7 +18,6 @@ from fourbar.solution import Array
 
 WORTH_COMPILING = 2_000_000
 """Evaluations of the forces, one a position, with error bars fourteen: loading numba and the loop costs as much."""
-
 PARTS_FOR_THREADS = 4
 
 

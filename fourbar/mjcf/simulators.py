@@ -10,11 +10,8 @@ from fourbar.scene import Scene
 
 SINGLE = replace(RECIPE, flywheel=1e3, pad=None)
 """For single precision: there a flywheel of 1e8 and fitted pads lose the closing force entirely."""
-
 FAST = replace(RECIPE, time_constant_steps=2.0)
 """For a closure whose acceleration lacks a term: the quicker it yields, the sooner its error makes up for that."""
-
-
 SIMULATORS = {"mujoco": RECIPE, "warp": SINGLE, "mjx": FAST, "genesis": RECIPE, "newton": SINGLE}
 """Who reads the file, and the settings that carry the loop best there."""
 OWN_MOTORS = ("genesis", "newton")

@@ -23,8 +23,6 @@ MOST_DIGITS = 16
 """Of a double."""
 GAP = 2
 """Blanks between two columns of the table, the divider among them."""
-
-
 MOST_ROWS = 40
 """Rows of the table on a terminal where --every does not state them: they and the summary can be read at a glance."""
 STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)

@@ -28,8 +28,6 @@ FRAMES_PER_SECOND = 25
 MAX_FRAMES = 1500
 SIZE = (6.4, 5.6)
 DPI = 100
-
-
 SWEEP_SECONDS = 6.0
 """Of a film of a sweep, where nothing else is stated."""
 WINDOW = 24

@@ -26,7 +26,6 @@ EVERY = 60.0
 """Dots on a hodograph stand this far apart in the commanded angle, deg ..."""
 MOST_DOTS = 12
 """... or, over time or a stroke, a round number that gives no more than these."""
-
 LONG_NUMBERS = 2000.0
 """From here on the numbers along a radius are too wide for four of them."""
 
