@@ -201,12 +201,7 @@ class FourBar:
 
 
 def uniform(
-    ground: float | str,
-    input: float | str,
-    coupler: float | str,
-    output: float | str,
-    *,
-    per_metre: float | str = 1.0,
+    ground: float | str, input: float | str, coupler: float | str, output: float | str, *, per_metre: float | str = 1.0
 ) -> FourBar:
     """Make a linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m).
 

@@ -14,15 +14,7 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, expect
 from fourbar.linkage import POSITIVE, require
 from fourbar.quantities import NOT_ASSEMBLED, OF_LINE, PIN_FORCES, STATUS_NAMES, UNITS, Quantities, is_scalar
-from fourbar.writing import (
-    describe_extent,
-    list_names,
-    make_data_frame,
-    null_nan,
-    write_between,
-    write_object,
-    write_text,
-)
+from fourbar.writing import describe_extent, list_names, make_data_frame, write_between, write_object, write_text
 
 Array = NDArray[np.float64]
 
@@ -189,14 +181,14 @@ def write_csv(solution: Solution, units: Conversion = SI, decimal: str = ".") ->
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
     size, first = solution.theta_2.size, list_leading(solution)
     columns = {
-        name: [None] * size if values is None else null_nan(values)
+        name: [math.nan] * size if values is None else values.tolist()
         for name, values in list_scalars(solution, units).items()
     }
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n", delimiter=";" if decimal == "," else ",")
     writer.writerow([*first, *columns])
     for start, row in zip(zip(*first.values(), strict=True), zip(*columns.values(), strict=True), strict=True):
-        writer.writerow([*start, *("" if cell is None else repr(cell).replace(".", decimal) for cell in row)])
+        writer.writerow([*start, *(repr(cell).replace(".", decimal) if math.isfinite(cell) else "" for cell in row)])
     return text.getvalue()
 
 

@@ -11,24 +11,18 @@ from fourbar.effects import Flywheel, Gravity, Load, Viscous
 from fourbar.evaluation.case import BLOCK, NO_MOTION, Case, Evaluated, change_numbers
 from fourbar.evaluation.compiled import ROWS, compile_loop, run, scatter
 from fourbar.evaluation.error_bars import draw_signs
-from fourbar.evaluation.stages import (
-    ERROR,
-    NO_HALF_ANGLE,
-    Part,
-    evaluate_command,
-    find_sign,
-    list_kinematics,
-    take_piece,
-)
+from fourbar.evaluation.stages import ERROR, Part, evaluate_command, find_sign, list_kinematics, take_piece
 from fourbar.evaluation.withheld import is_finite, withhold_in_place
 from fourbar.formulas.arithmetic import cross, is_any, polar, split_sum
 from fourbar.formulas.motion import Rates, State
-from fourbar.formulas.position import Position
+from fourbar.formulas.position import HalfAngle, Position
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Command
 from fourbar.solution import Array
 
+NO_HALF_ANGLE = HalfAngle(*[np.nan] * 5)
+"""Of positions whose motion and forces are known."""
 CARRIED = (Load, Gravity, Viscous, Flywheel)
 """Effects that the loop knows; a flywheel is in the inertia of its bar."""
 

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
-NO_HALF_ANGLE = HalfAngle(*[np.nan] * 5)
-"""Of positions whose motion and forces are known."""
 Part = tuple[Any, ...]
 """Index of some positions in the arrays of all."""
 WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)

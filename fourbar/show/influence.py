@@ -37,7 +37,7 @@ def find_largest(found: Sensitivity, quantity: str) -> float:
 def write_heading(found: Sensitivity) -> list[str]:
     """Write the lines above the table."""
     lines = [
-        "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude",
+        "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude"
     ]
     for name in list_shown(found):
         own = found.influences(name)

@@ -8,11 +8,7 @@ ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
 PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp"}
 STATED = ("m", "N", "N m", "kg", "rad", "rad/s", "rad/s^2", "m/s", "m/s^2", "W")
 """The SI units for which another one can be stated, each of a dimension of its own."""
-DERIVED = {
-    "m/s": ("m", "{}/s"),
-    "m/s^2": ("m", "{}/s^2"),
-    "J": ("N m", "{}"),
-}
+DERIVED = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", "{}")}
 """Not stated, these follow another one: energy the unit of torque, speeds that of length."""
 
 

@@ -168,14 +168,7 @@ def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
 
 
 def _draw_one(
-    axes: "Axes",
-    view: View,
-    bar: int,
-    arrows: list[Arrow],
-    scale: float,
-    biggest: float,
-    labels: Labels,
-    span: float,
+    axes: "Axes", view: View, bar: int, arrows: list[Arrow], scale: float, biggest: float, labels: Labels, span: float
 ) -> None:
     where = place_of(view.scene.linkage, view.here, 0, 1.0).pins
     along = where[ENDS[bar][1]] - where[ENDS[bar][0]]

@@ -6,16 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fourbar.show.plot.curves import break_at_poles, choose_limit, find_poles, list_force_sizes, note
-from fourbar.show.plot.style import (
-    FORCE_COLOURS,
-    MUTED,
-    OPEN,
-    choose_force_line,
-    choose_unit,
-    find_greatest,
-    write_force_name,
-    write_number,
-)
+from fourbar.show.plot.style import MUTED, OPEN, choose_force_line, choose_unit, find_greatest, write_number
 from fourbar.show.plot.view import View
 from fourbar.solution import Array
 
@@ -34,7 +25,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     """Draw the tips of a force's vectors from one origin; open dot: start of the sweep, dots every 60 deg."""
     from matplotlib.ticker import MaxNLocator
 
-    force = getattr(view.sweep, name)
+    force, look = getattr(view.sweep, name), choose_force_line(name)
     direction, own = np.arctan2(force[:, 1], force[:, 0]), np.hypot(*force.T)
     everywhere = list_force_sizes(view, (name,))
     limit = choose_limit(everywhere)
@@ -49,10 +40,10 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     free = _find_free_direction(direction[known])
     direction[known] = np.unwrap(direction[known])
     size = np.where(own <= top, own, np.nan) if limit else own
-    axes.plot(break_at_poles(direction, where), factor * break_at_poles(size, where), **choose_force_line(name))
-    axes.plot(direction[dots], factor * size[dots], "o", ms=2.8, color=FORCE_COLOURS[name], ls="none")
+    axes.plot(break_at_poles(direction, where), factor * break_at_poles(size, where), **look)
+    axes.plot(direction[dots], factor * size[dots], "o", ms=2.8, color=look["color"], ls="none")
     first = int(np.argmax(np.isfinite(size)))
-    start = {**OPEN, "mec": FORCE_COLOURS[name]}
+    start = {**OPEN, "mec": look["color"]}
     axes.plot(direction[[first]], factor * size[[first]], "o", ms=4.6, mew=1.1, zorder=5, **start)
     if limit and find_greatest(own) > limit:
         note(view, f"Hodographs of {name} clipped at {write_number(factor * top)} {unit}.")
@@ -64,7 +55,7 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     axes.set_rticks([tick for tick in ticks if 0.0 < tick < 0.97 * factor * top])
     axes.set_rlabel_position(free)
     axes.tick_params(axis="y", labelsize=6.5, labelcolor=MUTED)
-    axes.set_title(f"{write_force_name(name)} ({unit})", pad=12)
+    axes.set_title(f"{look['label']} ({unit})", pad=12)
     note(view, f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.")
 
 

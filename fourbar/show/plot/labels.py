@@ -126,14 +126,7 @@ def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
 
 
 def _choose_spot(
-    at: Point,
-    away: float,
-    half: Point,
-    dots: np.ndarray,
-    boxes: list[Box],
-    per_point: float,
-    mark: float,
-    inside: Box,
+    at: Point, away: float, half: Point, dots: np.ndarray, boxes: list[Box], per_point: float, mark: float, inside: Box
 ) -> Point:
     """Choose the centre of the label: the candidate that covers least, the nearest and most outward first."""
     best, best_cost, edge = at, math.inf, 0.5 * per_point * dots[:, 2]

@@ -10,7 +10,7 @@ from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.show.acting import list_acting
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, choose_unit, find_greatest, write_quantity
+from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, POINT, choose_unit, find_greatest, write_quantity
 from fourbar.show.plot.symbols import Place, place_of, split_components
 from fourbar.show.plot.view import View
 from fourbar.solution import Solution
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 Point = tuple[float, float]
-POINT = "#8A3B78"
-"""Of the scene's own points."""
 ON_BAR = 1e-3
 """Of a bar's length: a point that lies nearer to its line is on it, as far as can be seen."""
 
