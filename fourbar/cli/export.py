@@ -115,18 +115,26 @@ def mjcf(
 
     if (scene is None) == (lengths is None):
         raise click.UsageError("give a scene file or --lengths D A B C, one of the two")
-    if scene is not None:
-        if omega is not None:
-            raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
+    if scene is not None and omega is not None:
+        raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
+
+    def put(described: Scene) -> None:
+        text = writer.write_mjcf_for(described, simulator, drive)
+        if mimic:
+            from fourbar.studies.ratio import ratio
+
+            best = ratio(described).fits[-1]  # the best polynomials that MuJoCo holds
+            text = writer.replace_loop(text, described, best.about, best.joint_A, best.theta_4)
+        given.print_to(text, out)
+
+    if lengths is None:
+        assert scene is not None
         with given.open_scene(scene) as described:
-            text = writer.write_mjcf_for(described, simulator, drive)
-            given.print_to(_replace_loop(text, described) if mimic else text, out)
+            put(described)
         return
-    assert lengths is not None
     speed = {} if omega is None else {"omega": given.read_number("--omega", omega, "rad/s")}
     made = writer.make_scene(*given.read_lengths(lengths), **speed)
-    text = writer.write_mjcf_for(made, simulator, drive)
-    given.print_to(_replace_loop(text, made) if mimic else text, out)
+    put(made)
     for line in writer.list_defaults(made):
         click.echo(line)
 
@@ -154,12 +162,3 @@ def usd(scene: Path, without_loads: bool, out: Path) -> None:
 
     with given.open_scene(scene) as described:
         given.print_to(written(described, without_loads=without_loads), out)
-
-
-def _replace_loop(model: str, scene: Scene) -> str:
-    """Give MJCF text joints that follow the input by the best polynomials that MuJoCo holds."""
-    from fourbar.mjcf import replace_loop
-    from fourbar.studies.ratio import ratio as found
-
-    best = found(scene).fits[-1]
-    return replace_loop(model, scene, best.about, best.joint_A, best.theta_4)

@@ -6,7 +6,6 @@ from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, require_pair, require_whole
 from fourbar.quantities import UNITS
 
-LETTERS = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_")
 LONGEST_NAME = 40
 OF_POINTS = {"": "position", "v_": "velocity", "a_": "acceleration"}
 """What is evaluated of a point: the beginning of the quantity's name, and the stage."""
@@ -28,8 +27,8 @@ class Point:
     from_pin: tuple[float, float]
 
     def __post_init__(self) -> None:
-        plain = isinstance(self.name, str) and 0 < len(self.name) <= LONGEST_NAME and set(self.name) <= LETTERS
-        if not plain or self.name.startswith(("v_", "a_")) or self.name[0].isdigit():
+        plain = isinstance(self.name, str) and self.name.isascii() and self.name.isidentifier()
+        if not plain or self.name.startswith(("v_", "a_")) or len(self.name) > LONGEST_NAME:
             allowed = "must be a word of letters, digits and _, not beginning with a digit, v_ or a_"
             raise InputError("points", self.name, allowed)
         if {self.name, f"{self.name}_x", f"{self.name}_y"} & COLUMNS:

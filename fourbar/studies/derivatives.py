@@ -98,13 +98,12 @@ class Sensitivity:
         Raises DependencyError where pandas is not installed.
         """
         n = len(self.status)
-        slopes_of = {part: array for name, rows in self.by.items() for part, array in split_parts(name, rows).items()}
-        columns = {part: rows.ravel() for part, rows in slopes_of.items() if not part.startswith("|")}
-        size = {f"|{name}|": np.ravel([self.of(f"|{name}|", key) for key in self.keys]) for name in PIN_FORCES
-                if name in self.by}  # fmt: skip
+        every = (part for name in self.by for part in split_parts(name, self.value(name)))
+        parts = sorted(every, key=lambda part: part[0] == "|")  # magnitudes last
+        columns = {part: np.ravel([self.of(part, key) for key in self.keys]) for part in parts}
         first = {"key": np.repeat(list(self.keys), n), "theta_2": np.tile(self.solution.theta_2, len(self.keys)),
                  "status": self.status * len(self.keys)}  # fmt: skip
-        return make_data_frame(first | columns | size)
+        return make_data_frame(first | columns)
 
     def _find_whole(self, quantity: str) -> str:
         """Return the quantity of which one is asked, or a component or the magnitude; InputError for any other."""

@@ -57,7 +57,6 @@ def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 
 def _draw_kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    del labels
     panels = figure.subplots(3 if shown.moves else 1, 1, squeeze=False)[:, 0]
     painters: tuple[Any, ...] = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
     for axes, paint in zip(panels, painters, strict=False):
@@ -77,7 +76,6 @@ def _draw_single(paint: Callable[[Any, View], None]) -> Painter:
 
 
 def _draw_hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    del labels
     panels = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
     for axes, name in zip(panels, PIN_FORCES, strict=True):
         hodograph.draw_hodograph(axes, shown, name)

@@ -133,7 +133,6 @@ def _draw_shares(axes: "Axes", found: Tolerances, part: str, units: Conversion) 
 
 def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
     """One panel for each quantity over the same rows."""
-    del labels
     found = sensitivity(shown.scene)
     names = list_shown(found)[:MOST_PANELS]
     keys = rank_numbers(found, names)[:MOST_NUMBERS][::-1]
