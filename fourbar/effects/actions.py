@@ -7,7 +7,7 @@ import numpy as np
 
 from fourbar.formulas.arithmetic import Number, cross, is_any, sign
 from fourbar.formulas.motion import State
-from fourbar.formulas.pin_forces import Bodies, Body, Wrenches
+from fourbar.formulas.pin_forces import Bodies, Body, PinForces, Wrenches
 from fourbar.linkage import PINS, FourBar
 
 AT_REST = 50.0 * 2.0**-52
@@ -51,6 +51,8 @@ class Actions:
         """About the first pins O2, A, O4, N m, but for the couples between two bars."""
         self.couples: dict[str, Any] = {}
         """Between the two bars that meet at a pin, on the second of them, N m."""
+        self.through: dict[str, Any] = {}
+        """Forces between bars 2 and 3, 3 and 4, as if through their pin, on the second of them, complex, N."""
 
     def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
         """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.
@@ -73,18 +75,38 @@ class Actions:
         couple = self.rounded(couple)
         self.couples[pin] = self.couples[pin] + couple if pin in self.couples else couple
 
+    def pull(self, start: Any, end: Any, force: Number) -> None:
+        """Add a force (complex, N, world axes) at a point of a bar, and its opposite at one of another bar.
+
+        Between bars 2 and 3, or 3 and 4, it goes through their pin and leaves a couple: it is in no sum of another bar.
+        """
+        pin = next((pin for pin in ("A", "B") if {start.bar, end.bar} == {*PINS[pin]}), None)
+        if pin is None:
+            for point, sense in ((start, 1.0), (end, -1.0)):
+                self.force(point.bar, sense * force, point.arm(self.state))
+            return
+        point, sense = (end, -1.0) if end.bar > start.bar else (start, 1.0)
+        on_second, arm = self.rounded(sense * force, turned=True), point.arm(self.state)
+        if pin == "B":  # which is no first pin
+            arm = arm - self.state.lengths.c * self.state.at.u4
+        self.through[pin] = self.through[pin] + on_second if pin in self.through else on_second
+        self.couple(pin, cross(-on_second, arm))
+
     def plus(self, unit: "Actions", size: Number) -> "Actions":
         """Make the sum of these and of what a drive of a size does that does `unit` per newton."""
         whole = Actions(self.state, self.bodies, self.side, self.rounded)
-        whole.forces, whole.moments, whole.couples = dict(self.forces), dict(self.moments), self.couples
-        for bar, force in unit.forces.items():
-            whole.forces[bar] = whole.forces.get(bar, 0.0) + self.rounded(size * force, turned=True)
-        for bar, moment in unit.moments.items():
-            whole.moments[bar] = whole.moments.get(bar, 0.0) + self.rounded(size * moment)
+        for name, turned in (("forces", True), ("moments", False), ("couples", False), ("through", True)):
+            sums = dict(getattr(self, name))
+            for key, of_one in getattr(unit, name).items():
+                sums[key] = sums.get(key, 0.0) + self.rounded(size * of_one, turned=turned)
+            setattr(whole, name, sums)
         return whole
 
     def work(self) -> tuple[Number, Number]:
-        """Compute the generalised force Q (power over the independent angle's speed) of all and of bars 3, 4, N m."""
+        """Compute the generalised force Q (power over the independent angle's speed) of all and of bars 3, 4, N m.
+
+        That of bars 3 and 4 is without what goes through pin A.
+        """
         k = self.state.k
         parts = [self.moments[bar] * h for bar, h in ((3, k.h3), (4, k.h4)) if bar in self.moments]
         if 3 in self.forces:
@@ -136,3 +158,8 @@ class Actions:
                 if i != 1:
                     M[i - 2] = M[i - 2] - couple
         return Wrenches(R[0], R[1], R[2], M[0], M[1], M[2], self.couples.get("B", 0.0))
+
+    def at_pins(self, pins: PinForces) -> PinForces:
+        """Return what the pins themselves carry of the forces between their bars."""
+        A, B = (self.through.get(pin, 0.0) for pin in ("A", "B"))
+        return pins._replace(F32=pins.F32 + A, F43=pins.F43 + B) if self.through else pins

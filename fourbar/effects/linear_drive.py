@@ -72,9 +72,7 @@ class LinearDrive:
 
     def act(self, actions: Actions, force: Number) -> None:
         """Push its ends apart."""
-        push = force * self.line(actions.state, actions.rounded)[1]
-        for sense, point in self.ends:
-            actions.force(point.bar, sense * push, point.arm(actions.state))
+        actions.pull(self.end, self.start, force * self.line(actions.state, actions.rounded)[1])
 
     def per_newton(self, actions: Actions) -> Actions:
         """Make what 1 N of it does to the bars, with the roundings of other actions."""

@@ -148,9 +148,7 @@ class Springs(Effect):
         for spring in self.springs:
             start, end = (actions.rounded(point.place(state)) for point in (spring.start, spring.end))
             across = end - start
-            force = _divide_by_distance(spring, across, actions) * across
-            for point, sign in ((spring.start, 1.0), (spring.end, -1.0)):
-                actions.force(point.bar, sign * force, point.arm(state))
+            actions.pull(spring.start, spring.end, _divide_by_distance(spring, across, actions) * across)
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
         """NO_DIRECTION where the two points of a spring with slack coincide."""

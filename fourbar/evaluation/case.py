@@ -245,7 +245,7 @@ class Case(NamedTuple):
                 moment = -(acting.about_B() + rest[1])
             elif bar == 2 and short:
                 moment = (acting.work()[1] - rest[0]) / k.h2  # of bars 3 and 4 over the turn of bar 2
-            return pin_forces(self.lengths, at, bar, sines[bar], acting.wrenches(w), mass, moment)
+            return acting.at_pins(pin_forces(self.lengths, at, bar, sines[bar], acting.wrenches(w), mass, moment))
 
         def eliminate(acting: Actions, *, with_inertia: bool = True) -> PinForces:
             if unit is None:

@@ -102,6 +102,11 @@ def test_the_numbers_of_a_table_are_inputs() -> None:
     assert run("tables", range(8523, 8524)).holds()
 
 
+def test_a_pull_between_two_bars_stays_out_of_the_force_at_a_third() -> None:
+    """F12_y is 1.8 mN, the spring between input and coupler pulls with 5.4 N; in their sums 1.45 of what is allowed."""
+    assert run("springs", range(2515, 2516)).holds()
+
+
 @pytest.mark.nightly
 def test_kites_that_stand_still_beside_no_exact_directions() -> None:
     """B rests on O2: its speed across is the product of two roundings, where lengths are no constants."""

@@ -20,7 +20,7 @@ from fourbar.effects import (
     Viscous,
 )
 from fourbar.formulas.mobility import limit_positions
-from fourbar.linkage import Bar, FourBar, uniform
+from fourbar.linkage import PINS, Bar, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import Law
@@ -104,6 +104,14 @@ FAULT_SCENES: dict[str, Scene] = {
             ),
             Torsion.at(B=(0.5, 0.7, 0.1), O4=(0.3, 1.2, -0.05)),
             Flywheel(0.003, 4),
+        ),
+    ),
+    "sprung at the pins": replace(
+        CRANK_ROCKER,
+        effects=(
+            Springs(
+                tuple(Spring(SpringEnd(i, 0.12, 0.5), SpringEnd(j, 0.09, -0.4), 60.0, 0.1) for i, j in PINS.values())
+            ),
         ),
     ),
     "flywheel": replace(CRANK_ROCKER, effects=(Flywheel(0.003, 2), Torsion.at(A=(0.5, 0.2, 0.1)))),
