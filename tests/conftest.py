@@ -1,7 +1,9 @@
 """What tests of several folders need: a headless Chromium, where the machine has one; programs that Ctrl-C stops."""
 
+import os
 import shutil
 import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,6 +23,14 @@ FLAGS = (
     "--disable-sync",
     "--hide-scrollbars",
 )
+
+HERE = {"posix": hasattr(os, "fork"), "linux": sys.platform == "linux"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        for system in (name for name, here in HERE.items() if not here and item.get_closest_marker(name)):
+            item.add_marker(pytest.mark.skip(reason=f"of {system} alone"))
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import angle, is_any, namespace, nearest, polar, split_sum
+from fourbar.formulas.arithmetic import angle, is_any, make_like, namespace, nearest, polar, split_sum
 from fourbar.formulas.motion import State
 from fourbar.linkage import FourBar, require, require_bar, require_numbers, require_pair
 
@@ -67,18 +67,19 @@ class Table:
         first, xp = self.theta_2[0], namespace(theta_2)
         place = first + xp.remainder(angle(polar(1.0, theta_2)) - first, TURN)
         points, factors = np.array(self.theta_2), np.array(self.factor)
+        pieces = (points[:-1], np.diff(points), factors[:-1], np.diff(factors))
         if xp is np:
             place = self._require_covered(place)
-            k = np.searchsorted(points, place, "right") - 1
+            k = np.clip(np.searchsorted(points, place, "right") - 1, 0, len(points) - 2)
+            start, width, before, rise = (piece[k] for piece in pieces)
         else:  # what no library lacks, under no transformation of its own
-            points, factors = (xp.asarray(row, dtype=place.dtype) for row in (self.theta_2, self.factor))
-            k = xp.sum(xp.astype(place[..., None] >= points, xp.int32), axis=-1) - 1
-        k = xp.clip(k, 0, len(self.theta_2) - 2)
-        away, lost = split_sum(theta_2, -points[k])
+            k = xp.sum(xp.astype(place[..., None] >= make_like(points, place)[1:-1], xp.int32), axis=-1)[None]
+            start, width, before, rise = (make_like(piece, place)[k][0] for piece in pieces)
+        away, lost = split_sum(theta_2, -start)
         rest = xp.fmod(away, TURN)
         turns = nearest((theta_2 - place) / TURN)
         past = rest + (nearest((away - rest) / TURN) - turns) * TURN + (lost - turns * BEYOND_TURN)
-        return factors[k], xp.diff(factors)[k] * (past / xp.diff(points)[k])
+        return before, rise * (past / width)
 
     def _require_covered(self, place: Any) -> Any:
         """Return angles within a turn from the first, or raise an InputError for one that the table does not cover."""

@@ -85,6 +85,8 @@ class Dynamics(NamedTuple):
     status: Any
     drive: Any
     """Its torque, N m, or its force, N."""
+    work: Any
+    """Its power over the commanded angle's speed, N m, which has no pole where the driven bar rests."""
 
 
 class Case(NamedTuple):
@@ -258,7 +260,8 @@ class Case(NamedTuple):
         for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
             if term.loaded_pins:
                 solved = term.solve_friction(actions, solved.pins, eliminate)
-        return Dynamics(*solved, driving_torque(by, inertial, actions.work()[0]))
+        Q = actions.work()[0]
+        return Dynamics(*solved, driving_torque(by, inertial, Q), inertial - Q)
 
     def drive_interval(self, state: State, acceleration: Any, drive: Any) -> tuple[Any, Any, Any]:
         """Least and greatest torque or force of the drive where dry friction holds a pin at rest, elsewhere it twice.

@@ -39,6 +39,16 @@ def _find_namespace(number: Number) -> Any:
     return found
 
 
+def make_like(values: Number, other: Number) -> Number:
+    """Make plain numbers an array of another's library, kind and device."""
+    xp, where = namespace(other), {}
+    if xp is not np:
+        from array_api_compat import is_jax_array
+
+        where = {} if is_jax_array(other) else {"device": other.device}  # JAX brings plain numbers to the others
+    return xp.asarray(values, dtype=other.dtype, **where)
+
+
 def is_any(mask: Number) -> bool:
     """Whether a mask may hold at any entry; `np.any` costs a plain number fifty times as much."""
     if isinstance(mask, PLAIN):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import Number, angle, polar, select
+from fourbar.formulas.arithmetic import Number, angle, divisor, namespace, polar, select
 from fourbar.linkage import FourBar
 from fourbar.solution import Array
 
@@ -47,20 +47,24 @@ class Triangle(NamedTuple):
     def turned(self, stroke: Any, speed: Any, acceleration: Any, side: str | None) -> tuple[Any, Any, Any, Any]:
         """Compute angle, speed and acceleration of the bar, and the lever as a part of the longer of l and r.
 
-        NaN where the cylinder cannot have the stroke. All may be arrays, and numbers that carry their derivatives.
+        NaN where the cylinder cannot have the stroke; in libraries other than NumPy the lever alone says so, by 0. All
+        may be arrays, and numbers that carry their derivatives.
         """
         assert side is not None
         gap, most = self.length - self.reach, self.length + self.reach
-        sign, product = SIDES[side], self.length * self.reach
+        sign, product, xp = SIDES[side], self.length * self.reach, namespace(stroke, self.length, self.reach)
+        near, far = (stroke - gap) * (stroke + gap), (most - stroke) * (most + stroke)
+        inside = xp is np or (near > 0.0) & (far > 0.0)
+        near, far, stroke = (divisor(x, inside) for x in (near, far, stroke))
         with np.errstate(all="ignore"):
-            near, far = np.sqrt((stroke - gap) * (stroke + gap)), np.sqrt((most - stroke) * (most + stroke))
-            beta = 2.0 * np.arctan2(near, far)
+            near, far = xp.sqrt(near), xp.sqrt(far)
+            beta = 2.0 * xp.atan2(near, far)
             lever = near * far / (2.0 * stroke)
-            theta, share = self.angle + sign * beta, lever / (0.5 * (most + abs(gap)))
+            theta, share = self.angle + sign * beta, select(inside, lever / (0.5 * (most + abs(gap))), 0.0)
             if speed is None:
                 return theta, None, np.zeros(np.shape(theta)), share
             rate = speed / lever
-            growth = (speed * speed + stroke * acceleration - product * np.cos(beta) * rate * rate) / (lever * stroke)
+            growth = (speed * speed + stroke * acceleration - product * xp.cos(beta) * rate * rate) / (lever * stroke)
         return theta, sign * rate, sign * growth, share
 
 
@@ -72,5 +76,6 @@ def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
     own, other = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
     pivot = 0.0 if own.bar == 2 else polar(linkage.ground, linkage.ground_angle)
     to_ground = polar(other.distance, other.angle + linkage.ground_angle) - pivot
-    along = select(own.distance >= 0.0, 0.0, np.pi)
+    forwards = 0.0 * own.distance  # of its kind
+    along = select(own.distance >= 0.0, forwards, np.pi + forwards)
     return Triangle(own.bar, abs(own.distance), abs(to_ground), angle(to_ground) - own.angle - along)

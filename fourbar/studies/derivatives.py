@@ -323,7 +323,7 @@ def _compute_derivatives(
             held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (take_values(speed) == 0.0)
         dynamics = case.dynamics(state, acceleration)
         found |= {**dynamics.pins._asdict(), case.names.value: dynamics.drive}
-        found["power"] = dynamics.drive * case.drive_speed(state)
+        found["power"] = dynamics.work * speed
         found["drive_condition"] = case.drive_condition(state)
     return {name: found[name] for name in names}, held
 

@@ -9,12 +9,13 @@ import numpy as np
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.evaluation.case import Case, find_undecided
 from fourbar.evaluation.stages import list_kinematics, name_of_command
-from fourbar.formulas.arithmetic import namespace
+from fourbar.formulas.arithmetic import make_like, namespace
 from fourbar.formulas.mobility import change_points
 from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, STAGE_OF, is_scalar
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
+from fourbar.scene.stroke import find_triangle
 from fourbar.studies.keys import command_key, list_entries, read_place, refuse_key, replace_numbers
 
 NO_DIGIT_LEFT, UNDECIDED = 8.0, 16.0
@@ -53,7 +54,7 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     ------
     InputError : an unknown key or quantity; what cannot be traced: friction that depends on the pin forces, a free
         motion, a position stated from a limit, a path that is followed through change points, a table that
-        covers less than a turn, a stroke. The function: values that are no real floating-point numbers of one
+        covers less than a turn. The function: values that are no real floating-point numbers of one
         library, or whose shapes do not broadcast.
     DependencyError : array-api-compat is missing, without which other libraries than NumPy are not known.
 
@@ -63,12 +64,7 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     [-0.009, -0.011, nan]
     """
     expect("scene", scene, Scene)
-    for name, names in (("keys", keys), ("quantities", quantities)):
-        expect(name, names, tuple, list)
-        for each in names:
-            expect(name, each, str)
-        if len(set(names)) < len(names) or not names:
-            raise InputError(name, names, "must be one or more, each once")
+    _expect_names(keys=keys, quantities=quantities)
     known, theta, motion = list_entries(scene), command_key(scene), scene.motion
     for key in keys:
         if key not in (*known, theta):
@@ -80,6 +76,8 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
 
     def of_numbers(*values: Any) -> dict[str, Any]:
         given = _check_given(keys, values, shape)
+        if given.xp is np and given.zero.shape == ():  # as arrays, for a number of Python's own is not divided by 0
+            return {name: of[0] for name, of in of_numbers(*map(np.atleast_1d, given.values.values())).items()}
         xp, zero, numbers, holds = given.xp, given.zero, {}, True
         with np.errstate(all="ignore"):
             for key, value in given.values.items():
@@ -90,20 +88,37 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
             q, changed = numbers.pop(theta, None), replace_numbers(scene, numbers)
             speed, acceleration = changed.motion.speed, changed.motion.acceleration
             if stated is not None:
-                q = _make_like(stated.angle.reshape(shape), given)
+                q = make_like((stated.angle if stated.stroke is None else stated.stroke).reshape(shape), zero)
                 if motion.law is not None:
-                    speed, acceleration = (_make_like(x, given) for x in (stated.speed, stated.acceleration))
+                    speed, acceleration = (make_like(x, zero) for x in (stated.speed, stated.acceleration))
+            q, lever = q + zero, 1.0
+            if motion.stroke is not None:
+                triangle = find_triangle(changed.linkage, changed.drive)
+                q, speed, acceleration, lever = triangle.turned(q, speed, acceleration, motion.side)
+                holds = holds & (lever > NO_DIGIT_LEFT * given.eps)
             case, moved = Case.of(changed, motion.bar), (0.0 if speed is None else speed, acceleration)
-            found, ok = _evaluate(case, q + zero, float(motion.branch), moved, given, wanted)
+            found, ok = _evaluate(case, q, float(motion.branch), moved, given, wanted)
+            if "condition" in wanted:
+                found["condition"] = found["condition"] * lever
             ok = ok & holds
             parts = {
                 name: (found[name] + zero,) if is_scalar(name) else (found[name].real + zero, found[name].imag + zero)
                 for name in wanted
             }
-        kept = {name: [xp.where(ok, part, xp.nan) for part in of] for name, of in parts.items()}
+        kept = {name: [xp.where(ok & xp.isfinite(sum(of)), part, xp.nan) for part in of] for name, of in parts.items()}
         return {name: of[0] if is_scalar(name) else xp.stack(of, axis=-1) for name, of in kept.items()}
 
     return of_numbers
+
+
+def _expect_names(**lists: Sequence[str]) -> None:
+    """Raise an InputError for a list that is none of words, each once."""
+    for name, names in lists.items():
+        expect(name, names, tuple, list)
+        for each in names:
+            expect(name, each, str)
+        if len(set(names)) < len(names) or not names:
+            raise InputError(name, names, "must be one or more, each once")
 
 
 def _evaluate(
@@ -128,7 +143,7 @@ def _evaluate(
     found = list_kinematics(case, state, wanted.keys()) | name_of_command(case, at, state, q)
     if "force" in stages:
         done = case.dynamics(state, acceleration)
-        found |= {**done.pins._asdict(), case.names.value: done.drive, "power": done.drive * case.drive_speed(state)}
+        found |= {**done.pins._asdict(), case.names.value: done.drive, "power": done.work * speed}
         found["drive_condition"] = case.drive_condition(state)
         for term in case.terms:
             if (status := term.status(state, None)) is not None:
@@ -157,22 +172,17 @@ def _check_given(keys: Sequence[str], values: Sequence[Any], positions: tuple[in
         raise InputError(
             "values", shapes, f"must have shapes that broadcast to one of {positions or '() or (n,)'}"
         ) from None
-    kind = xp.result_type(*arrays.values()) if arrays else np.float64
+    kind = np.float64 if xp is np else xp.result_type(*arrays.values())
     zero = xp.zeros_like(xp.broadcast_to(xp.astype(first, kind) * 0.0, shape))
     like = Given({}, xp, zero, float(xp.finfo(kind).eps))
     for key, value in zip(keys, values, strict=True):
-        like.values[key] = value if key in arrays else _make_like(value, like)
+        like.values[key] = value if key in arrays and xp is not np else make_like(value, zero)
     return like
 
 
 def _is_plain(value: Any) -> bool:
     """Whether a value is one number of Python or NumPy."""
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-
-
-def _make_like(value: Any, given: Given) -> Any:
-    """Make numbers of Python or NumPy an array like the others."""
-    return given.xp.asarray(value, dtype=given.zero.dtype)
 
 
 def _find_library(key: str, value: Any) -> Any:
@@ -214,8 +224,6 @@ def _refuse_untraceable(scene: Scene, keys: Sequence[str]) -> None:
     motion = scene.motion
     if motion.free is not None:
         raise InputError("motion.free", motion.free, "is integrated step by step, which cannot be traced")
-    if motion.stroke is not None:
-        raise InputError("motion.stroke", motion.stroke, "is turned into an angle first: state that of a bar")
     for effect in scene.effects:
         if effect.loaded_pins:
             allowed = "depends on the pin forces, which are searched for and cannot be traced"

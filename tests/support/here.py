@@ -8,6 +8,7 @@ import pytest
 from fourbar_validation.engines import workers
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
+from fourbar_validation.run import judge
 
 
 def summary_of(records: Iterable[Record]) -> Summary:
@@ -19,7 +20,7 @@ def summary_of(records: Iterable[Record]) -> Summary:
 
 
 def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Do in this process, one item after another, what workers would do that are not under test."""
+    """Do in this process, one item after another, what workers would do that are not under test; shipped neither."""
 
     def over_none(
         function: Callable[[Any], Any], chunks: Iterable[workers.Chunk], *_: object, **__: object
@@ -28,3 +29,9 @@ def judge_here(monkeypatch: pytest.MonkeyPatch) -> None:
             yield number, [function(item) for item in items]
 
     monkeypatch.setattr(workers, "apply_over_processes", over_none)
+    judge_solve_alone(monkeypatch)
+
+
+def judge_solve_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out what is shipped besides `solve`, a second of work for each scene that is drawn."""
+    monkeypatch.setattr(judge, "CHECKS", tuple(check for check in judge.CHECKS if not check.shipped))

@@ -37,6 +37,7 @@ READING = [
 ]
 
 
+@pytest.mark.posix
 @pytest.mark.timeout(30)
 @pytest.mark.parametrize("what", ["pipe", "device", "directory"])
 @pytest.mark.parametrize("line", READING, ids=lambda line: " ".join(line[:2]))
@@ -56,6 +57,7 @@ def test_what_may_never_end_is_not_waited_for(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.posix
 def test_a_file_on_standard_input_is_read_and_a_pipe_is_not() -> None:
     """`< scene.toml` is an ordinary file with a size, `cat scene.toml |` is a pipe."""
     command = [sys.executable, "-m", "fourbar", "analyze", "/dev/stdin"]
@@ -94,12 +96,15 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
         assert "followed for 500 steps" in printed and not out.exists()
 
 
+@pytest.mark.posix
 @pytest.mark.usefixtures("interruptible")
 def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
     (tmp_path / "released.toml").write_text(RELEASED)
-    command = [sys.executable, "-m", "fourbar", "analyze", str(tmp_path / "released.toml")]
-    with subprocess.Popen(command, stderr=subprocess.PIPE) as running:
-        time.sleep(5.0)
+    begin = "from fourbar.cli import main; print(flush=True); main()"
+    command = [sys.executable, "-c", begin, "analyze", str(tmp_path / "released.toml")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+        assert running.stdout is not None and running.stdout.readline()
+        time.sleep(1.0)
         assert running.poll() is None
         running.send_signal(signal.SIGINT)
         _, printed = running.communicate(timeout=30.0)

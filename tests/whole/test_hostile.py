@@ -13,13 +13,15 @@ import fourbar
 import fourbar_validation.run.run
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.mjcf import write_mjcf
+from fourbar.mjcf.sdf import write_sdf
+from fourbar.mjcf.usd import write_usd
 from fourbar.scene import Command, Scene
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import COLUMNS, FAILS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines.memory import WORKER_MEMORY
+from fourbar_validation.engines.memory import WORKER_MEMORY, bound_memory
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.terminal import print_table
@@ -103,6 +105,15 @@ def test_mjcf_holds_a_hostile_title_as_an_attribute(kind: str) -> None:
     assert root.tag == "mujoco"
     assert not STEERING.search(root.attrib["model"])
     assert not root.findall(".//script")
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_sdf_and_usd_hold_a_hostile_title_as_a_text(kind: str) -> None:
+    scene = crank_rocker(title=HOSTILE[kind])
+    root = ET.fromstring(write_sdf(scene, without_loads=True))
+    (model,) = root.findall(".//model")
+    *_, title = re.findall(r"^ *doc = (.*)$", write_usd(scene, without_loads=True), re.MULTILINE)
+    assert not STEERING.search(model.attrib["name"] + json.loads(title)) and not root.findall(".//script")
 
 
 @pytest.mark.parametrize("kind", HOSTILE)
@@ -250,6 +261,20 @@ class Greedy:
         return Answer("greedy", "exact", refusal="declined")
 
 
+def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    resource = pytest.importorskip("resource")
+    asked = []
+
+    def refuse(*limit: object) -> None:  # as macOS does
+        asked.append(limit)
+        raise ValueError("current limit exceeds maximum limit")
+
+    monkeypatch.setattr(resource, "setrlimit", refuse)
+    bound_memory()
+    assert asked
+
+
+@pytest.mark.linux
 def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})

@@ -21,7 +21,7 @@ from tests.support.scenes import crank_rocker
 
 HOSTILE = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""}
 OURS = [str(ROOT / "fourbar"), str(ROOT / "validation")]
-BEGIN = "import os, sys; del os.fork; from {module} import status; sys.exit(status(sys.argv[1:]))"
+BEGIN = "import os, sys; vars(os).pop('fork', None); from {module} import status; sys.exit(status(sys.argv[1:]))"
 
 
 @pytest.fixture

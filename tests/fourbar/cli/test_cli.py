@@ -408,6 +408,7 @@ def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.toml", text)]
 
 
+@pytest.mark.posix
 def test_a_device_is_written_to_and_stays_one(run: Fourbar, tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)

@@ -233,6 +233,7 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(bench
     bench(ask)
 
 
+@pytest.mark.posix
 def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_bytes(CRANK_ROCKER.read_bytes())

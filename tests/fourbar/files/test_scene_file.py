@@ -182,6 +182,7 @@ def test_a_huge_file_is_not_read(tmp_path: Path, capsys: pytest.CaptureFixture[s
     refused(["analyze", str(huge)], ["100000000 bytes", str(LARGEST_FILE)], tmp_path, capsys)
 
 
+@pytest.mark.posix
 def test_a_pipe_is_not_waited_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     os.mkfifo(tmp_path / "pipe")
     refused(["analyze", str(tmp_path / "pipe")], ["ordinary file"], tmp_path, capsys)

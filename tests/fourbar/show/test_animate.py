@@ -206,6 +206,7 @@ def test_without_ffmpeg_an_mp4_is_refused_in_one_line(tmp_path: Path, monkeypatc
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.posix
 def test_an_ffmpeg_without_the_encoder_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program = tmp_path / "bin" / "ffmpeg"
     program.parent.mkdir()

@@ -158,6 +158,29 @@ def test_other_bars_command(library: Library, motion: Motion) -> None:
         assert np.asarray(value) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
 
 
+@pytest.mark.parametrize(("bar", "side", "length"), [(2, "left", 0.35), (4, "right", 0.5)])
+def test_a_stroke_commands(library: Library, bar: int, side: str, length: float) -> None:
+    """The strokes before and after the one are none that this cylinder can have."""
+    line = LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(bar, -0.12, 0.4))
+    scene = replace(CYLINDER, drive=line, loads=(), motion=Motion(stroke=length, stroke_speed=0.1, side=side))
+    solution, slopes = fourbar.solve(scene), fourbar.sensitivity(scene)
+    assert solution.status == ["ok"]
+    names, keys = ["drive_force", "alpha_3", "condition"], ["motion.stroke", "drive.to.at.0"]
+    f, stroke, end = function(scene, keys, names), library.array([0.01, length, 3.0]), library.array(-0.12)
+    found = library.jit(f)(stroke, end)
+    jacobian = library.jacrev if library.xp.__name__ == "torch" else library.jacfwd
+    by = jacobian(lambda x: {name: library.xp.nansum(of) for name, of in f(x[0] + stroke, x[1] + end).items()})(
+        library.array([0.0, 0.0])
+    )
+    for name in names:
+        assert np.isnan(np.asarray(found[name])).tolist() == [True, False, True]
+        assert float(found[name][1]) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
+        assert np.asarray(by[name]) == pytest.approx([slopes.of(name, key)[0] for key in keys], rel=ROUNDED)
+    assert np.isnan(f(np.array([0.01, length, 3.0]), -0.12)["alpha_3"]).tolist() == [True, False, True]
+    stated = function(scene, keys[1:], names[:1])
+    assert float(stated(end)["drive_force"]) == pytest.approx(solution.drive_force[0], rel=ROUNDED)
+
+
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name != "tables"])
 def test_derivatives_are_those_of_sensitivity(library: Library, family: str) -> None:
     """Forwards in JAX and backwards in PyTorch, which are no derivation of ours."""
@@ -243,6 +266,44 @@ def test_mapped_over_linkages_as_vary(library: Library) -> None:
         assert (gap.reshape(len(sine), -1).max(axis=1) * sine**2 <= ROUNDED).all()
 
 
+def test_derivatives_are_mapped_over_linkages_and_positions(library: Library) -> None:
+    """In a table's piece too, which a transformed index looks up."""
+    f = function(LOADED, ["lengths.input", "motion.theta_2"], ["torque"])
+    pairs = np.array([[0.1, 0.5], [0.11, 4.0]])
+    found = library.vmap(library.grad(lambda x: f(x[0], x[1])["torque"]))(library.array(pairs))
+    one = library.vmap(library.grad(lambda a: f(a, 4.0)["torque"]))(library.array([0.1, 0.11]))
+    for row, (a, theta) in zip(np.asarray(found), pairs, strict=True):
+        linkage = replace(LOADED.linkage, input=replace(LOADED.linkage.input, length=a))
+        slopes = fourbar.sensitivity(replace(LOADED, linkage=linkage, motion=Motion(theta, 8.0, 3.0)))
+        exact = [slopes.of("torque", key)[0] for key in ("lengths.input", "motion.theta_2")]
+        assert row == pytest.approx(exact, rel=ROUNDED)
+    assert float(one[1]) == pytest.approx(float(found[1, 0]), rel=ROUNDED)
+
+
+@pytest.mark.nightly
+def test_numbers_of_the_scene_go_to_the_device_of_the_values() -> None:
+    """One that computes nothing, and like a GPU takes no array of another."""
+    torch = pytest.importorskip("torch")
+    f = function(replace(LOADED, motion=Motion(ANGLES, 8.0)), ["lengths.input"], EVERY)
+    assert {of.device.type for of in f(torch.tensor(0.1, device="meta")).values()} == {"meta"}
+
+
+NO_VALUE = {
+    "no_torque": replace(LOADED, linkage=uniform(0.3, 0.1, 0.3, 0.1), drive_bar=3, loads=()),
+    "overflow": replace(LOADED, motion=Motion(0.5, 1e153)),
+}
+
+
+@pytest.mark.parametrize("status", NO_VALUE)
+def test_where_solve_has_no_value_there_is_none(library: Library, status: str) -> None:
+    """The power alone is beyond the range of doubles in the second."""
+    scene = NO_VALUE[status]
+    assert fourbar.solve(scene).status == [status]
+    for make in (float, np.array, library.array):
+        found = function(scene, ["motion.theta_2"], ["power", "theta_4"])(make(0.5))
+        assert np.isnan(float(found["power"])) and np.isfinite(float(found["theta_4"]))
+
+
 def test_single_precision_stays_single(library: Library) -> None:
     f = function(LOADED, ["lengths.input", "motion.theta_2"], ["torque"])
     kind = library.xp.float32
@@ -259,6 +320,7 @@ def test_scenes_state_the_positions_and_shapes_are_broadcast() -> None:
     )
     assert one(1.0)["torque"].shape == () and one(np.ones(3))["torque"].shape == (3,)
     assert many(0.3)["torque"].shape == (13,)
+    assert one(np.float32([1.0]))["torque"].tolist() == [one(1.0)["torque"]]  # NumPy's are all made doubles
     assert (many(0.3)["torque"] == fourbar.solve(replace(LOADED, motion=Motion(ANGLES, 8.0))).torque).all()
 
 
@@ -268,7 +330,6 @@ REFUSED = {
     "motion.theta_2": replace(LOADED, motion=Motion(FromLimit(1, 0.1), 1.0)),
     "motion.through": replace(LOADED, linkage=uniform(0.3, 0.1, 0.3, 0.1), motion=Motion(1.0, 1.0, through="follow")),
     "loads.0.table": replace(LOADED, loads=(Load(3, moment=1.0, table=Table((0.0, 1.0), (1.0, 2.0))),)),
-    "motion.stroke": replace(CYLINDER, motion=Motion(stroke=0.2, stroke_speed=0.1, side="left")),
     "motion.omega_2": replace(LOADED, motion=Motion(0.5)),
 }
 

@@ -382,7 +382,7 @@ BAD_TABLES = [
     ("NaN", "theta_2,torque\n1,nan\n", "finite"),
     ("too large", "theta_2,torque\n1,1e999\n", "larger than a double"),
     ("cells missing", "theta_2,torque\n\n1,2\n3\n", "line 4"),
-    ("decimal comma", 'theta_2,torque\n1,"2,5"\n', "must be a number"),
+    ("decimal comma", 'theta_2,torque\n1,"2,5"\n', "line 2, torque = '2,5': must be a number"),
     ("binary", b"\xff\xfe\x00\x01", "UTF-8"),
     ("null byte", "theta_2,torque\n1,2\x00\n", "table"),
     ("escape", "theta_2,\x1b[31mtorque\n1,2\n", "known are"),

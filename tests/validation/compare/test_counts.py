@@ -52,10 +52,8 @@ def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named() -> None
         "two": [("a", "F12", DEGRADED, 1.0), ("b", "F12", AGREES, 1e-14), ("b", "F43", FAILS, NAN)],
         "three": [("a", "torque", DEGRADED, 0.5), ("b", "torque", REFUSES, NAN)],
     }
-    records = [
-        replace(judge_for_report("", crank_rocker(), ()), name=name, rows=[row(name, *of) for of in many])
-        for name, many in scenes.items()
-    ]
+    judged = judge_for_report("", crank_rocker(), (), draw=False)
+    records = [replace(judged, name=name, rows=[row(name, *of) for of in many]) for name, many in scenes.items()]
     summary = summary_of(records)
     assert (summary.loose, summary.pairs) == (2, 5)
     stated = "2 of 5 quantities of a scene are at best"

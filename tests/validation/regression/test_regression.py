@@ -279,6 +279,7 @@ def test_what_stood_for_a_failure_and_is_gone_is_no_regression() -> None:
     assert compare_rows((HERE, [failed]), (HERE, [])).regressed  # a comparison that failed and is not made any more
 
 
+@pytest.mark.posix
 def test_another_python_without_the_libraries_is_one_line_and_status_3(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

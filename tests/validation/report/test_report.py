@@ -8,12 +8,13 @@ import re
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fourbar
-from fourbar_validation.compare.rows import FAILS, write_rows
+from fourbar_validation.compare.rows import FAILS, Row, write_rows
 from fourbar_validation.engines import added
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
 from fourbar_validation.report import colours
@@ -24,8 +25,9 @@ from fourbar_validation.report.html import ALL_OPEN, Section, write_html, write_
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.svg import FLOOR
+from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.judge import judge_for_report
-from tests.support.here import summary_of
+from tests.support.here import judge_solve_alone, summary_of
 from tests.support.scenes import crank_rocker
 
 COMMENT_LIMIT = 65_536
@@ -163,7 +165,8 @@ def test_costs_are_those_of_the_run() -> None:
     ],
     ids=["positions", "one position", "released", "sweep"],
 )
-def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int) -> None:
+def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    judge_solve_alone(monkeypatch)
     witnesses = tuple(w for w in WITNESSES if w.name == "free-body")
     made = judge_for_report("kind", crank_rocker(motion=motion), witnesses)
     assert made.figure is not None and made.figure.count("<svg") == pictures
@@ -212,3 +215,13 @@ def test_every_witness_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.Mon
     colours.NUMBERS.update(added.list_numbers(witnesses[1:]))  # a scene in which the first broke down
     assert choose_style(names[-1]).symbol == marks[names[-1]][0]
     assert all(choose_style(name).colour in colours.VARIABLES for name in names)
+
+
+def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    row = Row("thesis_printed_inertias", "mujoco-simulated", "RK4", "limit_positions", 3.14, 1e-9, FAILS, "", 0.5, 0.3)
+    print_table(summary_of([replace(demo(draw=False), name=row.scene, rows=[row])]), tmp_path)
+    line = next(line for line in capsys.readouterr().out.splitlines() if "mujoco-simulated" in line)
+    assert line.split() == ["mujoco-simulated", "limit_positions", "3.1e+00", "1.0e-09", "3.1e+09", "28.6"]

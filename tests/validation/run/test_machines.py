@@ -54,6 +54,7 @@ def running(nanny: object) -> int | None:
     return watched.process.pid
 
 
+@pytest.mark.posix
 @pytest.mark.timeout(120 + 20 * KILLS)
 def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {False: IN_A_CHUNK})
@@ -121,6 +122,7 @@ def started(tmp_path: Path) -> Iterator[Callable[..., tuple[subprocess.Popen[byt
 WORKER = ("--nthreads", "1", "--no-nanny")
 
 
+@pytest.mark.posix
 def test_a_cluster_without_workers_or_without_the_checkout_is_one_line(
     started: Callable[..., tuple[subprocess.Popen[bytes], str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -137,9 +139,10 @@ def test_a_cluster_without_workers_or_without_the_checkout_is_one_line(
     assert "\n" not in str(caught.value) and "no such module" in str(caught.value)
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM] if FULL else [signal.SIGKILL])
+@pytest.mark.posix
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGTERM"] if FULL else ["SIGKILL"])
 def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
-    how: signal.Signals,
+    how: str,
     started: Callable[..., tuple[subprocess.Popen[bytes], str]],
     tmp_path: Path,
     caplog: pytest.LogCaptureFixture,
@@ -151,7 +154,7 @@ def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
         for step in run(suite, tmp_path / "out", EXACT, RunOptions(drawn=False, scheduler=address)):
             steps += bool(step)
             if steps:
-                scheduler.send_signal(how)
+                scheduler.send_signal(getattr(signal, how))
     assert not [each for each in caplog.records if each.exc_info]  # two tracebacks before the one line
     written = [path.read_bytes().partition(b"\n")[2] for path in (tmp_path / "out" / "parts").iterdir()]
     assert len(written) >= steps

@@ -109,7 +109,7 @@ def read_table(path: Path) -> TheirTable:
         if len(cells) < len(headings) or any(cell.strip() for cell in cells[len(headings) :]):
             raise InputError(f"line {line}", cells, f"needs {len(headings)} cells", str(path))
         for index, (name, unit) in columns.items():
-            value, half = _read_number(path, line, cells[index])
+            value, half = _read_number(path, f"line {line}, {headings[index].strip()}", cells[index])
             numbers[name][row], halves[name][row] = value * unit.factor, half * unit.factor
         if math.isnan(numbers["theta_2"][row]):
             raise InputError(f"line {line}", cells, "needs a theta_2", str(path))
@@ -205,7 +205,7 @@ def _find_known() -> str:
     return ", ".join(f"{q}_x, {q}_y" if q in VECTORS else q for q in UNITS if q not in NOT_JUDGED)
 
 
-def _read_number(path: Path, line: int, cell: str) -> tuple[float, float]:
+def _read_number(path: Path, place: str, cell: str) -> tuple[float, float]:
     """Read the number in a cell and half a unit of its last printed digit; NaN for a blank."""
     text = cell.strip().replace("\N{MINUS SIGN}", "-")
     if not text:
@@ -213,12 +213,12 @@ def _read_number(path: Path, line: int, cell: str) -> tuple[float, float]:
     try:
         exact = Decimal(text)
     except InvalidOperation:
-        raise InputError(f"line {line}", cell, "must be a number", str(path)) from None
+        raise InputError(place, cell, "must be a number", str(path)) from None
     if not exact.is_finite():
-        raise InputError(f"line {line}", cell, "must be a finite number", str(path))
+        raise InputError(place, cell, "must be a finite number", str(path))
     exponent = exact.as_tuple().exponent
     assert isinstance(exponent, int)
     value = float(exact)
     if not math.isfinite(value):
-        raise InputError(f"line {line}", cell, "is larger than a double can hold", str(path))
+        raise InputError(place, cell, "is larger than a double can hold", str(path))
     return value, 0.5 * 10.0**exponent

@@ -25,7 +25,7 @@ def print_table(summary: Summary, out: Path) -> None:
     title = "worst row of each scene and engine"
     if len(summary.worst) < summary.judged:
         title = f"worst rows of {len(summary.worst)} of {summary.judged} scenes and engines"
-    shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False)
+    shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     for heading in ("scene and engine", "worst"):
         shown.add_column(heading, no_wrap=True)
     for heading in ("error", "allowed", "used", "at deg"):
@@ -36,7 +36,7 @@ def print_table(summary: Summary, out: Path) -> None:
             numbers = (
                 write_short(w.row.error),
                 write_short(w.row.allowed),
-                f"{w.used:.2f}",
+                f"{w.used:.2g}",
                 f"{math.degrees(w.row.theta_2):.1f}",
             )
             words = (f"  {escape(w.row.engine)}", escape(w.row.quantity))

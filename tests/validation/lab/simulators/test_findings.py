@@ -33,11 +33,11 @@ def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
     listed = (FOLDER / "README.md").read_text()
     for finding in ALL:
         assert set(FIELDS) - {"With"} <= finding.fields.keys(), finding.script
-        cells = [finding.fields[name] for name in ("Since", "Until", "Reported")]
+        dates = " ".join(f"*{name}:* {finding.fields[name]}." for name in ("Since", "Until", "Reported"))
         name = finding.script.name
-        row = " | ".join([finding.sentence, finding.engine[0], *cells, f"[{name}]({name})"])
-        assert f"| {row} |" in listed, row
-    assert listed.count(".py)") == len(ALL), "a row without its script"
+        entry = f"- **{finding.engine[0]}**: {finding.sentence}\n  {dates} [{name}]({name})\n"
+        assert entry in listed, entry
+    assert listed.count(".py)") == len(ALL), "an entry without its script"
 
 
 @pytest.mark.parametrize(

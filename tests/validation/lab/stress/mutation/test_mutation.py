@@ -80,6 +80,7 @@ def test_every_operator_and_number_of_functions_methods_and_properties_is_change
     ])  # fmt: skip
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize(
     ("verdicts", "status"),
     [([], FAILED), ([None], FAILED), ([True] * 94 + [False] * 6, FAILED), ([True] * 95 + [False] * 5 + [None], HOLDS)],
@@ -96,6 +97,7 @@ def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
     assert capsys.readouterr().out.count("not caught: ") == verdicts.count(False)
 
 
+@pytest.mark.posix
 def test_a_mutant_that_hangs_or_raises_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     tried = [harness.Baseline(SCENE, at := command_of(SCENE), [], compute_numbers(SCENE, at))]
     mutant = next(compile_mutants(torque))

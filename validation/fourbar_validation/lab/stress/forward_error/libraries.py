@@ -83,28 +83,40 @@ def list_numbers(scene: Scene) -> dict[str, float]:
     return {**found, command_key(scene): float(np.asarray(scene.motion.angle))}
 
 
-def evaluate(scene: Scene, library: str) -> dict[str, Any]:
-    """Evaluate every quantity of a scene of one position in doubles."""
-    scene = make_alike(scene)
-    if scene.loads or len(scene.effects) > 1:
-        scene = add_every_load(scene)
-    numbers, scene = list_numbers(scene), replace_place(scene, ("motion", scene.motion.names[0]), 0.0)
+def evaluate(scene: Scene, library: str, *, derivatives: bool = False) -> dict[str, Any]:
+    """Evaluate every quantity of a scene of one position in doubles, or its derivatives by each number, last axis."""
+    own = make_alike(scene)
+    scene = add_every_load(own) if own.loads or len(own.effects) > 1 else own
+    numbers, places = list_numbers(scene), {str(k): str(scene.loads.index(load)) for k, load in enumerate(own.loads)}
+    scene = replace_place(scene, ("motion", scene.motion.names[0]), 0.0)
     xp, doubles = load_library(library)
     with doubles:
-        program = _make_program(
-            replace_numbers(scene, dict.fromkeys(list_entries(scene).keys() & numbers, 1.0)), library
-        )
-        found = program(*(xp.asarray(number, dtype=xp.float64) for number in numbers.values()))
+        alike = replace_numbers(scene, dict.fromkeys(list_entries(scene).keys() & numbers, 1.0))
+        found = _make_program(alike, library, derivatives)(xp.asarray(list(numbers.values()), dtype=xp.float64))
+    if not derivatives:
         return {name: np.asarray(value) for name, value in found.items()}
+    parts = (key.split(".") for key in list_numbers(own))
+    keys = (".".join(("loads", places[rest[0]], *rest[1:]) if of == "loads" else (of, *rest)) for of, *rest in parts)
+    index = [list(numbers).index(key) for key in keys]
+    return {name: np.asarray(value)[..., index] for name, value in found.items()}
 
 
 @cache
-def _make_program(scene: Scene, library: str) -> Callable[..., Any]:
-    """Make the function of every number of a scene; of a table, which is none, there would be too many programs."""
+def _make_program(scene: Scene, library: str, derivatives: bool) -> Callable[..., Any]:
+    """Make the function of every number of a scene; of a table, which is none, there would be too many programs.
+
+    Derivatives go forwards in JAX, backwards in PyTorch.
+    """
     f = function(scene, list(list_numbers(scene)), QUANTITIES)
-    if library == "torch" or any(load.table for load in scene.loads):
-        return f
+
+    def of_row(x: Any) -> Any:
+        return f(*x)
+
+    if library == "torch":
+        from torch.func import jacrev
+
+        return jacrev(of_row) if derivatives else of_row
     import jax
 
-    compiled: Callable[..., Any] = jax.jit(f)
-    return compiled
+    program = jax.jacfwd(of_row) if derivatives else of_row
+    return program if any(load.table for load in scene.loads) else jax.jit(program)

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from fourbar.quantities import OK, STATUS_NAMES
+from fourbar.effects import Friction
 from fourbar.scene import Scene
 from fourbar.studies.derivatives import sensitivity
-from fourbar.studies.function import function
 from fourbar.studies.keys import command_key, replace_numbers
 from fourbar_validation.engines.balls import STEP_BITS, Values, compute_outputs, make_balls
-from fourbar_validation.lab.stress.forward_error.libraries import QUANTITIES, list_numbers, load_library, make_alike
+from fourbar_validation.engines.description import PINS
+from fourbar_validation.lab.stress.forward_error.libraries import evaluate, list_numbers, make_alike
 from fourbar_validation.lab.stress.forward_error.tally import Tally, compute_ratio, is_untold, list_components
 
 Slopes = dict[str, dict[str, tuple[Any, float]]]
@@ -25,7 +25,10 @@ Slopes = dict[str, dict[str, tuple[Any, float]]]
 
 
 def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
-    """Return every output, and its derivatives and theirs by every number, by differences in balls."""
+    """Return every output, and its derivatives and theirs by every number, by differences in balls.
+
+    No output where the loop does not close, no derivative where the drive has no torque.
+    """
     numbers, angle = list_numbers(scene), command_key(scene)
     make_balls(scene, numbers[angle])  # sets the precision
     steps = {key: arb(abs(number) or 1.0) * arb(2) ** -STEP_BITS for key, number in numbers.items()}
@@ -36,14 +39,17 @@ def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
             changed[key] = changed[key] + steps[key]
         stated = changed.pop(angle)
         other = replace_numbers(scene, {key: changed[key] for key in set(keys) - {angle}})
-        found = compute_outputs(other, scene.motion.branch, make_balls(other, stated), scene.drive_bar)
-        assert found is not None
-        return found
+        return compute_outputs(other, scene.motion.branch, make_balls(other, stated), scene.drive_bar) or {}
 
-    base, once = moved(), {key: moved(key) for key in numbers}
+    base = moved()
+    if "torque" not in base:
+        return base, {}
+    once = {key: moved(key) for key in numbers}
     by: dict[str, dict[str, Any]] = {name: {} for name in base}
     rates: dict[str, dict[str, float]] = {name: dict.fromkeys(numbers, 0.0) for name in base}
     for one, other in combinations_with_replacement(numbers, 2):
+        if one != other and numbers[one] == numbers[other] == 0.0:  # neither moves the other's derivative
+            continue
         twice = moved(one, other)
         for name, y in base.items():
             change = twice[name] - once[one][name] - once[other][name] + y
@@ -57,32 +63,30 @@ def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
 
 
 def differentiate(scene: Scene, library: str) -> dict[str, Any]:
-    """Differentiate by every number: by `sensitivity`, forwards in JAX, backwards in PyTorch; a row for each number."""
-    numbers = list_numbers(scene)
-    if library == "numpy":
-        found = sensitivity(scene)
-        rows = [list(found.keys).index(key) for key in numbers]
-        return {name: of[rows, 0] for name, of in found.by.items()}
-    f, (xp, doubles) = function(scene, list(numbers), QUANTITIES), load_library(library)
-    if library == "jax":
-        from jax import jacfwd as jacobian
-    else:
-        from torch.func import jacrev as jacobian
-    with doubles:
-        by = jacobian(lambda x: f(*x))(xp.asarray(list(numbers.values()), dtype=xp.float64))
-        return {name: np.moveaxis(np.asarray(value), -1, 0) for name, value in by.items()}
+    """Differentiate by every number: NumPy's by `sensitivity`; a row for each number."""
+    if library != "numpy":
+        return {name: np.moveaxis(of, -1, 0) for name, of in evaluate(scene, library, derivatives=True).items()}
+    found = sensitivity(scene)
+    rows = [list(found.keys).index(key) for key in list_numbers(scene)]
+    return {name: of[rows, 0] for name, of in found.by.items()}
 
 
 def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
     """Compare the derivatives at one position with those of the reference."""
     tally.samples += 1
-    scene = make_alike(scene)
-    if sensitivity(scene).status != [STATUS_NAMES[OK]]:
+    if library != "numpy":
+        scene = make_alike(scene)
+    (values, exact), found, numbers = compute_exact_slopes(scene), differentiate(scene, library), list_numbers(scene)
+    if not values:
+        tally.not_assembled += 1
+        if np.nan_to_num(found["torque"]).any():  # a library's are 0: its value is a constant, NaN
+            tally.worst["assembled"] = (math.inf, sample)
+        return
+    if not exact or _is_held(scene, values):
         tally.no_torque += 1
         return
-    (values, exact), found, numbers = compute_exact_slopes(scene), differentiate(scene, library), list_numbers(scene)
     moves = {name: _moves(by, numbers) for name, by in exact.items()}
-    if library != "numpy" and np.isnan(found["sin_mu"]).any() and is_untold(values["sin_mu"], moves["sin_mu"]):
+    if np.isnan(found["sin_mu"]).any() and is_untold(values["sin_mu"], moves["sin_mu"]):
         tally.untold += 1
         return
     for name, rows in found.items():
@@ -94,6 +98,12 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
                 value, rate = exact[component][key]
                 rate += together / (abs(number) or 1.0)
                 tally.note(component, compute_ratio("", np.ravel(row)[index], value, rate)[0], f"{sample} by {key}")
+
+
+def _is_held(scene: Scene, values: Values) -> bool:
+    """Whether dry friction holds a pin at rest, so that torque and pin forces have no derivative."""
+    dry = [PINS[pin] for term in scene.effects if isinstance(term, Friction) for pin, f in term.torques if f]
+    return any(not abs(values.get(f"omega_{j}", 0) - values.get(f"omega_{i}", 0)) > 0 for i, j in dry)
 
 
 def _moves(slopes: dict[str, tuple[Any, float]], numbers: dict[str, float]) -> float:

@@ -187,7 +187,7 @@ def stability(
         rows.append((f"% {name} > {TOO_LARGE:.0f} x error", *(f"{share:.2f}" for share in shares)))
     rows.append(("not assembled", *(str(tallies[family].not_assembled) for family in chosen)))
     rows.append(("no torque", *(str(tallies[family].no_torque) for family in chosen)))
-    if library != "numpy":
+    if library != "numpy" or derivatives:
         rows.append(("no digit tells", *(str(tallies[family].untold) for family in chosen)))
     console = Console()
     of = ", of derivatives by every number" if derivatives else ""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import click
 import numpy as np
 
-from fourbar.errors import FAILED, HOLDS
+from fourbar.errors import FAILED, HOLDS, FourBarError
 from fourbar.formulas import mobility, transmission
 from fourbar.formulas.path import compute_state as state_of
 from fourbar.linkage import MOVING_BARS, FourBar
@@ -173,6 +173,9 @@ def command(module: str | None, most: int) -> int:
     """
     from rich.console import Console
     from rich.progress import track
+
+    if not hasattr(signal, "SIGALRM"):
+        raise FourBarError("faults --mutants ends what hangs by SIGALRM, which Windows does not have")
 
     def alarm(*_: object) -> None:
         raise HangError
