@@ -9,6 +9,7 @@ from collections.abc import Container
 from contextlib import suppress
 from dataclasses import dataclass
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,20 +30,20 @@ NO_NUMBERS = (bool, str, bytes, complex)
 A_BRANCH = "must be +1 (open) or -1 (crossed)"
 MOST_STEPS = 100_000_000
 """Intervals of any motion or curve."""
+ANY, AT_LEAST_ZERO, POSITIVE = "a finite number", "a finite number >= 0", "a finite number > 0"
+"""Bounds of a number, as errors say them."""
 
 
-def require(key: str, value: object, unit: str = "1", *, positive: bool = False, at_least_zero: bool = False) -> float:
+def is_within(number: float, bound: str) -> bool:
+    """Whether a finite number keeps a bound."""
+    return number > 0.0 if bound == POSITIVE else number >= 0.0 if bound == AT_LEAST_ZERO else True
+
+
+def require(key: str, value: object, unit: str = "1", bound: str = ANY) -> float:
     """Return the value as a float, or raise an InputError that says what is allowed.
 
-    Parameters
-    ----------
-    unit : of the number; a text like "48 cm" is converted to it. "1": there is none, and no text is read.
+    `unit`: of the number; a text like "48 cm" is converted to it. "1": there is none, and no text is read.
     """
-    allowed = "a finite number"
-    if positive:
-        allowed = "a finite number > 0"
-    elif at_least_zero:
-        allowed = "a finite number >= 0"
     number = math.nan
     if unit != "1" and isinstance(value, str):
         from fourbar.quantities.units import UnitError, to_si
@@ -50,13 +51,13 @@ def require(key: str, value: object, unit: str = "1", *, positive: bool = False,
         try:
             number = to_si(value, unit)
         except UnitError as error:
-            like = f'must be {allowed}, in {unit} or with a unit, like "1 {unit}"'
+            like = f'must be {bound}, in {unit} or with a unit, like "1 {unit}"'
             raise InputError(key, value, f"{error}; {like}") from None
     elif not isinstance(value, NO_NUMBERS) and not getattr(value, "shape", ()):
         with suppress(TypeError, ValueError, OverflowError):
             number = float(value)  # type: ignore[arg-type]
-    if not math.isfinite(number) or (positive and number <= 0.0) or (at_least_zero and number < 0.0):
-        raise InputError(key, value, f"must be {allowed}")
+    if not math.isfinite(number) or not is_within(number, bound):
+        raise InputError(key, value, f"must be {bound}")
     return number
 
 
@@ -90,6 +91,15 @@ def require_numbers(
     return array.astype(float)
 
 
+def require_pair(key: str, value: Any, unit: str) -> tuple[float, float]:
+    """Return a pair (size in a unit, angle in rad) as floats, or raise an InputError."""
+    try:
+        size, angle = value
+    except (TypeError, ValueError):
+        raise InputError(key, value, "must be a pair (size, angle)") from None
+    return require(key, size, unit), require(key, angle, "rad")
+
+
 def require_bar(key: str, value: object) -> int:
     """Return the number of a moving bar, or raise an InputError."""
     return require_whole(key, value, MOVING_BARS, "must be 2, 3 or 4")
@@ -116,19 +126,15 @@ class Bar:
     centre: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        length = require("length", self.length, "m", positive=True)
-        mass = require("mass", self.mass, "kg", at_least_zero=True)
+        length = require("length", self.length, "m", POSITIVE)
+        mass = require("mass", self.mass, "kg", AT_LEAST_ZERO)
         set_field = object.__setattr__  # the class is frozen; this is its constructor
         set_field(self, "length", length)
         set_field(self, "mass", mass)
         if self.inertia is not None:
-            set_field(self, "inertia", require("inertia", self.inertia, "kg m^2", at_least_zero=True))
+            set_field(self, "inertia", require("inertia", self.inertia, "kg m^2", AT_LEAST_ZERO))
         if self.centre is not None:
-            try:
-                r, phi = self.centre
-            except (TypeError, ValueError):
-                raise InputError("centre", self.centre, "must be a pair (distance, angle)") from None
-            set_field(self, "centre", (require("centre", r, "m"), require("centre", phi, "rad")))
+            set_field(self, "centre", require_pair("centre", self.centre, "m"))
 
     @property
     def moment_of_inertia(self) -> float:
@@ -162,7 +168,7 @@ class FourBar:
     ground_angle: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ground", require("lengths.ground", self.ground, "m", positive=True))
+        object.__setattr__(self, "ground", require("lengths.ground", self.ground, "m", POSITIVE))
         for name, bar in zip(("input", "coupler", "output"), self.moving, strict=True):
             if not isinstance(bar, Bar):
                 raise InputError(f"bars.{name}", bar, "must be a Bar, like fourbar.Bar(0.1) for a bar of 0.1 m")
@@ -195,12 +201,7 @@ class FourBar:
 
 
 def uniform(
-    ground: float | str,
-    input: float | str,
-    coupler: float | str,
-    output: float | str,
-    *,
-    per_metre: float | str = 1.0,
+    ground: float | str, input: float | str, coupler: float | str, output: float | str, *, per_metre: float | str = 1.0
 ) -> FourBar:
     """Make a linkage of uniform slender bars of the given lengths (m) and mass per metre (kg/m).
 
@@ -208,8 +209,8 @@ def uniform(
     0.1524
     """
     bars: list[Bar] = []
-    density = require("per_metre", per_metre, "kg/m", at_least_zero=True)
+    density = require("per_metre", per_metre, "kg/m", AT_LEAST_ZERO)
     for key, length in (("input", input), ("coupler", coupler), ("output", output)):
-        checked = require(f"lengths.{key}", length, "m", positive=True)
+        checked = require(f"lengths.{key}", length, "m", POSITIVE)
         bars.append(Bar(checked, mass=density * checked))
-    return FourBar(require("lengths.ground", ground, "m", positive=True), bars[0], bars[1], bars[2])
+    return FourBar(require("lengths.ground", ground, "m", POSITIVE), bars[0], bars[1], bars[2])

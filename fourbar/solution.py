@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
-from fourbar.linkage import require
+from fourbar.linkage import POSITIVE, require
 from fourbar.quantities import NOT_ASSEMBLED, OF_LINE, PIN_FORCES, STATUS_NAMES, UNITS, Quantities, is_scalar
-from fourbar.writing import describe_extent, list_names, make_data_frame, write_between, write_text
+from fourbar.writing import describe_extent, list_names, make_data_frame, write_between, write_object, write_text
 
 Array = NDArray[np.float64]
 
@@ -163,37 +162,33 @@ def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
     Entries of other names follow as they are given.
     """
     names = _list_quantities(solution)
-    document: dict[str, Any] = {
-        "schema": SCHEMA,
-        "title": solution.title,
-        "angle_unit": find_unit_in("rad", units)[0],
-        "units": {name: find_unit_in(find_unit(name), units)[0] for name in names},
-        "status": solution.status,
-        "branch": solution.branch.tolist(),
-    }
-    for name in names:
-        values = find_values(solution, name, units)
-        document[name] = None if values is None else null_nan(values)
-    if solution.time is not None:
-        document["stopped_at"] = solution.stopped_at
-    document["drive_bar"] = solution.drive_bar
-    document["assembled"] = solution.assembled.tolist()
-    document |= more
-    return json.dumps(document, allow_nan=False) + "\n"
+    return write_object(
+        SCHEMA,
+        title=solution.title,
+        angle_unit=find_unit_in("rad", units)[0],
+        units={name: find_unit_in(find_unit(name), units)[0] for name in names},
+        status=solution.status,
+        branch=solution.branch,
+        **{name: find_values(solution, name, units) for name in names},
+        **({} if solution.time is None else {"stopped_at": solution.stopped_at}),
+        drive_bar=solution.drive_bar,
+        assembled=solution.assembled,
+        **more,
+    )
 
 
 def write_csv(solution: Solution, units: Conversion = SI, decimal: str = ".") -> str:
     """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
     size, first = solution.theta_2.size, list_leading(solution)
     columns = {
-        name: [None] * size if values is None else null_nan(values)
+        name: [math.nan] * size if values is None else values.tolist()
         for name, values in list_scalars(solution, units).items()
     }
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n", delimiter=";" if decimal == "," else ",")
     writer.writerow([*first, *columns])
     for start, row in zip(zip(*first.values(), strict=True), zip(*columns.values(), strict=True), strict=True):
-        writer.writerow([*start, *("" if cell is None else repr(cell).replace(".", decimal) for cell in row)])
+        writer.writerow([*start, *(repr(cell).replace(".", decimal) if math.isfinite(cell) else "" for cell in row)])
     return text.getvalue()
 
 
@@ -249,7 +244,7 @@ def require_units(units: object) -> Conversion:
     if not isinstance(units, Mapping) or not plain or not all(isinstance(name, str) for name, _ in units.values()):
         raise InputError("units", units, 'must be as fourbar.units makes them, like fourbar.units("mm N.mm")')
     for _, factor in units.values():
-        require("units", factor, positive=True)
+        require("units", factor, "1", POSITIVE)
     return units
 
 
@@ -283,27 +278,10 @@ def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:
     return values if values is None or unit not in units else values * units[unit][1]
 
 
-def null_nan(values: Array) -> list[Any]:
-    """Python numbers, None for what is not finite."""
-    plain = values.tolist()
-    if np.isfinite(values).all():
-        return plain  # type: ignore[no-any-return]
-    return _replace_nans(plain)  # type: ignore[no-any-return]
-
-
-def _replace_nans(plain: Any) -> Any:
-    """Numbers, in lists or lists of lists, None for what is not finite."""
-    if isinstance(plain, list):
-        return [_replace_nans(inner) for inner in plain]
-    return plain if math.isfinite(plain) else None
-
-
 def unwrap(angles: Array) -> None:
     """Make angles in [-pi, pi] continuous along a sweep, in place: the first in (-pi, pi]; NaN is stepped over.
 
-    Parameters
-    ----------
-    angles : (n,), or (m, n) for as many sweeps.
+    `angles`: (n,), or (m, n) for as many sweeps.
     """
     if angles.shape[-1] < 2 or (np.ptp(angles) < np.pi and not (angles[..., 0] == -np.pi).any()):
         return

@@ -144,10 +144,8 @@ def find_requested(
 ) -> tuple[int, KeysView[str]]:
     """Return the number of the last stage evaluated, and the names of the quantities; an InputError as of `solve`.
 
-    Parameters
-    ----------
-    shape : of the positions.
-    at : the command; of a bar other than the input theta_2 and sin_mu, whose sign is the branch, are found too.
+    `shape`: of the positions. `at`: the command; of a bar other than the input theta_2 and sin_mu, whose sign is the
+    branch, are found too.
     """
     if out is None:
         if stage is None:
@@ -159,10 +157,17 @@ def find_requested(
     else:
         expect("out", out, Mapping)
         names = out.keys()
-        stages = _list_stages(tuple(point.name for point in scene.points))
-        wanted = _find_highest_stage(
-            out, shape, {name: of for name, of in stages.items() if name not in _list_foreign(scene)}
-        )
+        foreign, stages = _list_foreign(scene), _list_stages(tuple(point.name for point in scene.points))
+        stages = {name: of for name, of in stages.items() if name not in foreign}
+        for name, array in out.items():
+            if name not in stages:
+                raise InputError("out", name, "must be among " + ", ".join(stages))
+            wanted_shape = shape if is_scalar(name) else (*shape, 2)
+            expect(f"out.{name}", array, np.ndarray)
+            if array.shape != wanted_shape or array.dtype != np.float64 or not array.flags.writeable:
+                allowed = f"must be float64 of shape {wanted_shape}, writeable"
+                raise InputError(f"out.{name}", (array.shape, str(array.dtype)), allowed)
+        wanted = max((STAGES.index(stages[name]) for name in out), default=0)
     if wanted > 0 and at.speed is None:
         raise InputError(f"motion.omega_{at.bar}", None, f"is needed for the stage {STAGES[wanted]!r}")
     return wanted, names if at.bar == 2 else {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
@@ -308,16 +313,3 @@ def _list_absent(scene: Scene) -> tuple[str, ...]:
     if not any(effect.dry for effect in scene.effects):
         absent = (*absent, *OF_DRY_FRICTION)
     return absent if any(effect.loaded_pins for effect in scene.effects) else (*absent, *OF_PIN_LOADS)
-
-
-def _find_highest_stage(out: Mapping[str, Array], positions: tuple[int, ...], stages: Mapping[str, str]) -> int:
-    """Find the last stage that the quantities named need; an InputError where one cannot be written."""
-    for name, array in out.items():
-        if name not in stages:
-            raise InputError("out", name, "must be among " + ", ".join(stages))
-        shape = positions if is_scalar(name) else (*positions, 2)
-        expect(f"out.{name}", array, np.ndarray)
-        if array.shape != shape or array.dtype != np.float64 or not array.flags.writeable:
-            allowed = f"must be float64 of shape {shape}, writeable"
-            raise InputError(f"out.{name}", (array.shape, str(array.dtype)), allowed)
-    return max((STAGES.index(stages[name]) for name in out), default=0)

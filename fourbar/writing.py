@@ -1,5 +1,7 @@
 """Files appear whole or not at all: written under a temporary name, then renamed; and what a result says of itself."""
 
+import json
+import math
 import os
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -109,3 +111,22 @@ def make_html(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) ->
     lines = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     heads = "".join(f"<th>{escape(cell)}</th>" for cell in head)
     return f"<div><b>{escape(title)}</b><table><tr>{heads}</tr>{lines}</table></div>"
+
+
+def write_object(schema: str, **entries: Any) -> str:
+    """Write one JSON object: named tuples as objects, arrays as lists, null for what is not finite."""
+    return json.dumps({"schema": schema, **null_nan(entries)}, allow_nan=False) + "\n"
+
+
+def null_nan(value: Any) -> Any:
+    """Make lists, tables and numbers of Python of a value, None for what is not finite."""
+    if isinstance(value, np.ndarray):
+        plain = value.tolist()
+        return null_nan(plain) if value.dtype.kind == "f" and not np.isfinite(value).all() else plain
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
+    if isinstance(value, dict):
+        return {name: null_nan(each) for name, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [null_nan(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -6,9 +6,8 @@ import click
 
 from fourbar import __version__
 from fourbar.cli.edit import edit
-from fourbar.cli.evaluate import analyze, classify, extremes, new, tolerance
+from fourbar.cli.evaluate import analyze, classify, equilibrium, extremes, new, ratio, tolerance
 from fourbar.cli.export import animate, mjcf, plot, sdf, usd
-from fourbar.cli.rest import equilibrium, ratio
 from fourbar.errors import run
 
 

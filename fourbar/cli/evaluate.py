@@ -1,33 +1,20 @@
-"""The commands that evaluate a linkage (classify, new, analyze) and what may vary of it (tolerance, extremes)."""
+"""The commands that evaluate a linkage, what may vary of it, at rest, and what can take the place of its loop."""
 
 import shutil
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from fourbar.cli.given import (
-    FILE,
-    is_bare,
-    open_scene,
-    or_out_option,
-    print_to,
-    read_lengths,
-    scene_argument,
-    show_waiting,
-    units_option,
-)
+from fourbar.cli import given
 from fourbar.errors import InputError, NotAssembledError
-
-if TYPE_CHECKING:
-    from fourbar.solution import Conversion
+from fourbar.solution import DEGREES, Conversion
 
 
 @click.command()
 @click.argument("lengths", nargs=4, metavar="D A B C")
-@click.option("--json", "as_json", is_flag=True, help="One object, SI and radians, every digit.")
-@or_out_option
+@given.json_option
+@given.or_out_option
 def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     """Name a linkage by its bar lengths (ground, input, coupler, output), and say what turns and how far.
 
@@ -36,18 +23,18 @@ def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     from fourbar.linkage import Bar, FourBar
     from fourbar.show.words import write_type, write_type_json
 
-    ratios = [is_bare(text) for text in lengths]
+    ratios = [given.is_bare(text) for text in lengths]
     if any(ratios) and not all(ratios):
         raise InputError("D A B C", " ".join(lengths), "must be four ratios, or four lengths each with its unit")
-    d, a, b, c = read_lengths(lengths)
+    d, a, b, c = given.read_lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
     unit = "" if all(ratios) else " m"
-    print_to((write_type_json(linkage) if as_json else "\n".join(write_type(linkage, unit))) + "\n", out)
+    given.print_to(write_type_json(linkage) if as_json else "\n".join([*write_type(linkage, unit), ""]), out)
 
 
 @click.command()
-@click.argument("file", type=FILE, required=False)
-@click.option("-o", "--out", type=FILE, metavar="FILE", help="The same, as an option.")
+@click.argument("file", type=given.FILE, required=False)
+@click.option("-o", "--out", type=given.FILE, metavar="FILE", help="The same, as an option.")
 @click.option("--lengths", nargs=4, required=True, metavar="D A B C", help="Ground, input, coupler, output: 300mm ...")
 @click.option("--unit", metavar="UNIT", help="Of bare numbers, like mm.")
 def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str | None) -> None:
@@ -64,7 +51,7 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
     assert file is not None
     if file.exists():
         raise InputError("FILE", str(file), "is there already; a new scene needs a new name")
-    bare = [text for text in lengths if is_bare(text)]
+    bare = [text for text in lengths if given.is_bare(text)]
     if bare and unit is None:
         raise InputError(
             "--lengths", bare[0], "the unit is missing; write each with its own, like 300mm, or --unit mm once"
@@ -74,22 +61,22 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
 
 
 @click.command()
-@scene_argument
+@given.scene_argument
 @click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
 @click.option("--csv", "as_csv", flag_value=".", help="One line per position, SI, every digit.")
 @click.option("--csv-comma", "as_csv", flag_value=",", help="The same with decimal commas, and semicolons between.")
 @click.option("--degrees/--radians", default=None, help="Angles theta; left out: degrees in the table, else radians.")
-@units_option
+@given.units_option
 @click.option("--sensitivity", is_flag=True, help="What the quantities depend on: d(quantity)/d(number).")
 @click.option("--every", type=click.IntRange(min=1), metavar="N", help="Show every N-th position in the table.")
 @click.option("--all", "every", flag_value=1, help="Show every position; a terminal gets some forty at most.")
-@or_out_option
+@given.or_out_option
 def analyze(
     scene: Path,
     as_json: bool,
     as_csv: str | None,
     degrees: bool | None,
-    units: "Conversion",
+    units: Conversion,
     sensitivity: bool,
     every: int | None,
     out: Path | None,
@@ -103,7 +90,7 @@ def analyze(
     from fourbar.show.between import locate_between
     from fourbar.show.duty import write_motor
     from fourbar.show.tables import print_tables
-    from fourbar.solution import DEGREES, write_csv, write_json
+    from fourbar.solution import write_csv, write_json
     from fourbar.solve import find_last_stage, solve
 
     if as_json and as_csv:
@@ -115,21 +102,21 @@ def analyze(
         shown |= DEGREES
     elif degrees is False:
         shown.pop("rad", None)
-    with open_scene(scene) as described, show_waiting(described):
+    with given.open_scene(scene) as described, given.show_waiting(described):
         solution = solve(described, find_last_stage(described))
     if not solution.assembled.any():
         raise NotAssembledError(
             f"{scene}: motion.{described.motion.names[0]}: the linkage assembles at none of the positions requested"
         )
     if as_json:
-        found = locate_between(described, solution)
-        text = write_json(solution, shown, motor=write_motor(solution, shown, found and found.solution))
+        located = locate_between(described, solution).solution
+        text = write_json(solution, shown, motor=write_motor(solution, shown, located))
     elif as_csv:
         text = write_csv(solution, shown, as_csv)
     else:
         width = None if out or not sys.stdout.isatty() else shutil.get_terminal_size().columns
         text = print_tables(described, solution, width, shown, every=every)
-    print_to(text, out)
+    given.print_to(text, out)
 
 
 def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
@@ -137,7 +124,7 @@ def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
     from fourbar.show.tables import write_table
     from fourbar.studies.derivatives import sensitivity
 
-    with open_scene(scene) as stated:
+    with given.open_scene(scene) as stated:
         found = sensitivity(stated)
     if not found.solution.assembled.any():
         raise NotAssembledError(
@@ -147,31 +134,28 @@ def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
         text = influence.write_json(found)
     else:
         text = write_table(stated.title, influence.write_heading(found), influence.make_table(found))
-    print_to(text, out)
+    given.print_to(text, out)
 
 
 @click.command()
-@scene_argument
+@given.scene_argument
 @click.option("--samples", type=int, metavar="N", help="Linkages that are tried; left out: 8192.")
 @click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Of the quasi-random samples.")
-@click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
-@units_option
-@click.option("-o", "--out", type=FILE, metavar="PLOT", help="Draw the bands: svg, png or pdf.")
-def tolerance(
-    scene: Path, samples: int | None, seed: int, as_json: bool, units: "Conversion", out: Path | None
-) -> None:
+@given.json_option
+@given.units_option
+@click.option("-o", "--out", type=given.FILE, metavar="PLOT", help="Draw the bands: svg, png or pdf.")
+def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units: Conversion, out: Path | None) -> None:
     """Show what the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
     from fourbar.show.progress import show_running
     from fourbar.show.tables import write_table
-    from fourbar.solution import DEGREES
     from fourbar.studies.spread import SAMPLES, tolerances
 
     _refuse_units_of_json(as_json, units)
     if out is not None:
         format_of(out)
-    with open_scene(scene) as stated, show_running("samples are solved") as progress:
+    with given.open_scene(scene) as stated, show_running("samples are solved") as progress:
         found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
     if (found.without == found.samples).all():
         raise NotAssembledError(
@@ -180,39 +164,70 @@ def tolerance(
     if out is not None:
         draw_tolerances(found, out, units)
     if as_json:
-        print_to(shown.write_json(found), None)
+        given.print_to(shown.write_json(found), None)
     else:
         own = {**DEGREES, **units}
-        print_to(write_table(stated.title, shown.write_heading(found, own), shown.make_table(found, own)), None)
+        given.print_to(write_table(stated.title, shown.write_heading(found, own), shown.make_table(found, own)), None)
 
 
-def _refuse_units_of_json(as_json: bool, units: "Conversion") -> None:
+def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
     if as_json and units:
         raise click.UsageError("--json is SI and radians, every digit; --units is of the table")
 
 
 @click.command()
-@scene_argument
+@given.scene_argument
 @click.option(
     "--quantity", "quantities", multiple=True, metavar="NAME", help="torque or drive_force, F12 .. F14, transmission."
 )
-@click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
-@units_option
-@or_out_option
-def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: "Conversion", out: Path | None) -> None:
+@given.json_option
+@given.units_option
+@given.or_out_option
+def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: Conversion, out: Path | None) -> None:
     """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
     from fourbar.show import extremes as shown
     from fourbar.show.progress import show_running
     from fourbar.show.tables import write_table
-    from fourbar.solution import DEGREES
     from fourbar.studies.enclosure import extremes as proven
 
     _refuse_units_of_json(as_json, units)
-    with open_scene(scene) as stated, show_running("pieces of the interval are halved"):
+    with given.open_scene(scene) as stated, show_running("pieces of the interval are halved"):
         found = proven(stated, quantities)
     if as_json:
         text = shown.write_json(stated, found)
     else:
         own = {**DEGREES, **units}
         text = write_table(stated.title, shown.write_heading(stated, found, own), shown.make_table(found, own))
-    print_to(text, out)
+    given.print_to(text, out)
+
+
+@click.command()
+@given.scene_argument
+@given.json_option
+@given.or_out_option
+def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
+    """Find where a linkage stays by itself, stable or not, how fast it swings there, and what holds it elsewhere."""
+    from fourbar.show import equilibrium as shown
+    from fourbar.show.progress import show_running
+    from fourbar.studies.equilibrium import equilibrium as found
+
+    with given.open_scene(scene) as described, show_running("the boxes are halved"):
+        result = found(described)
+    given.print_to((shown.write_json if as_json else shown.write_tables)(described.title, result), out)
+
+
+@click.command()
+@given.scene_argument
+@click.option(
+    "--degree", type=int, default=4, show_default=True, metavar="N", help="Of the highest polynomial, 1 to 4."
+)
+@given.json_option
+@given.or_out_option
+def ratio(scene: Path, degree: int, as_json: bool, out: Path | None) -> None:
+    """Show omega_4/omega_2, torque ratio and reflected inertia, and the polynomial of a mimic joint with its errors."""
+    from fourbar.show import ratio as shown
+    from fourbar.studies.ratio import ratio as found
+
+    with given.open_scene(scene) as described:
+        result = found(described, degree)
+    given.print_to((shown.write_json if as_json else shown.write_tables)(described.title, result), out)

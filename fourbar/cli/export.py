@@ -5,24 +5,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fourbar.cli.given import (
-    FILE,
-    open_scene,
-    out_option,
-    print_to,
-    read_lengths,
-    read_number,
-    require_unit,
-    scene_argument,
-    show_waiting,
-    units_option,
-)
-from fourbar.cli.rest import replace_loop
+from fourbar.cli import given
 from fourbar.errors import InputError
+from fourbar.scene import Scene
+from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
     from fourbar.mjcf.document import Drive
-    from fourbar.solution import Conversion
 
 without_loads_option = click.option(
     "--without-loads", is_flag=True, help="Leave the loads out: the form has none, your program applies them."
@@ -30,8 +19,8 @@ without_loads_option = click.option(
 
 
 @click.command()
-@scene_argument
-@out_option
+@given.scene_argument
+@given.out_option
 @click.option(
     "--figure",
     default="overview",
@@ -43,23 +32,24 @@ without_loads_option = click.option(
 @click.option("--position", metavar="PLACE", help='Of the linkage and free bodies: what is commanded, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
 @click.option("--dimensions", is_flag=True, help="Write the lengths of the bars at them.")
-@units_option
+@given.units_option
 def plot(
-    scene: Path, out: Path, figure: str, position: str | None, branches: str, dimensions: bool, units: "Conversion"
+    scene: Path, out: Path, figure: str, position: str | None, branches: str, dimensions: bool, units: Conversion
 ) -> None:
     """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
     from fourbar.show.plot import draw
 
-    require_unit("--position", position)
-    with open_scene(scene) as described, show_waiting(described):
+    if position is not None and given.is_bare(position):  # it may have been meant in any unit
+        raise InputError("--position", position, f'the unit is missing; did you mean "{position} deg"?')
+    with given.open_scene(scene) as described, given.show_waiting(described):
         unit = "rad" if described.motion.stroke is None else "m"
-        at = None if position is None else read_number("--position", position, unit)
+        at = None if position is None else given.read_number("--position", position, unit)
         draw(described, out, figure, position=at, branches=branches, units=units, dimensions=dimensions)
 
 
 @click.command()
-@scene_argument
-@out_option
+@given.scene_argument
+@given.out_option
 @click.option(
     "--picture",
     "pictures",
@@ -73,9 +63,9 @@ def plot(
     help="Length of a film; left out: 6, of a motion through time its own.",
 )
 @click.option("--vectors", is_flag=True, help="With arrows of velocity and acceleration at the points.")
-@units_option
+@given.units_option
 def animate(
-    scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, vectors: bool, units: "Conversion"
+    scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, vectors: bool, units: Conversion
 ) -> None:
     """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""
     from fourbar.show.animate import write
@@ -86,12 +76,12 @@ def animate(
         if not equals:
             raise InputError("--picture", entry, "must be like coupler=FILE")
         attached[bar] = file
-    with open_scene(scene) as described, show_waiting(described):
+    with given.open_scene(scene) as described, given.show_waiting(described):
         write(described, out, pictures=attached, seconds=seconds, units=units, vectors=vectors)
 
 
 @click.command()
-@click.argument("scene", type=FILE, required=False)
+@click.argument("scene", type=given.FILE, required=False)
 @click.option("--lengths", nargs=4, metavar="D A B C", help="Ground, input, coupler, output (bare numbers: m).")
 @click.option("--omega", metavar="W", help="Speed of the input with --lengths (a bare number: rad/s).")
 @click.option(
@@ -110,7 +100,7 @@ def animate(
     show_default=True,
     help="flywheel keeps omega_2; for a controller of your own: motor, whose ctrl is the couple or force, or none.",
 )
-@out_option
+@given.out_option
 def mjcf(
     scene: Path | None,
     lengths: tuple[str, ...] | None,
@@ -125,42 +115,50 @@ def mjcf(
 
     if (scene is None) == (lengths is None):
         raise click.UsageError("give a scene file or --lengths D A B C, one of the two")
-    if scene is not None:
-        if omega is not None:
-            raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
-        with open_scene(scene) as described:
-            text = writer.write_mjcf_for(described, simulator, drive)
-            print_to(replace_loop(text, described) if mimic else text, out)
+    if scene is not None and omega is not None:
+        raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
+
+    def put(described: Scene) -> None:
+        text = writer.write_mjcf_for(described, simulator, drive)
+        if mimic:
+            from fourbar.studies.ratio import ratio
+
+            best = ratio(described).fits[-1]  # the best polynomials that MuJoCo holds
+            text = writer.replace_loop(text, described, best.about, best.joint_A, best.theta_4)
+        given.print_to(text, out)
+
+    if lengths is None:
+        assert scene is not None
+        with given.open_scene(scene) as described:
+            put(described)
         return
-    assert lengths is not None
-    speed = {} if omega is None else {"omega": read_number("--omega", omega, "rad/s")}
-    made = writer.make_scene(*read_lengths(lengths), **speed)
-    text = writer.write_mjcf_for(made, simulator, drive)
-    print_to(replace_loop(text, made) if mimic else text, out)
+    speed = {} if omega is None else {"omega": given.read_number("--omega", omega, "rad/s")}
+    made = writer.make_scene(*given.read_lengths(lengths), **speed)
+    put(made)
     for line in writer.list_defaults(made):
         click.echo(line)
 
 
 @click.command()
-@scene_argument
+@given.scene_argument
 @click.option("--for", "reader", type=click.Choice(["gazebo", "drake"]), default="gazebo", show_default=True)
 @without_loads_option
-@out_option
+@given.out_option
 def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
     """Write a scene as SDF, the loop closed by a fourth joint (Gazebo) or a ball constraint (Drake)."""
     from fourbar.mjcf.sdf import write_sdf as written
 
-    with open_scene(scene) as described:
-        print_to(written(described, reader, without_loads=without_loads), out)
+    with given.open_scene(scene) as described:
+        given.print_to(written(described, reader, without_loads=without_loads), out)
 
 
 @click.command()
-@scene_argument
+@given.scene_argument
 @without_loads_option
-@out_option
+@given.out_option
 def usd(scene: Path, without_loads: bool, out: Path) -> None:
     """Write a scene as USD text (.usda) for Newton, the loop closed by a fourth revolute joint."""
     from fourbar.mjcf.usd import write_usd as written
 
-    with open_scene(scene) as described:
-        print_to(written(described, without_loads=without_loads), out)
+    with given.open_scene(scene) as described:
+        given.print_to(written(described, without_loads=without_loads), out)

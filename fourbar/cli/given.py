@@ -3,24 +3,21 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from fourbar.errors import InputError
-
-if TYPE_CHECKING:
-    from fourbar.scene import Scene
-    from fourbar.solution import Conversion
+from fourbar.linkage import ANY, POSITIVE, require
+from fourbar.scene import Scene
+from fourbar.solution import Conversion
 
 MOST_POSITIONS = 1_000_000
 """Positions that `analyze` prints: about a gigabyte of text."""
-
 FILE = click.Path(path_type=Path)
 KEYS_OF_A_SCENE = ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
 
 
-def _read_units(context: click.Context, parameter: click.Parameter, text: str) -> "Conversion":
+def _read_units(context: click.Context, parameter: click.Parameter, text: str) -> Conversion:
     from fourbar.show.units import units
 
     return units(text)
@@ -29,6 +26,7 @@ def _read_units(context: click.Context, parameter: click.Parameter, text: str) -
 scene_argument = click.argument("scene", type=FILE)
 out_option = click.option("-o", "--out", type=FILE, required=True, metavar="FILE")
 or_out_option = click.option("-o", "--out", type=FILE, metavar="FILE", help="Write it to FILE instead of printing it.")
+json_option = click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
 units_option = click.option(
     "--units",
     default="SI",
@@ -39,7 +37,7 @@ units_option = click.option(
 
 
 @contextmanager
-def open_scene(path: Path) -> Iterator["Scene"]:
+def open_scene(path: Path) -> Iterator[Scene]:
     """Read the scene of a file; InputError where it cannot be printed, or not to the file of -o.
 
     The output is looked at before anything is solved, which may take minutes. Mistakes that show only then name the
@@ -64,7 +62,7 @@ def open_scene(path: Path) -> Iterator["Scene"]:
 
 
 @contextmanager
-def show_waiting(scene: "Scene") -> Iterator[None]:
+def show_waiting(scene: Scene) -> Iterator[None]:
     """Show in a terminal that a long free motion, which takes minutes, is running."""
     if scene.motion.free is None:
         yield
@@ -79,7 +77,7 @@ def show_waiting(scene: "Scene") -> Iterator[None]:
 def read_lengths(texts: tuple[str, ...]) -> list[float]:
     """Ground, input, coupler and output, m."""
     names = ("ground", "input", "coupler", "output")
-    return [read_number(f"length of {name}", text, "m", positive=True) for name, text in zip(names, texts, strict=True)]
+    return [read_number(f"length of {name}", text, "m", POSITIVE) for name, text in zip(names, texts, strict=True)]
 
 
 def is_bare(text: str) -> bool:
@@ -91,25 +89,9 @@ def is_bare(text: str) -> bool:
     return True
 
 
-def read_number(key: str, text: str, unit: str, *, positive: bool = False) -> float:
+def read_number(key: str, text: str, unit: str, bound: str = ANY) -> float:
     """Read a number of the command line: bare in SI, or with a unit."""
-    from fourbar.linkage import require
-
-    try:
-        return require(key, float(text), positive=positive)
-    except ValueError:
-        from fourbar.quantities.units import UnitError, to_si
-
-        try:
-            return require(key, to_si(text, unit), positive=positive)
-        except UnitError as error:
-            raise InputError(key, text, f"{error}; must be a number in {unit}, or one with a unit") from None
-
-
-def require_unit(key: str, text: str | None) -> None:
-    """InputError for a bare number: it may have been meant in any unit."""
-    if text is not None and is_bare(text):
-        raise InputError(key, text, f'the unit is missing; did you mean "{text} deg"?')
+    return require(key, float(text) if is_bare(text) else text, unit, bound)
 
 
 def print_to(text: str, out: Path | None) -> None:

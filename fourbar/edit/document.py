@@ -19,8 +19,6 @@ from fourbar.scene.motion_law import ENDS
 Path = Sequence[str | int]
 WORDS = {"branch": [*BRANCHES], "through": ["sign", "follow"], "frame": ["world", "bar"], "ends": [*ENDS]}
 """Entries that are one of a few words."""
-IN_LINE = ("points", "tolerances")
-"""Tables whose entries take one line each; so do the effects."""
 LONGEST_TEXT = 10_000
 """Characters of one entry."""
 
@@ -84,7 +82,9 @@ class SceneDocument:
             if isinstance(old, Table):  # a table of its own is written anew, with its heading
                 del holder[last]
                 old = None
-            holder[last] = _make_like(old, value) if old is not None else _write_entry(path, value)
+            own_table = len(path) == 1 and isinstance(value, dict)  # at the top of the file; anywhere else in one line
+            new = _make_table(value) if own_table else _write_inline(value)
+            holder[last] = new if old is None else _make_like(old, value)
         else:
             raise InputError(name_entry(path), value, "stands in no table")
 
@@ -165,8 +165,3 @@ def _write_inline(value: Any) -> Any:
             row.append(_write_inline(entry))
         return row
     return value
-
-
-def _write_entry(path: Path, value: Any) -> Any:
-    """Write a new entry: a table of its own at the top of the file, in one line anywhere else."""
-    return _make_table(value) if len(path) == 1 and isinstance(value, dict) else _write_inline(value)

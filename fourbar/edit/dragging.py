@@ -131,8 +131,8 @@ def _drag_pin(document: SceneDocument, given: Dragged, pins: dict[str, complex])
         raise InputError("drag", given.what, "must be one of " + ", ".join(PINS))
     of = {"A": {"input": "O2"}, "B": {"coupler": "A", "output": "O4"}, "O4": {"ground": "O2"}}[str(given.what)]
     for bar, pin in of.items():
-        length = abs(given.to - pins[pin])
-        _put(document, ("lengths", bar), length, given.grain, "m")
+        key = ("lengths", bar)
+        document.put(key, _write_like(document.at(key), abs(given.to - pins[pin]), given.grain, "m", "m"))
     if given.what == "O4":
         angle, key = cmath.phase(given.to), ("lengths", "ground_angle")
         document.put(key, _write_angle(document.at(key), angle, given.grain / max(abs(given.to), given.grain)))
@@ -140,8 +140,8 @@ def _drag_pin(document: SceneDocument, given: Dragged, pins: dict[str, complex])
 
 def _put_pair(document: SceneDocument, path: Path, size: float, angle: float, grain: float) -> None:
     """State a distance and an angle, in the units that they have; where there is none, in those of the ground."""
-    unit = find_unit(document.at((*path, 0)) or document.at(("lengths", "ground")), "m")
-    texts = [write_rounded(size * to_si("1 m", unit), grain * to_si("1 m", unit), unit)]
+    distance = document.at((*path, 0)) or document.at(("lengths", "ground"))
+    texts = [_write_like(distance, size, grain, "m", "m")]
     texts.append(_write_angle(document.at((*path, 1)), angle, grain / max(size, grain)))
     if document.at(path) is None:
         document.put(path, texts)
@@ -150,16 +150,15 @@ def _put_pair(document: SceneDocument, path: Path, size: float, angle: float, gr
             document.put((*path, index), text)
 
 
-def _put(document: SceneDocument, path: Path, value: float, grain: float, si: str) -> None:
-    unit = find_unit(document.at(path), si)
-    factor = to_si(f"1 {si}", unit)
-    document.put(path, write_rounded(value * factor, grain * factor, unit))
-
-
 def _write_angle(old: object, angle: float, grain: float) -> str:
-    unit = find_unit(old, "deg")
-    factor = to_si("1 rad", unit)
-    return write_rounded(angle * factor, grain * factor, unit)
+    return _write_like(old, angle, grain, "rad", "deg")
+
+
+def _write_like(old: object, value: float, grain: float, si: str, otherwise: str) -> str:
+    """Write a number of an SI unit in the unit that an older text of it has, or in another one where it has none."""
+    unit = find_unit(old, otherwise)
+    factor = to_si(f"1 {si}", unit)
+    return write_rounded(value * factor, grain * factor, unit)
 
 
 def find_unit(text: object, otherwise: str) -> str:

@@ -1,7 +1,6 @@
 """What the workbench writes besides the scene: into one folder, under names of its own."""
 
 import base64
-from collections.abc import Callable
 from pathlib import Path
 
 from fourbar.errors import InputError
@@ -10,35 +9,8 @@ from fourbar.solution import Conversion, write_csv
 from fourbar.solve import find_last_stage, solve
 from fourbar.writing import write_text
 
-
-def _export_picture(scene: Scene, path: Path, units: Conversion) -> None:
-    from fourbar.show.plot import draw
-
-    draw(scene, path, units=units)
-
-
-def _export_csv(scene: Scene, path: Path, units: Conversion) -> None:
-    write_text(path, write_csv(solve(scene, find_last_stage(scene)), units))
-
-
-def _export_mjcf(scene: Scene, path: Path, units: Conversion) -> None:
-    from fourbar.mjcf import write_mjcf_for
-
-    del units  # a model has its own
-    write_text(path, write_mjcf_for(scene, "mujoco"))
-
-
-def _export_page(scene: Scene, path: Path, units: Conversion) -> None:
-    from fourbar.show.animate import write
-
-    write(scene, path, units=units)
-
-
-FORMATS: dict[str, tuple[str, Callable[[Scene, Path, Conversion], None]]] = {
-    **{kind: (kind, _export_picture) for kind in ("svg", "png", "pdf")},
-    **{"csv": ("csv", _export_csv), "mjcf": ("xml", _export_mjcf), "page": ("html", _export_page)},
-}
-"""By name: the ending of the file, and what writes it."""
+ENDINGS = {**{kind: kind for kind in ("svg", "png", "pdf", "csv")}, "mjcf": "xml", "page": "html"}
+"""Of the file, by the name of the format."""
 
 
 class Exports:
@@ -49,12 +21,22 @@ class Exports:
 
     def write(self, scene: Scene, name: str, units: Conversion) -> Path:
         """Write one export and return its path; InputError for an unknown format."""
-        if name not in FORMATS:
-            raise InputError("format", name, "must be one of " + ", ".join(FORMATS))
-        ending, writer = FORMATS[name]
+        from fourbar.mjcf import write_mjcf_for
+        from fourbar.show.animate import write
+        from fourbar.show.plot import draw
+
+        if name not in ENDINGS:
+            raise InputError("format", name, "must be one of " + ", ".join(ENDINGS))
         self.folder.mkdir(exist_ok=True)
-        path = self.folder / f"{self.stem}.{ending}"
-        writer(scene, path, units)
+        path = self.folder / f"{self.stem}.{ENDINGS[name]}"
+        if name == "csv":
+            write_text(path, write_csv(solve(scene, find_last_stage(scene)), units))
+        elif name == "mjcf":  # which has units of its own
+            write_text(path, write_mjcf_for(scene))
+        elif name == "page":
+            write(scene, path, units=units)
+        else:
+            draw(scene, path, units=units)
         return path
 
     @staticmethod

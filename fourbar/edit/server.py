@@ -125,10 +125,7 @@ class Workbench:
         try:
             self.session.keep()
         except OSError as error:
-            asyncio.run_coroutine_threadsafe(self._note(f"the state file cannot be written: {error}"), self.loop)
-
-    async def _note(self, text: str) -> None:
-        self.tell({"note": text})
+            self.loop.call_soon_threadsafe(self.tell, {"note": f"the state file cannot be written: {error}"})
 
     async def _settle(self) -> None:
         """Send the error bars, unless something has changed again."""
@@ -303,11 +300,7 @@ class Nothing(RequestHandler):
 def edit(path: Path, exports: Path, port: int = 0, *, browse: bool = True) -> None:
     """Open a scene in the workbench, and serve it until all pages have gone.
 
-    Parameters
-    ----------
-    path : the scene file; a new one is begun where it does not exist.
-    exports : the folder that exports and reports go to.
-    port : 0: any that is free.
+    A file that does not exist is begun; exports and reports go to the folder `exports`; port 0: any that is free.
     """
 
     async def run() -> None:

@@ -108,15 +108,6 @@ class Session:
 
     # ---- what a page asks for ----------------------------------------------------------------
 
-    def greeting(self) -> dict[str, Any]:
-        """Describe what does not change with the state, to a page that has come."""
-        return {
-            "offers": list_offers(),
-            "file": self.path.name,
-            "exports": str(self.exports.folder),
-            "kept": [*self.kept],
-        }
-
     def answer(self, *, settled: bool = False) -> dict[str, Any]:
         """Describe the present state."""
         return {
@@ -175,10 +166,6 @@ class Session:
 
 def _hash_text(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
-
-
-def _set(session: Session, asked: dict[str, Any]) -> None:
-    session.change(lambda of: of.set(asked["path"], str(asked["value"])), str(asked.get("gesture", "")))
 
 
 def _add(session: Session, asked: dict[str, Any]) -> None:
@@ -250,16 +237,10 @@ def _save(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"note": f"saved {session.path.name}", "saved": True}
 
 
-def _export(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    return {"note": "wrote " + str(session.exports.write(session.now.scene, str(asked["format"]), session.units))}
-
-
-def _list_bodies(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    return {"bodies": session.exports.free_bodies(session.now.scene, float(asked["position"]), session.units)}
-
-
 ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] = {
-    "set": _set,
+    "set": lambda session, asked: session.change(
+        lambda of: of.set(asked["path"], str(asked["value"])), str(asked.get("gesture", ""))
+    ),
     "add": _add,
     "remove": _remove,
     "drag": _drag,
@@ -270,8 +251,12 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
     "refer": _refer,
     "units": _list_units,
     "save": _save,
-    "export": _export,
-    "bodies": _list_bodies,
-    "hello": lambda session, asked: session.greeting() | {"refer": True},
+    "export": lambda session, asked: {
+        "note": f"wrote {session.exports.write(session.now.scene, str(asked['format']), session.units)}"
+    },
+    "bodies": lambda session, asked: {
+        "bodies": session.exports.free_bodies(session.now.scene, float(asked["position"]), session.units)
+    },
+    "hello": lambda session, asked: {"offers": list_offers(), "file": session.path.name, "refer": True},
 }
 """What a page can ask for."""

@@ -57,9 +57,7 @@ class Actions:
     def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
         """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.
 
-        Parameters
-        ----------
-        arm : from the bar's first pin to where it acts, complex, m, world axes.
+        `arm`: from the bar's first pin to where it acts, complex, m, world axes.
         """
         if bar != 1:
             force = self.rounded(force, turned=True)

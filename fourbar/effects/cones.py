@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-
 ONE, NONE, SEVERAL = range(3)
 """How many solutions there are."""
 ROUNDING = 32.0 * 2.0**-52

@@ -61,10 +61,8 @@ class Effect:
     def solve_friction(self, actions: Actions, pins: PinForces, eliminate: Callable[..., PinForces]) -> SolvedFriction:
         """Solve for what depends on the pin forces, where there are `loaded_pins`, and add it to the actions.
 
-        Parameters
-        ----------
-        pins : pin forces under the actions, without it.
-        eliminate : computes the pin forces under some actions, and under inertia if `with_inertia`.
+        `pins`: pin forces under the actions, without it. `eliminate`: computes the pin forces under some actions, and
+        under inertia if `with_inertia`.
         """
         raise NotImplementedError
 

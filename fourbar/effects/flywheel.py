@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fourbar.effects.effect import Effect
-from fourbar.linkage import require, require_whole
+from fourbar.linkage import AT_LEAST_ZERO, require, require_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Flywheel(Effect):
     key: ClassVar[str] = "flywheel"
 
     def __post_init__(self) -> None:
-        inertia = require("effects.flywheel.inertia", self.inertia, "kg m^2", at_least_zero=True)
+        inertia = require("effects.flywheel.inertia", self.inertia, "kg m^2", AT_LEAST_ZERO)
         bar = require_whole("effects.flywheel.bar", self.bar, (2, 4), "must be 2 or 4, a bar on a fixed pin")
         object.__setattr__(self, "inertia", inertia)
         object.__setattr__(self, "bar", bar)

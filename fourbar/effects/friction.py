@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fourbar.effects.actions import Actions
-from fourbar.effects.effect import Effect
-from fourbar.effects.pins import check_rows
+from fourbar.effects.pins import PinRows
 from fourbar.formulas.arithmetic import is_any
 from fourbar.formulas.motion import State
 
 
 @dataclass(frozen=True, slots=True)
-class Friction(Effect):
+class Friction(PinRows):
     """Friction torques per pin, N m, as pairs (pin, value).
 
     At a pin that does not turn the couple may have any value up to the torque; 0, the middle, is
@@ -21,14 +20,6 @@ class Friction(Effect):
     torques: tuple[tuple[str, float], ...]
     key: ClassVar[str] = "friction"
     dry: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "torques", check_rows("friction", self.torques))
-
-    @classmethod
-    def at(cls, **torques: float) -> "Friction":
-        """``Friction.at(A=0.05)``."""
-        return cls(tuple(torques.items()))
 
     @property
     def dry_pins(self) -> tuple[str, ...]:

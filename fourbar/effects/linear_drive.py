@@ -85,9 +85,7 @@ class LinearDrive:
 
         That is r on bar 2, a + r a/b on bar 3, r a/c on bar 4, r its distance from the bar's first pin.
 
-        Parameters
-        ----------
-        sines : of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2, as of a drive on bar 2, 3, 4.
+        `sines`: of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2, as of a drive on bar 2, 3, 4.
         """
         _, a, b, c, _, _ = state.lengths
         turning = {"h2": sines[2], "h3": (-a / b) * sines[3], "h4": (-a / c) * sines[4]}

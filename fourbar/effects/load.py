@@ -12,7 +12,7 @@ from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import angle, is_any, make_like, namespace, nearest, polar, split_sum
 from fourbar.formulas.motion import State
-from fourbar.linkage import FourBar, require, require_bar, require_numbers
+from fourbar.linkage import FourBar, require, require_bar, require_numbers, require_pair
 
 TURN = 2.0 * math.pi
 BEYOND_TURN = 2.4492935982947064e-16
@@ -125,13 +125,9 @@ class Load(Effect):
         if self.frame not in ("world", "bar"):
             raise InputError("loads.frame", self.frame, 'must be "world" or "bar"')
         expect("loads.table", self.table, Table, type(None))
-        pairs = {"at": self.at} if self.force is None else {"force": self.force, "at": self.at}
-        for name, pair in pairs.items():
-            expect(f"loads.{name}", pair, tuple, list)
-            if len(pair) != 2:
-                raise InputError(f"loads.{name}", pair, "must be a pair (size, angle)")
-            units = ("N" if name == "force" else "m", "rad")
-            set_field(self, name, tuple(require(f"loads.{name}", *each) for each in zip(pair, units, strict=True)))
+        if self.force is not None:
+            set_field(self, "force", require_pair("loads.force", self.force, "N"))
+        set_field(self, "at", require_pair("loads.at", self.at, "m"))
         set_field(self, "moment", require("loads.moment", self.moment, "N m"))
 
     def act(self, actions: Actions, state: State) -> None:

@@ -1,6 +1,7 @@
 """The numbers of a scene and of each effect, with their units: what scene files read and studies vary."""
 
-ANY, AT_LEAST_ZERO, POSITIVE = "a finite number", "a finite number >= 0", "a finite number > 0"
+from fourbar.linkage import ANY, AT_LEAST_ZERO, POSITIVE
+
 OF_EFFECT: dict[str, dict[str, tuple[str, str]]] = {
     "gravity": {"magnitude": ("m/s^2", ANY), "angle": ("rad", ANY)},
     "viscous": {"": ("N m s/rad", AT_LEAST_ZERO)},

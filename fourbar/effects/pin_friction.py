@@ -8,8 +8,8 @@ import numpy as np
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.cones import NONE, ONE, solve_sliding
-from fourbar.effects.effect import Effect, SolvedFriction
-from fourbar.effects.pins import check_rows, make_rows
+from fourbar.effects.effect import SolvedFriction
+from fourbar.effects.pins import PinRows
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import is_any
 from fourbar.formulas.pin_forces import PinForces
@@ -19,7 +19,7 @@ from fourbar.solution import Array
 
 
 @dataclass(frozen=True, slots=True)
-class PinFriction(Effect):
+class PinFriction(PinRows):
     """Pins as (pin, coefficient of friction mu, pin radius r in m): couple mu r |F| where the pin turns.
 
     At a pin that does not turn the couple may have any value up to that; 0, the middle, is taken, and
@@ -32,15 +32,9 @@ class PinFriction(Effect):
     dry: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        rows = check_rows("pin_friction", self.pins)
-        if not rows:
+        PinRows.__post_init__(self)
+        if not self.pins:
             raise InputError("effects.pin_friction", {}, "must name at least one pin")
-        object.__setattr__(self, "pins", rows)
-
-    @classmethod
-    def at(cls, **pins: tuple[float, float]) -> "PinFriction":
-        """``PinFriction.at(A=(mu, radius))``."""
-        return cls(make_rows(pins))
 
     @property
     def loaded_pins(self) -> tuple[str, ...]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING
-from fourbar.effects.pins import require_number
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import is_any, namespace, polar, select
 from fourbar.formulas.motion import State
@@ -84,7 +83,7 @@ class Spring:
         for name, point in zip(("start", "end"), require_ends("effects.springs", self.start, self.end), strict=True):
             object.__setattr__(self, name, point)
         for name, of in OF_EFFECT["springs"].items():
-            object.__setattr__(self, name, require_number(f"effects.springs.{name}", getattr(self, name), of))
+            object.__setattr__(self, name, require(f"effects.springs.{name}", getattr(self, name), *of))
 
     @classmethod
     def gas(
@@ -109,7 +108,7 @@ class Spring:
         """
         key, last = "effects.springs.gas", extended_force if compressed_force is None else compressed_force
         given = zip(OF_GAS_SPRING.items(), (extended, stroke, extended_force, last), strict=True)
-        extended, stroke, first, last = (require_number(f"{key}.{name}", value, of) for (name, of), value in given)
+        extended, stroke, first, last = (require(f"{key}.{name}", value, *of) for (name, of), value in given)
         if stroke >= extended:
             raise InputError(f"{key}.stroke", stroke, f"must be less than the extended length, {extended:.6g} m")
         if last < first:

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
-from fourbar.effects.effect import Effect
-from fourbar.effects.pins import check_rows, make_rows
+from fourbar.effects.pins import PinRows
 from fourbar.errors import expect
 from fourbar.formulas.arithmetic import Number, conjugate, namespace, nearest
 from fourbar.formulas.motion import State
@@ -25,7 +24,7 @@ HALF_TURN = math.pi * (1.0 - 1e-12)
 
 
 @dataclass(frozen=True, slots=True)
-class Torsion(Effect):
+class Torsion(PinRows):
     """Springs as (pin, stiffness in N m/rad, rest angle in rad, preload in N m).
 
     With beta = theta_j - theta_i (theta_1 for the ground) the couple on bar j is
@@ -42,12 +41,7 @@ class Torsion(Effect):
 
     def __post_init__(self) -> None:
         expect("effects.torsion.turns", self.turns, type(None))
-        object.__setattr__(self, "springs", check_rows("torsion", self.springs))
-
-    @classmethod
-    def at(cls, **springs: tuple[float, float, float]) -> "Torsion":
-        """``Torsion.at(B=(stiffness, rest, preload))``."""
-        return cls(make_rows(springs))
+        PinRows.__post_init__(self)
 
     @property
     def greatest_couple(self) -> float:

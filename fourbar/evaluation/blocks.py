@@ -18,7 +18,6 @@ from fourbar.solution import Array
 
 WORTH_COMPILING = 2_000_000
 """Evaluations of the forces, one a position, with error bars fourteen: loading numba and the loop costs as much."""
-
 PARTS_FOR_THREADS = 4
 
 
@@ -98,10 +97,8 @@ def keep(
 ) -> None:
     """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so.
 
-    Parameters
-    ----------
-    seen : whether what is no number has its status already.
-    shape : of the part of the arrays; None: that of what was evaluated.
+    `seen`: whether what is no number has its status already. `shape`: of the part of the arrays; None: that of what was
+    evaluated.
     """
     codes, values, _ = found
     if not seen:

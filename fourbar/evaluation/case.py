@@ -38,15 +38,12 @@ BLOCK = 8000
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the cache. Of 8192 an array of complex
 numbers is a little more than the C library hands out again without asking the system for fresh pages, and from 10 000
 on OpenBLAS starts threads for the squares by which `withheld` looks for what is no number."""
-
 U = 2.0**-53
 """Unit round-off of a double."""
 UNDECIDED = 32.0 * U
 """A factor of Heron's formula smaller than this times its terms is evaluated in many digits: in doubles it is wrong
 by at most about 12 U times them."""
-
 NOWHERE = np.empty(0, dtype=np.intp)
-
 NO_MOTION = Coefficients(*[np.nan] * 8)
 """Where positions alone are wanted."""
 Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
@@ -145,9 +142,7 @@ class Case(NamedTuple):
     ) -> State:
         """Positions and, where more than they is wanted, motion.
 
-        Parameters
-        ----------
-        at : in the order in which the path reads the loop.
+        `at`: in the order in which the path reads the loop.
         """
         k = NO_MOTION
         if moving:

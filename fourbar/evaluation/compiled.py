@@ -17,13 +17,7 @@ import numpy as np
 from fourbar.evaluation import case as cases
 from fourbar.evaluation import error_bars as bars
 from fourbar.evaluation.case import BLOCK, find_undecided
-from fourbar.evaluation.error_bars import (
-    EVALUATIONS,
-    compute_bar,
-    round_coefficients,
-    round_half_angle,
-    round_real,
-)
+from fourbar.evaluation.error_bars import EVALUATIONS, compute_bar, round_coefficients, round_half_angle, round_real
 from fourbar.formulas import arithmetic, motion, path, pin_forces, position, torque
 from fourbar.formulas.arithmetic import conjugate, cross, divisor, is_any, select, square_root, vector
 from fourbar.formulas.motion import Coefficients, Rates, coefficients, rates, take_sines_of_rates
@@ -249,9 +243,7 @@ def scatter(
 ) -> None:
     """Compute the error bars of positions that `run` has evaluated; for the parameters see there.
 
-    Parameters
-    ----------
-    signs : (evaluations, numbers).
+    `signs`: (evaluations, numbers).
     """
     n, turns = len(tangents), len(of_theta_2) > 0
     scalars[10 * BLOCK :] = 0.0

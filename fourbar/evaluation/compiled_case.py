@@ -11,24 +11,18 @@ from fourbar.effects import Flywheel, Gravity, Load, Viscous
 from fourbar.evaluation.case import BLOCK, NO_MOTION, Case, Evaluated, change_numbers
 from fourbar.evaluation.compiled import ROWS, compile_loop, run, scatter
 from fourbar.evaluation.error_bars import draw_signs
-from fourbar.evaluation.stages import (
-    ERROR,
-    NO_HALF_ANGLE,
-    Part,
-    evaluate_command,
-    find_sign,
-    list_kinematics,
-    take_piece,
-)
+from fourbar.evaluation.stages import ERROR, Part, evaluate_command, find_sign, list_kinematics, take_piece
 from fourbar.evaluation.withheld import is_finite, withhold_in_place
 from fourbar.formulas.arithmetic import cross, is_any, polar, split_sum
 from fourbar.formulas.motion import Rates, State
-from fourbar.formulas.position import Position
+from fourbar.formulas.position import HalfAngle, Position
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar.scene import Command
 from fourbar.solution import Array
 
+NO_HALF_ANGLE = HalfAngle(*[np.nan] * 5)
+"""Of positions whose motion and forces are known."""
 CARRIED = (Load, Gravity, Viscous, Flywheel)
 """Effects that the loop knows; a flywheel is in the inertia of its bar."""
 
@@ -50,9 +44,7 @@ class Loads(NamedTuple):
     def with_force(self, force: Any, at: Any, turns: bool, factor: Any = 1.0, size: Any = 1.0) -> "Loads":
         """One force more, times a factor, with its arm from the mass centre, both complex and in the same frame.
 
-        Parameters
-        ----------
-        size : of the terms of the factor.
+        `size`: of the terms of the factor.
         """
         force, size = factor * force, size * np.abs(force)
         moment = cross(at, force)
@@ -62,10 +54,6 @@ class Loads(NamedTuple):
         if turns:
             return more._replace(turning=more.turning + force, of_turning=more.of_turning + size)
         return more._replace(world=more.world + force, of_world=more.of_world + size)
-
-    def with_couple(self, couple: Any, factor: Any, size: Any) -> "Loads":
-        """One couple more, likewise."""
-        return self._replace(couple=self.couple + factor * couple, of_couple=self.of_couple + size * np.abs(couple))
 
 
 def can_carry(case: Case) -> bool:
@@ -95,7 +83,9 @@ def pack_numbers(case: Case, theta_2: Array, branch: Any, omega_2: Any, alpha_2:
             if term.force is not None:
                 force, at = polar(*term.force), polar(*term.at)
                 loads[term.bar] = loads[term.bar].with_force(force, at, term.frame == "bar", factor, size)
-            loads[term.bar] = loads[term.bar].with_couple(term.moment, factor, size)
+            own, moment = loads[term.bar], term.moment
+            own = own._replace(couple=own.couple + factor * moment, of_couple=own.of_couple + size * np.abs(moment))
+            loads[term.bar] = own
     of_loads = [
         number
         for load in loads.values()

@@ -49,10 +49,8 @@ class Roundings:
     def __call__(self, number: Any, *, turned: bool = False) -> Any:
         """Real numbers: the next double up or down, (EVALUATIONS, ...); each part of a complex one by itself.
 
-        Parameters
-        ----------
-        turned : whether a direction, known to its last digit, mixes the parts, and each carries the larger's, as all do
-            with a ground at an angle.
+        `turned`: whether a direction, known to its last digit, mixes the parts, and each carries the larger's, as all
+        do with a ground at an angle.
         """
         if type(number) is float and number == 0.0:  # exact, and quicker alone than as many zeros
             return number
@@ -143,10 +141,7 @@ def round_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, sign
 def round_coefficients(lengths: Loop, at: Position, k: Coefficients, signs: Any) -> Coefficients:
     """Compute the coefficients from parts rounded each: h3 = n - g, h4 = n + g, n = t + x g/e^2, and so their slopes.
 
-    Parameters
-    ----------
-    at, k : in the order in which the loop is read.
-    signs : thirteen of them.
+    `at` and `k` are in the order in which the loop is read; of the signs there are thirteen.
     """
     d, a, b, c, _, _ = lengths
     g, dg = 0.5 * k.h43, 0.5 * (k.dh4 - k.dh3)

@@ -10,12 +10,13 @@ import cmath
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, list_bodies
+from fourbar.effects.effect import Effect
 from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, say_install
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, drive_sine, find_smooth_branch, prepare_path
@@ -25,9 +26,6 @@ from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command
 from fourbar.solution import Array
-
-if TYPE_CHECKING:
-    from fourbar.effects import Effect
 
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
 """Tolerances of a step of DOP853: below them a long fast motion errs by its round-off."""
@@ -73,14 +71,8 @@ def _meet_change_points(lengths: Loop) -> Loop:
     d, a, b, c, E1, E2 = lengths
     total = d + a + b + c
     largest = max(abs((d - a) - (b - c)), abs((d - a) + (b - c)))
-    return Loop(
-        d,
-        a,
-        b,
-        c,
-        0.0 if abs(E1) <= TOUCHING * total * total else E1,
-        0.0 if abs(E2) <= TOUCHING * total * largest else E2,
-    )
+    met = abs(E1) <= TOUCHING * total * total, abs(E2) <= TOUCHING * total * largest
+    return lengths._replace(E1=0.0 if met[0] else E1, E2=0.0 if met[1] else E2)
 
 
 def _make_plain(numbers: Any) -> Any:
@@ -91,15 +83,11 @@ def _make_plain(numbers: Any) -> Any:
 class _Reading:
     """The linkage read in the angle of bar 2 or of bar 4, with the sign of its path."""
 
-    def __init__(self, linkage: FourBar, bar: int, sign: float = 1.0) -> None:
+    def __init__(self, linkage: FourBar, bar: int) -> None:
         found = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
-        own = {
-            "lengths": _make_plain(_meet_change_points(found.lengths)),
-            "u1": complex(found.u1),
-            "unit": float(found.unit),
-        }
-        self.path = found._replace(**own)
-        self.bar, self.sign = bar, sign
+        lengths = _make_plain(_meet_change_points(found.lengths))
+        self.path = found._replace(lengths=lengths, u1=complex(found.u1), unit=float(found.unit))
+        self.bar, self.sign = bar, 1.0
         self.changes = 0.0 in (self.path.lengths.E1, self.path.lengths.E2)
         self.last: tuple[tuple[float, float], tuple[Position, Coefficients]] | None = None
 
@@ -136,7 +124,7 @@ def _compute_sines(at: Position) -> dict[int, float]:
 
 def release(
     linkage: FourBar,
-    terms: "Iterable[Effect]",
+    terms: Iterable[Effect],
     theta: float,
     omega: float,
     branch: int,
@@ -177,7 +165,7 @@ class _Run:
     def __init__(
         self,
         linkage: FourBar,
-        terms: "tuple[Effect, ...]",
+        terms: tuple[Effect, ...],
         theta: float,
         omega: float,
         branch: int,
@@ -207,7 +195,8 @@ class _Run:
         self._change_over()
         self.side = 0.0  # the sense of motion, where dry friction tells the two apart
         self.holding = 0.0  # at a standstill, the part of its torque that dry friction takes at every pin
-        self.dry = self._is_dry()
+        ahead, back = self._try_both_senses()
+        self.dry = ahead != back
         self.start_energy = self._compute_kinetic_energy()
 
     def _compute_inertia(self, at: Position, k: Coefficients) -> Any:
@@ -231,10 +220,6 @@ class _Run:
     def _try_both_senses(self) -> list[float]:
         q = float(self.y[0])
         return [self._compute_generalised_force(q, *self._at(), rate) for rate in (VANISHING, -VANISHING)]
-
-    def _is_dry(self) -> bool:
-        ahead, back = self._try_both_senses()
-        return ahead != back
 
     def _compute_rates(self, _: float, y: Array) -> list[float]:
         q, rate = float(y[0]), float(y[1])
@@ -283,7 +268,11 @@ class _Run:
 
     def through(self, times: Array) -> FreeMotion:
         """Integrate over the times and report."""
-        DOP853, brentq = _import_scipy()
+        try:
+            from scipy.integrate import DOP853
+            from scipy.optimize import brentq
+        except ModuleNotFoundError:
+            raise DependencyError(f"SciPy is needed for free motion: {say_install('dynamics')}") from None
         rows: list[tuple[float, ...]] = []
         t, end, steps, stopped = 0.0, float(times[-1]), 0, None
         worst, largest = 0.0, self.start_energy
@@ -311,9 +300,9 @@ class _Run:
                 dense, t_new, new = _Within(solver), solver.t, solver.y
                 rested = bool(self.side and self.side * new[1] < 0.0)
                 if rested:
-                    t_new = self._find_root(brentq, dense, self._compute_rate, solver.t_old, t_new)
+                    t_new = self._find_root(brentq, dense, lambda y: float(y[1]), solver.t_old, t_new)
                     new = np.array([dense(t_new)[0], 0.0, dense(t_new)[2]])
-                if not self.follow and self._is_past(new):
+                if not self.follow and self.branch * self._compute_sine(new) < 0.0:  # through their common line
                     stopped = t_new = self._find_root(brentq, dense, self._compute_sine, solver.t_old, t_new)
                     new = dense(t_new)
                 report(t_new, dense)
@@ -348,16 +337,9 @@ class _Run:
             return low
         return float(brentq(lambda t: f(dense(t)), low, high, xtol=1e-15, rtol=1e-15))
 
-    def _compute_rate(self, y: Array) -> float:
-        return float(y[1])
-
     def _compute_sine(self, y: Array) -> float:
         """sin(theta_4 - theta_3), or that of the bar that was released: zero at its limits."""
         return _compute_sines(self.reading.at(float(y[0]))[0])[self.bar]
-
-    def _is_past(self, y: Array) -> bool:
-        """Whether the two other moving bars have gone through their common line."""
-        return self.branch * self._compute_sine(y) < 0.0
 
     def _make_row(self, y: Array) -> tuple[float, ...]:
         """theta_2, omega_2, alpha_2, branch, and the independent angle with all that belongs to it, of one instant."""
@@ -388,12 +370,3 @@ class _Within:
         if self.known is None:
             self.known = self.solver.dense_output()
         return self.known(t)
-
-
-def _import_scipy() -> tuple[Any, Any]:
-    try:
-        from scipy.integrate import DOP853
-        from scipy.optimize import brentq
-    except ModuleNotFoundError:
-        raise DependencyError(f"SciPy is needed for free motion: {say_install('dynamics')}") from None
-    return DOP853, brentq

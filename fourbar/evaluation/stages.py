@@ -34,14 +34,8 @@ if TYPE_CHECKING:
 
 
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
-
-NO_HALF_ANGLE = HalfAngle(*[np.nan] * 5)
-"""Of positions whose motion and forces are known."""
-
 Part = tuple[Any, ...]
 """Index of some positions in the arrays of all."""
-
-
 WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 """Statuses of positions at which an effect or the drive has no value, and so the forces have none."""
 
@@ -49,9 +43,7 @@ WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 def evaluate_command(case: Case, where: Command, part: Part, wanted: int, names: KeysView[str]) -> Evaluated:
     """Evaluate some positions of a command.
 
-    Parameters
-    ----------
-    wanted : number of the last stage that the quantities named need.
+    `wanted`: number of the last stage that the quantities named need.
     """
     q: Any = where.angle[part]
     if q.ndim == 0:
@@ -84,9 +76,7 @@ def evaluate_command(case: Case, where: Command, part: Part, wanted: int, names:
 def name_of_command(case: Case, at: Position, state: State, q: Any) -> dict[str, Any]:
     """Quantities that a command of bar 3 or 4 has in the place of others: its angle as commanded, theta_2, its sine.
 
-    Parameters
-    ----------
-    at : in the order in which the path reads the loop.
+    `at`: in the order in which the path reads the loop.
     """
     if case.path.bar == 2:
         return {}

@@ -32,10 +32,8 @@ def withhold_in_place(case: Case, found: Evaluated) -> None:
 def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:
     """Where a quantity is no number and the status promises one: the status that says so, and NaN from that stage on.
 
-    Parameters
-    ----------
-    code : status of each position, changed in place.
-    in_line : where the two bars that are not driven are in line: there no forces hold them in balance.
+    `code`: status of each position, changed in place. `in_line`: where the two bars that are not driven are in line:
+    there no forces hold them in balance.
     """
     gone = np.zeros(code.shape, dtype=bool)
     for stage in STAGES:

@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fourbar import effects as kinds
-from fourbar.effects.numbers import AT_LEAST_ZERO, OF_EFFECT, OF_GAS_SPRING, POSITIVE, ROWS
+from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING, ROWS
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader, write_polar, write_quantity
-from fourbar.linkage import PINS
+from fourbar.linkage import AT_LEAST_ZERO, PINS
 
 if TYPE_CHECKING:
     from fourbar.effects import Effect, Flywheel, SpringEnd, Springs
@@ -47,16 +47,7 @@ def _read_numbers(
     read: Reader, key: str, given: Mapping[str, object], numbers: Mapping[str, tuple[str, str]]
 ) -> list[float]:
     """Read each of some numbers within its bound."""
-    return [
-        read.quantity(
-            f"{key}.{name}".rstrip("."),
-            given.get(name),
-            unit,
-            positive=bound == POSITIVE,
-            at_least_zero=bound == AT_LEAST_ZERO,
-        )
-        for name, (unit, bound) in numbers.items()
-    ]
+    return [read.quantity(f"{key}.{name}".rstrip("."), given.get(name), *of) for name, of in numbers.items()]
 
 
 def read_ends(read: Reader, key: str, given: dict[str, Any]) -> "tuple[SpringEnd, SpringEnd]":
@@ -90,7 +81,7 @@ def _read_flywheel(value: object, read: Reader) -> "Flywheel":
     """On bar 2 where none is named."""
     key = "effects.flywheel"
     entry = read.table(key, value, ("bar", "inertia"))
-    inertia = read.quantity(f"{key}.inertia", entry.get("inertia"), INERTIA, at_least_zero=True)
+    inertia = read.quantity(f"{key}.inertia", entry.get("inertia"), INERTIA, AT_LEAST_ZERO)
     return kinds.Flywheel(inertia, read.whole(f"{key}.bar", entry.get("bar", 2), 2, 4))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from fourbar.errors import InputError
+from fourbar.linkage import ANY, is_within
 from fourbar.quantities.units import UnitError, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -20,8 +21,8 @@ class Reader:
         self.file = file
 
     def refuse(self, key: str, value: object, allowed: str) -> InputError:
-        """Make the error for an entry, with the file's name."""
-        return InputError(key, _shorten(value), allowed, self.file)
+        """Make the error for an entry, or for one that is left out (None), with the file's name."""
+        return InputError(key, _shorten(value), f"{'is missing; ' if value is None else ''}{allowed}", self.file)
 
     def table(self, key: str, value: object, allowed: Iterable[str]) -> dict[str, Any]:
         """Read a table that holds no other keys than those allowed; `key` is "" for the top of the file."""
@@ -52,42 +53,34 @@ class Reader:
     def whole(self, key: str, value: object, least: int, most: int) -> int:
         """Read an integer of a range, both ends included."""
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            missing = "is missing; " if value is None else ""
-            raise self.refuse(key, value, f"{missing}must be a whole number from {least} to {most}")
+            raise self.refuse(key, value, f"must be a whole number from {least} to {most}")
         return value
 
     def number(self, key: str, value: object) -> float:
         """Read a number without a dimension."""
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            missing = "is missing; " if value is None else ""
-            raise self.refuse(key, value, f"{missing}must be a finite number without a unit")
+            raise self.refuse(key, value, "must be a finite number without a unit")
         return float(value)
 
-    def quantity(
-        self, key: str, value: object, unit: str, *, positive: bool = False, at_least_zero: bool = False
-    ) -> float:
+    def quantity(self, key: str, value: object, unit: str, bound: str = ANY) -> float:
         """Read a number with a unit, in `unit`; of unit "1" one without."""
         if unit == "1":
             return self.number(key, value)
-        bound = " > 0" if positive else " >= 0" if at_least_zero else ""
-        wanted = f'must be a finite number{bound} with a unit, like "1 {unit}"'
-        if value is None:
-            raise self.refuse(key, value, f"is missing; {wanted}")
+        wanted = f'must be {bound} with a unit, like "1 {unit}"'
         if not isinstance(value, str):
             raise self.refuse(key, value, wanted)
         try:
             number = to_si(value, unit)
         except UnitError as error:
             raise self.refuse(key, value, f"{error}; {wanted}") from None
-        if (positive and number <= 0.0) or (at_least_zero and number < 0.0):
+        if not is_within(number, bound):
             raise self.refuse(key, value, wanted)
         return number
 
     def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
         """Read a list of numbers with units, in `unit`."""
         if not isinstance(value, list):
-            missing = "is missing; " if value is None else ""
-            raise self.refuse(key, value, f'{missing}must be a list like ["1 {unit}", "2 {unit}"]')
+            raise self.refuse(key, value, f'must be a list like ["1 {unit}", "2 {unit}"]')
         return tuple(self.quantity(f"{key}[{index}]", entry, unit) for index, entry in enumerate(value))
 
     def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:

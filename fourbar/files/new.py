@@ -4,7 +4,7 @@ from importlib.resources import files
 from string import Template
 
 from fourbar.files.fields import Reader
-from fourbar.linkage import BAR_NAMES, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, POSITIVE, Bar, FourBar
 
 
 def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
@@ -14,7 +14,7 @@ def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
     """
     read = Reader("--lengths")
     given = [(name, " ".join(text.split())) for name, text in zip(BAR_NAMES.values(), lengths, strict=True)]
-    d, a, b, c = (read.quantity(name, text, "m", positive=True) for name, text in given)
+    d, a, b, c = (read.quantity(name, text, "m", POSITIVE) for name, text in given)
     FourBar(d, Bar(a), Bar(b), Bar(c))
     lines = "\n".join(f'{name} = "{text}"' for name, text in given)
     text = files("fourbar.files").joinpath("new.toml").read_text(encoding="utf-8")

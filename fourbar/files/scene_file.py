@@ -20,7 +20,7 @@ from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.pictures import Picture
 from fourbar.files.scene_text import BARS, BRANCHES
 from fourbar.files.tolerances import read_tolerances
-from fourbar.linkage import BAR_NAMES, MOST_STEPS, Bar, FourBar
+from fourbar.linkage import AT_LEAST_ZERO, BAR_NAMES, MOST_STEPS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import COMMANDS, ENDS, Law
@@ -145,9 +145,7 @@ def _read_pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Pic
 
 def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     lengths = read.table("lengths", top.get("lengths", {}), (*BAR_NAMES.values(), "ground_angle"))
-    length = {
-        name: read.quantity(f"lengths.{name}", lengths.get(name), "m", positive=True) for name in BAR_NAMES.values()
-    }
+    length = {name: read.quantity(f"lengths.{name}", lengths.get(name), "m", POSITIVE) for name in BAR_NAMES.values()}
     tables = read.table("bars", top.get("bars", {}), BARS)
     bars = {name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name]) for name in BARS}
     angle = read.quantity("lengths.ground_angle", lengths.get("ground_angle", "0 rad"), "rad")
@@ -156,10 +154,10 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
 
 def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
     entry = read.table(key, value, ("mass", "inertia", "centre", "picture"))
-    mass = read.quantity(f"{key}.mass", entry.get("mass", "0 kg"), "kg", at_least_zero=True)
+    mass = read.quantity(f"{key}.mass", entry.get("mass", "0 kg"), "kg", AT_LEAST_ZERO)
     inertia = centre = None
     if "inertia" in entry:
-        inertia = read.quantity(f"{key}.inertia", entry["inertia"], "kg m^2", at_least_zero=True)
+        inertia = read.quantity(f"{key}.inertia", entry["inertia"], "kg m^2", AT_LEAST_ZERO)
     elif not math.isfinite(mass * length * length):
         raise read.refuse(f"{key}.mass", entry.get("mass"), "must leave the inertia m L^2/12 a finite number")
     if "centre" in entry:
@@ -171,58 +169,35 @@ def _read_motion(read: Reader, value: object) -> Motion:
     numbers = [name for names in COMMANDS.values() for name in names]
     entry = read.table("motion", value, (*numbers, *OF_STROKE, "side", "branch", "through", "free", "law"))
     stated = [name for name in numbers if name in entry]
-    words: dict[str, Any] = {
+    given: dict[str, Any] = {
         "branch": BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
         "through": read.choice("motion.through", entry.get("through", "sign"), THROUGH),
     }
-    if given := [name for name in (*OF_STROKE, "side") if name in entry]:
+    if of_stroke := [name for name in (*OF_STROKE, "side") if name in entry]:
         for name in (*stated, *(name for name in ("free", "law") if name in entry)):
-            raise read.refuse(f"motion.{name}", entry[name], f"{given[0]} commands a cylinder, and nothing else is")
-        return _read_stroke_motion(read, entry, words)
-    bar = int(stated[0][-1]) if stated else 2
-    for name in stated:
-        if int(name[-1]) != bar:
-            raise read.refuse(f"motion.{name}", entry[name], f"{stated[0]} commands bar {bar}; one bar is commanded")
-    theta, omega, alpha = COMMANDS[bar]
-    free = None
+            raise read.refuse(f"motion.{name}", entry[name], f"{of_stroke[0]} commands a cylinder, and nothing else is")
+        (place, speed, acceleration), unit = OF_STROKE, "m"
+        given["side"] = read.choice("motion.side", entry.get("side"), ("left", "right"))
+    else:
+        bar = int(stated[0][-1]) if stated else 2
+        for name in stated:
+            if int(name[-1]) != bar:
+                allowed = f"{stated[0]} commands bar {bar}; one bar is commanded"
+                raise read.refuse(f"motion.{name}", entry[name], allowed)
+        (place, speed, acceleration), unit = COMMANDS[bar], "rad"
+    if place in entry or of_stroke:
+        given[place] = _read_places(read, f"motion.{place}", entry.get(place), unit)
+    if speed in entry:
+        given[speed] = read.quantity(f"motion.{speed}", entry[speed], f"{unit}/s")
+    none = f"0 {unit}/s^2"
+    given[acceleration] = read.quantity(f"motion.{acceleration}", entry.get(acceleration, none), f"{unit}/s^2")
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
-        duration = read.quantity("motion.free.duration", released.get("duration"), "s", positive=True)
-        free = Free(duration, read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS))
-    commanded: dict[str, Any] = {alpha: read.quantity(f"motion.{alpha}", entry.get(alpha, "0 rad/s^2"), "rad/s^2")}
-    if theta in entry:
-        commanded[theta] = _read_angle(read, f"motion.{theta}", entry[theta])
-    if omega in entry:
-        commanded[omega] = read.quantity(f"motion.{omega}", entry[omega], "rad/s")
-    return Motion(
-        free=free,
-        law=_read_law(read, entry["law"]) if "law" in entry else None,
-        **words,
-        **commanded,
-    )
-
-
-def _read_stroke_motion(read: Reader, entry: dict[str, Any], words: dict[str, Any]) -> Motion:
-    key, value = "motion.stroke", entry.get("stroke")
-    stroke: Any = None
-    if isinstance(value, dict):
-        sweep = read.table(key, value, ("from", "to", "steps"))
-        start, stop = (read.quantity(f"{key}.{name}", sweep.get(name), "m") for name in ("from", "to"))
-        stroke = Sweep(start, stop, read.whole(f"{key}.steps", sweep.get("steps", DEFAULT_STEPS), 1, MOST_STEPS))
-    elif isinstance(value, list) and value:
-        stroke = np.array([read.quantity(f"{key}[{index}]", each, "m") for index, each in enumerate(value)])
-    else:
-        stroke = read.quantity(key, value, "m")
-    speed = "stroke_speed"
-    return Motion(
-        stroke=stroke,
-        stroke_speed=read.quantity(f"motion.{speed}", entry[speed], "m/s") if speed in entry else None,
-        stroke_acceleration=read.quantity(
-            "motion.stroke_acceleration", entry.get("stroke_acceleration", "0 m/s^2"), "m/s^2"
-        ),
-        side=read.choice("motion.side", entry.get("side"), ("left", "right")),
-        **words,
-    )
+        duration = read.quantity("motion.free.duration", released.get("duration"), "s", POSITIVE)
+        given["free"] = Free(duration, read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS))
+    if "law" in entry:
+        given["law"] = _read_law(read, entry["law"])
+    return Motion(**given)
 
 
 def _read_law(read: Reader, value: object) -> Law:
@@ -238,23 +213,24 @@ def _read_law(read: Reader, value: object) -> Law:
     )
 
 
-def _read_angle(read: Reader, key: str, value: object) -> float | Array | Sweep | FromLimit:
-    if isinstance(value, str):
-        return read.quantity(key, value, "rad")
+def _read_places(read: Reader, key: str, value: object, unit: str) -> float | Array | Sweep | FromLimit:
+    """Read angles or strokes: one, a list of them, a sweep; an angle from a limit position too."""
+    if value is None or isinstance(value, str):
+        return read.quantity(key, value, unit)
     if isinstance(value, list) and value:
-        return np.array([read.quantity(f"{key}[{index}]", angle, "rad") for index, angle in enumerate(value)])
+        return np.array(read.quantities(key, value, unit))
+    from_limit = " or { limit, offset }" if unit == "rad" else ""
     if not isinstance(value, dict):
-        raise read.refuse(
-            key, value, 'must be an angle like "135 deg", a list of angles, { from, to, steps } or { limit, offset }'
-        )
-    if "limit" in value or "offset" in value:
-        start = read.table(key, value, ("limit", "offset"))
-        offset = read.quantity(f"{key}.offset", start.get("offset", "0 rad"), "rad")
+        like = "135 deg" if unit == "rad" else "1.5 m"
+        raise read.refuse(key, value, f'must be like "{like}", a list of such, {{ from, to, steps }}{from_limit}')
+    if from_limit and value.keys() & {"limit", "offset"}:
+        near = read.table(key, value, ("limit", "offset"))
+        offset = read.quantity(f"{key}.offset", near.get("offset", "0 rad"), "rad")
         # four bars have at most four limit positions of a bar; how many these have is not known here
-        return FromLimit(read.whole(f"{key}.limit", start.get("limit"), 1, 4), offset)
+        return FromLimit(read.whole(f"{key}.limit", near.get("limit"), 1, 4), offset)
     sweep = read.table(key, value, ("from", "to", "steps"))
-    ends = [read.quantity(f"{key}.{end}", sweep.get(end), "rad") for end in ("from", "to")]
-    return Sweep(ends[0], ends[1], read.whole(f"{key}.steps", sweep.get("steps"), 1, MOST_STEPS))
+    start, stop = (read.quantity(f"{key}.{end}", sweep.get(end), unit) for end in ("from", "to"))
+    return Sweep(start, stop, read.whole(f"{key}.steps", sweep.get("steps", DEFAULT_STEPS), 1, MOST_STEPS))
 
 
 def _load(read: Reader, key: str, value: object) -> Load:

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from fourbar.effects.numbers import ANY
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader, write_quantity
+from fourbar.linkage import ANY, POSITIVE
 from fourbar.scene import Scene
 from fourbar.scene.tolerance import Tolerance
 from fourbar.studies.keys import LEFT_OUT, is_left_out, list_entries, read_place, refuse_key
@@ -25,7 +25,7 @@ def read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Toleranc
         width = given[0] if sigma else given
         if is_left_out(scene, entry):
             raise read.refuse(name, width, LEFT_OUT)
-        own = read.quantity(name, width, entry.unit, positive=True)
+        own = read.quantity(name, width, entry.unit, POSITIVE)
         if own <= 0.0:
             raise read.refuse(name, width, "must be > 0")
         tolerance, number = Tolerance(key, own, sigma), read_place(scene, entry.place)

@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import NotAssembledError
 from fourbar.formulas.mobility import TURN, Array, change_points, find_intervals, turns_fully
 from fourbar.formulas.path import prepare_path
 from fourbar.formulas.position import loop
@@ -41,10 +40,7 @@ def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
 def find_circuit(linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8]) -> NDArray[np.int8]:
     """Find the circuit (index into `circuits`) of each position, -1 where it does not assemble, (n,).
 
-    Parameters
-    ----------
-    theta_2 : (n,), rad.
-    branch : +1 or -1, or one of them for each position (n,).
+    `theta_2`: (n,), rad. `branch`: +1 or -1, or one of them for each position (n,).
     """
     theta_2 = np.asarray(theta_2, dtype=float)
     found = circuits(linkage)
@@ -56,16 +52,3 @@ def find_circuit(linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8
         number = np.where((theta_2 - linkage.ground_angle) % TURN < 0.5 * TURN, 0, 1)
     half = prepare_path(loop(*linkage.lengths), linkage.ground_angle).half_angle(theta_2)
     return np.where((half.outer >= 0.0) & (half.inner >= 0.0), number, -1).astype(np.int8)
-
-
-def is_same_circuit(linkage: FourBar, one: tuple[float, int], other: tuple[float, int]) -> bool:
-    """Whether the linkage moves from one (theta_2, branch) to another without being taken apart.
-
-    Raises NotAssembledError where one of the two positions does not exist.
-    """
-    theta_2, branch = np.array([one[0], other[0]]), np.array([one[1], other[1]], dtype=np.int8)
-    numbers = find_circuit(linkage, theta_2, branch)
-    if (numbers < 0).any():
-        missing = float(theta_2[np.argmin(numbers)])
-        raise NotAssembledError(f"theta_2 = {missing!r} rad: the linkage does not assemble there")
-    return bool(numbers[0] == numbers[1])

@@ -118,12 +118,7 @@ class Rates(NamedTuple):
 
 
 def rates(k: Coefficients, speed: Number, acceleration: Number) -> Rates:
-    """omega_k = h_k q', alpha_k = h_k q'' + h_k' q'^2.
-
-    Parameters
-    ----------
-    speed, acceleration : q' and q'' of the independent angle, rad/s and rad/s^2.
-    """
+    """omega_k = h_k q', alpha_k = h_k q'' + h_k' q'^2, by the speed q' (rad/s) and the acceleration q'' (rad/s^2)."""
     square = speed * speed
     alpha_2, alpha_3, alpha_4 = k.dh2 * square, k.dh3 * square, k.dh4 * square
     if is_any(acceleration != 0.0):

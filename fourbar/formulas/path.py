@@ -70,11 +70,7 @@ class Path(NamedTuple):
     def position(self, q: Number, half: HalfAngle, branch: Number) -> Position:
         """Positions with the bars in the order of the reading.
 
-        Parameters
-        ----------
-        q : rad.
-        half : of q.
-        branch : sign of the root in that order, which is that of `drive_sine` for a drive on the bar itself.
+        `branch`: sign of the root in that order, which is that of `drive_sine` for a drive on the bar itself.
         """
         turned, along = self.theta_1 != 0.0, is_any(is_zero(self.theta_1))
         u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
@@ -153,9 +149,9 @@ def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     return Path(bar, own, theta_1, -u1 if bar == 4 else u1, unit, meets)
 
 
-def find_singular(at: Position, margin: float = NO_DIGIT_LEFT) -> Number:
+def find_singular(at: Position) -> Number:
     """Where velocities are 0/0: bars 3 and 4 lie in one line."""
-    return np.abs(at.sin_mu) <= margin
+    return np.abs(at.sin_mu) <= NO_DIGIT_LEFT
 
 
 def compute_state(
@@ -163,11 +159,7 @@ def compute_state(
 ) -> State:
     """Positions and motion for a motion of the input; NaN where the loop does not close, or speeds are 0/0.
 
-    Parameters
-    ----------
-    theta_2 : rad.
-    branch : +1 or -1.
-    omega_2, alpha_2 : rad/s and rad/s^2; left out, speeds are first coefficients and accelerations second ones.
+    With omega_2 and alpha_2 left out speeds are first coefficients and accelerations second ones.
     """
     with np.errstate(all="ignore"):
         lengths = loop(*linkage.lengths)
@@ -190,9 +182,7 @@ def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Numbe
         sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2 c e^2),
         sin(theta_3 - theta_2) = ((d cos psi - a) root - d sin psi (e^2 + b^2 - c^2))/(2 b e^2).
 
-    Parameters
-    ----------
-    lengths : of the loop that the position was closed with.
+    `lengths`: of the loop that the position was closed with.
     """
     if drive_bar == 2:
         return at.sin_mu
@@ -207,10 +197,7 @@ def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Numbe
 def find_smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:
     """Return the root's sign on a path that runs smoothly through change points: there cos h or sin h changes its sign.
 
-    Parameters
-    ----------
-    psi : independent angle less that of the ground, rad, not wrapped.
-    sign : +1 or -1, a constant of the path.
+    `psi`: independent angle less that of the ground, rad, not wrapped. `sign`: +1 or -1, a constant of the path.
     """
     k, s = np.cos(0.5 * psi), np.sin(0.5 * psi)
     at_stretched = np.where(np.equal(lengths.E1, 0.0) & (k < 0.0), -1.0, 1.0)

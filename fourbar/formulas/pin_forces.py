@@ -67,10 +67,7 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
     The force -m a_A of the coupler's mass at pin A is no part of R3; it is returned apart, in the frame of bar 2:
     m_3 a (omega_2^2 - i alpha_2).
 
-    Parameters
-    ----------
-    a : length of the input, m.
-    bodies : of bars 2, 3, 4.
+    `a`: length of the input, m.
     """
     two, three, four = bodies
     w2, w3, w4, alpha_2, alpha_3, alpha_4 = moving
@@ -90,9 +87,7 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
 def coupler_about_B(lengths: Loop, three: Body, at: Position, moving: Rates, sine: Number) -> Number:
     """d'Alembert: -I alpha_3 - m (G - B) x a_G, the coupler's moment about pin B, which is small where G lies near B.
 
-    Parameters
-    ----------
-    sine : of theta_3 - theta_2.
+    `sine`: of theta_3 - theta_2.
     """
     w2, w3, _, alpha_2, alpha_3, _ = moving
     x, y, cosine = three.z.real - lengths.b, three.z.imag, dot(at.u2, at.u3)

@@ -103,9 +103,7 @@ def direction_of_tangent(t: Number) -> Number:
 def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAngle:
     """Compute the half angle h of psi = theta_2 - theta_1 (rad), and the factors of Heron's formula.
 
-    Parameters
-    ----------
-    opposite : h of psi - pi, from the same tangent: there the ground is read from O4 to O2.
+    `opposite`: h of psi - pi, from the same tangent: there the ground is read from O4 to O2.
     """
     if (
         xp := namespace(psi)

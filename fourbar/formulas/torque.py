@@ -19,10 +19,7 @@ from fourbar.formulas.position import Position
 def inertia(a: Number, bodies: Bodies, at: Position, k: Coefficients) -> tuple[Number, Number]:
     """Equivalent inertia J = sum of m |dG/dq|^2 + I h_k^2 of bar 2, and of bars 3 and 4, kg m^2.
 
-    Parameters
-    ----------
-    a : length of the input, m.
-    bodies : of bars 2, 3, 4.
+    `a`: length of the input, m.
     """
     two, three, four = bodies
     G = (a * k.h2) * at.u2 + (three.z * k.h3) * at.u3

@@ -6,9 +6,8 @@ from typing import Any, NamedTuple
 
 from fourbar.errors import LimitError
 from fourbar.linkage import FIRST_PIN, MOVING_BARS
-from fourbar.mjcf.document import Start, find_start
+from fourbar.mjcf.document import NOTES, Start, find_start
 from fourbar.mjcf.model import require_carriable
-from fourbar.mjcf.notes import NOTES
 from fourbar.scene import Scene, require_input
 
 PARENT = {2: 1, 3: 2, 4: 1}

@@ -2,8 +2,8 @@
 
 import math
 
-from fourbar.formulas.mobility import choose_range
-from fourbar.linkage import BAR_NAMES, FourBar, uniform
+from fourbar.formulas.mobility import choose_range, turns_fully
+from fourbar.linkage import BAR_NAMES, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 
@@ -17,7 +17,10 @@ def make_scene(ground: float, input: float, coupler: float, output: float, omega
     """Uniform slender bars of 1 kg/m on the open branch, the input at omega (rad/s) from mid-range; lengths in m."""
     linkage = uniform(ground, input, coupler, output, per_metre=PER_METRE)
     title = f"four-bar {ground!r} {input!r} {coupler!r} {output!r}"
-    return Scene(linkage, Motion(_find_mid_range(linkage), omega), title=title)
+    # half a turn from the ground's line would start a parallelogram in its change point
+    quarter = linkage.ground_angle + math.pi / 2.0
+    start = quarter if turns_fully(linkage) else 0.5 * sum(choose_range(linkage))
+    return Scene(linkage, Motion(start, omega), title=title)
 
 
 def list_defaults(scene: Scene) -> list[str]:
@@ -33,14 +36,3 @@ def list_defaults(scene: Scene) -> list[str]:
         f"start: theta_2 = {theta_2!r} rad ({math.degrees(theta_2):.6g} deg)",
         "drive: bar 2; no gravity, no loads",
     ]
-
-
-def _find_mid_range(linkage: FourBar) -> float:
-    """Return the middle of the input's range; a quarter turn from the ground bar where it turns fully.
-
-    Half a turn would start a parallelogram in its change point.
-    """
-    least, most = choose_range(linkage)
-    if most - least >= 2.0 * math.pi * (1.0 - 1e-12):
-        return linkage.ground_angle + math.pi / 2.0
-    return 0.5 * (least + most)

@@ -1,26 +1,29 @@
 """Scene -> MJCF text: the closed loop, a drive at omega_2 and alpha_2, and a keyframe to start from."""
 
 import math
+import tomllib
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from importlib.resources import files
+from typing import Any, Literal, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from fourbar.effects.numbers import ROWS
-from fourbar.errors import InputError, LimitError, NotAssembledError
+from fourbar.errors import InputError, LimitError, NotAssembledError, clean_line
 from fourbar.formulas.mobility import change_points, choose_range
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.effects import find_row, unwind
 from fourbar.mjcf.model import Model, join, make_constant_motor, make_motor, make_servo, require_carriable
-from fourbar.mjcf.notes import NOTES
 from fourbar.mjcf.settings import FULL_TURN, RECIPE, Settings, WindowMotion, fit_pad
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command, require_input
 from fourbar.solution import Array
 from fourbar.solve import solve
 
+NOTES: dict[str, Any] = tomllib.loads(files("fourbar.mjcf").joinpath("notes.toml").read_text(encoding="utf-8"))
+"""What the model files say of themselves in comments: how they start, and where their numbers stand."""
 AT_REST = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""
 SETTLING = 2.0
@@ -61,7 +64,10 @@ def write_mjcf(
     LimitError : an effect or the motion has no counterpart in MJCF.
     NotAssembledError : the linkage closes at none of the scene's positions.
     """
-    _require_carried(scene)
+    require_input(scene, "the drive of an MJCF")
+    if scene.motion.law is not None:
+        raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
+    require_carriable(scene.linkage)
     cylinder = scene.drive
     if scene.motion.free is not None:
         drive, cylinder = "none", None
@@ -81,7 +87,7 @@ def write_mjcf(
     for term in (*scene.effects, *scene.loads):
         find_row(term).add(term, model)
     armature = size_flywheel(scene, settings)
-    root = ET.Element("mujoco", model=make_plain(scene.title) or "four-bar")
+    root = ET.Element("mujoco", model=clean_line(scene.title) or "four-bar")
     for line in _write_comments(scene, drive, reader):
         root.append(ET.Comment(f" {line} "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
@@ -103,14 +109,6 @@ def write_mjcf(
         ET.SubElement(frame, "key", name="start", qpos=join(*start.qpos), qvel=join(*start.qvel))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
-
-
-def _require_carried(scene: Scene) -> None:
-    """LimitError or InputError for what of a motion, a drive or a linkage MJCF does not carry."""
-    require_input(scene, "the drive of an MJCF")
-    if scene.motion.law is not None:
-        raise LimitError("a motion law has no counterpart in MJCF: its drive keeps omega_2 or alpha_2")
-    require_carriable(scene.linkage)
 
 
 def _write_comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
@@ -251,8 +249,3 @@ def _compute_span(linkage: FourBar) -> float:
     """Width of the range that the input can turn through, rad."""
     least, most = choose_range(linkage)
     return min(abs(most - least), 2.0 * math.pi)
-
-
-def make_plain(title: str) -> str:
-    """Return a title that XML can hold: every character that does not print becomes a blank."""
-    return "".join(character if character.isprintable() else " " for character in title).strip()

@@ -10,7 +10,7 @@ from fourbar.mjcf.model import Model
 from fourbar.scene import Scene
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Springs, Torsion, Viscous
+    from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Torsion, Viscous
 
 Joints = tuple[float, float, float]
 
@@ -69,16 +69,6 @@ def _unwind_torsion(effect: "Torsion", linkage: FourBar, q: Joints) -> Joints:
     return q2, q3, q4
 
 
-def _add_springs(effect: "Springs", model: Model) -> None:
-    """Add a spatial tendon between two sites, its rest length shortened by the preload."""
-    model.springs += effect.springs
-
-
-def _sum_tensions(effect: "Springs", linkage: FourBar, speed: float) -> float:
-    """Greatest tensions times the longest bar."""
-    return sum(spring.greatest_tension(linkage) for spring in effect.springs) * max(linkage.lengths)
-
-
 def _add_flywheel(effect: "Flywheel", model: Model) -> None:
     """Inertia of the body: MuJoCo's armature of pin O2 is what drives."""
     model.inertia[effect.bar] += effect.inertia
@@ -109,7 +99,10 @@ MJCF_OF: dict[str, MjcfForm] = {
     ),
     "friction": MjcfForm(_add_friction, lambda effect, linkage, speed: sum((f for _, f in effect.torques), 0.0)),
     "torsion": MjcfForm(_add_torsion, lambda effect, linkage, speed: effect.greatest_couple, _unwind_torsion),
-    "springs": MjcfForm(_add_springs, _sum_tensions),
+    "springs": MjcfForm(  # spatial tendons
+        lambda effect, model: model.springs.extend(effect.springs),
+        lambda effect, linkage, speed: sum(s.greatest_tension(linkage) for s in effect.springs) * max(linkage.lengths),
+    ),
     "flywheel": MjcfForm(_add_flywheel),
     "load": MjcfForm(_add_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
 }

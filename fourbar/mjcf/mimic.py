@@ -7,9 +7,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from fourbar.mjcf.document import find_start
+from fourbar.mjcf.document import NOTES, find_start
 from fourbar.mjcf.model import join
-from fourbar.mjcf.notes import NOTES
 from fourbar.scene import Scene
 
 STEPS = 2.0

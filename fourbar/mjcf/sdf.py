@@ -2,10 +2,10 @@
 
 from xml.etree import ElementTree as ET
 
-from fourbar.errors import LimitError
+from fourbar.errors import LimitError, clean_line
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.assembly import PARENT, assemble, write_comment
-from fourbar.mjcf.document import Start, make_plain
+from fourbar.mjcf.document import Start
 from fourbar.mjcf.model import join
 from fourbar.scene import Scene
 
@@ -22,7 +22,7 @@ def write_sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None, 
     Parameters
     ----------
     reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
-    start : the assembled state to stand in; None: that of `at_start`.
+    start : the assembled state to stand in; None: that of `find_start`.
     without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
 
     Raises
@@ -46,7 +46,7 @@ def write_sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None, 
         root.append(ET.Comment(f" {line} "))
     world = ET.SubElement(root, "world", name="four_bar")
     ET.SubElement(world, "gravity").text = join(*gravity, 0.0)
-    model = ET.SubElement(world, "model", name=make_plain(scene.title) or "four-bar")
+    model = ET.SubElement(world, "model", name=clean_line(scene.title) or "four-bar")
     _add_link(model, BAR_NAMES[1], 0j, 0.0, 1.0, 1.0, 0j)
     _add_joint(model, "ground_on_world", "fixed", "world", BAR_NAMES[1])
     for number in MOVING_BARS:

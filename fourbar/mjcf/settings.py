@@ -48,8 +48,6 @@ STIFF_PAD, SOFT_PAD = 1e-4, 2e-3
 QUICK = 1.0
 """rad/s^2. Newton stops where a pass moves the accelerations by less than 1e-15 rad/s^2 (mjMINVAL): below about
 this acceleration there is no second pass, and with stiff pads the forces of the first are wrong by up to 1e-3."""
-
-
 LIGHT = 100.0
 """A bar this many times lighter than the other that the closure joins makes the closure softer than loads do: 10 g
 and 1 g on 14.5 kg had the inertial torque 3e-5 and 3e-3 wrong, in proportion to the ratio. Pads follow it from here."""

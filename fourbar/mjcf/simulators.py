@@ -10,11 +10,8 @@ from fourbar.scene import Scene
 
 SINGLE = replace(RECIPE, flywheel=1e3, pad=None)
 """For single precision: there a flywheel of 1e8 and fitted pads lose the closing force entirely."""
-
 FAST = replace(RECIPE, time_constant_steps=2.0)
 """For a closure whose acceleration lacks a term: the quicker it yields, the sooner its error makes up for that."""
-
-
 SIMULATORS = {"mujoco": RECIPE, "warp": SINGLE, "mjx": FAST, "genesis": RECIPE, "newton": SINGLE}
 """Who reads the file, and the settings that carry the loop best there."""
 OWN_MOTORS = ("genesis", "newton")
@@ -24,9 +21,7 @@ OWN_MOTORS = ("genesis", "newton")
 def write_mjcf_for(scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel") -> str:
     """Write the MJCF text of a scene for one simulator, its comments naming where torque and pin force are read.
 
-    Raises
-    ------
-    InputError : no such simulator, or a motor for one that does not take it; else as `write_mjcf`.
+    Raises InputError for no such simulator, or a motor for one that does not take it, and as `write_mjcf` does.
     """
     if simulator not in SIMULATORS:
         raise InputError("simulator", simulator, f"must be one of {', '.join(SIMULATORS)}")

@@ -3,25 +3,17 @@
 import json
 import math
 
+from fourbar.errors import clean_line
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.assembly import PARENT, assemble, write_comment
-from fourbar.mjcf.document import Start, make_plain
+from fourbar.mjcf.document import Start
 from fourbar.scene import Scene
 
 
 def write_usd(scene: Scene, start: Start | None = None, *, without_loads: bool = False) -> str:
     """Write the USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
 
-    Parameters
-    ----------
-    start : the assembled state to stand in; None: that of `at_start`.
-    without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
-
-    Raises
-    ------
-    LimitError : a load, a motion law, or an effect but gravity and flywheel has no counterpart there.
-    InputError : a bar without mass or inertia, which simulators do not carry.
-    NotAssembledError : the linkage closes at none of the scene's positions.
+    Parameters and errors as of `write_sdf`; of the effects it has gravity and flywheel.
 
     Source: openusd.org, UsdPhysics.
     """
@@ -83,7 +75,7 @@ def PhysicsScene "physics"
 }}
 
 def Xform "four_bar" (
-    doc = {json.dumps(make_plain(scene.title) or "four-bar", ensure_ascii=False)}
+    doc = {json.dumps(clean_line(scene.title) or "four-bar", ensure_ascii=False)}
     prepend apiSchemas = ["PhysicsArticulationRootAPI"]
 )
 {{

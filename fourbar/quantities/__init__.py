@@ -122,7 +122,6 @@ OF_LINE = (*dict.fromkeys((*(q.name for q in QUANTITIES if q.group == "linear dr
 FORCES = (*PIN_FORCES, COUPLE.value, LINE.value, "power")
 OF_DRY_FRICTION = tuple(q.name for q in QUANTITIES if q.group == "dry friction")
 OF_PIN_LOADS = tuple(q.name for q in QUANTITIES if q.group == "pin loads")
-
 STATUS_NAMES = (
     *("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound"),
     *("no_torque", "overflow", "invalid", "no_lever"),

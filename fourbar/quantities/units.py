@@ -25,7 +25,6 @@ SWAPS = (
     {"lbf": "lb", "ozf": "oz", "kgf": "kg"},
 )
 """Names that stand for each other in ordinary speech; here a pound is a mass, and the angle is a dimension."""
-
 SIGNS = str.maketrans(
     {"⋅": "·", "×": "·", "•": "·", "″": " in", "”": " in", '"': " in", "′": " ft", "’": " ft", "'": " ft"}
 )

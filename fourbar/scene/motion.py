@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fourbar.errors import InputError, expect
-from fourbar.linkage import A_BRANCH, require, require_numbers, require_whole
+from fourbar.linkage import A_BRANCH, POSITIVE, require, require_numbers, require_whole
 from fourbar.scene.motion_law import COMMANDS, STEPS, Law, find_bar
 from fourbar.solution import Array
 
@@ -61,7 +61,7 @@ class Free:
     steps: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "duration", require("motion.free.duration", self.duration, "s", positive=True))
+        object.__setattr__(self, "duration", require("motion.free.duration", self.duration, "s", POSITIVE))
         object.__setattr__(self, "steps", require_whole("motion.free.steps", self.steps, *STEPS))
 
 

@@ -17,8 +17,6 @@ LEAST = {"free": 4, "rest": 2, "periodic": 3}
 MOST_POINTS = 100_000
 STEPS = (range(1, MOST_STEPS + 1), f"must be a whole number from 1 to {MOST_STEPS}")
 """Intervals of any motion."""
-
-
 COMMANDS = {bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS}
 """What commands a bar: its angle, speed and acceleration."""
 ANGLES = {bar: names[:1] for bar, names in COMMANDS.items()}

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 from fourbar.errors import InputError
-from fourbar.linkage import BAR_NAMES, require, require_whole
+from fourbar.linkage import BAR_NAMES, require_pair, require_whole
 from fourbar.quantities import UNITS
 
-LETTERS = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_")
 LONGEST_NAME = 40
 OF_POINTS = {"": "position", "v_": "velocity", "a_": "acceleration"}
 """What is evaluated of a point: the beginning of the quantity's name, and the stage."""
@@ -28,20 +27,15 @@ class Point:
     from_pin: tuple[float, float]
 
     def __post_init__(self) -> None:
-        plain = isinstance(self.name, str) and 0 < len(self.name) <= LONGEST_NAME and set(self.name) <= LETTERS
-        if not plain or self.name.startswith(("v_", "a_")) or self.name[0].isdigit():
+        plain = isinstance(self.name, str) and self.name.isascii() and self.name.isidentifier()
+        if not plain or self.name.startswith(("v_", "a_")) or len(self.name) > LONGEST_NAME:
             allowed = "must be a word of letters, digits and _, not beginning with a digit, v_ or a_"
             raise InputError("points", self.name, allowed)
         if {self.name, f"{self.name}_x", f"{self.name}_y"} & COLUMNS:
             raise InputError(self.key, self.name, "is the name of a quantity; a point needs another")
         bar = require_whole(f"{self.key}.bar", self.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
         object.__setattr__(self, "bar", bar)
-        try:
-            r, phi = self.from_pin
-        except (TypeError, ValueError):
-            raise InputError(f"{self.key}.from_pin", self.from_pin, "must be a pair (distance, angle)") from None
-        ends = tuple(require(f"{self.key}.from_pin", number, unit) for number, unit in ((r, "m"), (phi, "rad")))
-        object.__setattr__(self, "from_pin", ends)
+        object.__setattr__(self, "from_pin", require_pair(f"{self.key}.from_pin", self.from_pin, "m"))
 
     @property
     def key(self) -> str:

@@ -1,11 +1,12 @@
 """A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages requested."""
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.mobility import MARGIN, choose_range, find_limit_angles, follow_smooth_path
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
@@ -16,11 +17,11 @@ from fourbar.scene.tolerance import Tolerance
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, LinearDrive, Load
+    from fourbar.effects import LinearDrive, Load
     from fourbar.files.pictures import Picture
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Scene:
     """A linkage and everything that is stated about it; two that state the same are equal.
 
@@ -65,8 +66,6 @@ class Scene:
 
             object.__setattr__(self, "motion", replace(self.motion))
             object.__setattr__(self.motion, "bar", find_triangle(self.linkage, self.drive).bar)
-        from fourbar.effects.effect import Effect
-
         many = {"loads": Effect, "effects": Effect, "pictures": object, "points": Point, "tolerances": Tolerance}
         for name, each_kind in many.items():
             expect(name, getattr(self, name), tuple, list)
@@ -91,14 +90,6 @@ class Scene:
             raise InputError("drive.bar", self.drive_bar, "a drive acts on a bar or along a line: bar, or from and to")
         assert isinstance(drive, LinearDrive)
         drive.require_stroke(self.linkage)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Scene):
-            return NotImplemented
-        return all(getattr(self, each.name) == getattr(other, each.name) for each in fields(self))
-
-    def __hash__(self) -> int:
-        return hash((self.title, self.drive_bar, self.motion))
 
     @property
     def counts_turns(self) -> bool:
@@ -186,9 +177,7 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
 def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = None) -> Command:
     """Command what the scene's motion commands at other places: angles, strokes, or of a law times.
 
-    Parameters
-    ----------
-    branch : at each of them; left out: the scene's, which may follow its smooth path.
+    `branch`: at each of them; left out: the scene's, which may follow its smooth path.
     """
     motion, bar, time, lever = scene.motion, scene.motion.bar, None, None
     angle = places

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from fourbar.effects.numbers import find_unit
 from fourbar.errors import InputError, expect
-from fourbar.linkage import require
+from fourbar.linkage import POSITIVE, require
 
 THREE_SIGMA = 3.0
 """What counts as the width of a normal distribution in a worst case."""
@@ -32,7 +32,7 @@ class Tolerance:
         unit = find_unit(self.key)
         if unit is None and isinstance(self.width, str):
             raise InputError(f"tolerances.{self.key}", self.width, "unknown key")
-        object.__setattr__(self, "width", require(f"tolerances.{self.key}", self.width, unit or "1", positive=True))
+        object.__setattr__(self, "width", require(f"tolerances.{self.key}", self.width, unit or "1", POSITIVE))
         expect(f"tolerances.{self.key}", self.sigma, bool)
 
     @property

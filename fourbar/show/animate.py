@@ -32,7 +32,6 @@ def write(
     path: str | Path,
     *,
     pictures: Mapping[str, str | Path] | None = None,
-    file_format: str | None = None,
     seconds: float | None = None,
     units: Conversion = SI,
     vectors: bool = False,
@@ -45,7 +44,6 @@ def write(
     pictures : for bars "input", "coupler", "output", in place of the scene's own: a PNG or JPEG file
         that is laid along the bar, its left edge at the bar's first pin (O2, A, O4) and its right
         edge at the second. Pages only.
-    file_format : html, gif or mp4 where the path's ending does not say it.
     units : in which numbers are shown; left out: SI. Angles are in degrees.
     vectors : with arrows of velocity and acceleration at the points; a page can show and hide them.
     seconds : duration of a film; left out: 6 s for a sweep, of a motion through time its own.
@@ -56,7 +54,7 @@ def write(
     NotAssembledError : the linkage assembles at none of the scene's positions.
     DependencyError : a film without matplotlib, or MP4 without ffmpeg.
     """
-    target, kind = Path(path), format_of(path, file_format, FORMATS)
+    target, kind = Path(path), format_of(path, FORMATS)
     if kind == "html":
         write_text(target, write_page(scene, pictures or {}, units, vectors))
         return

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.linkage import PINS
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import COUPLE, LINE, PIN_FORCES
 from fourbar.scene import Scene, command_at
 from fourbar.show.duty import read_drive
 from fourbar.solution import Array, Solution
@@ -37,7 +37,7 @@ class Between(NamedTuple):
     reversals: list[tuple[float, str]]
     """Commanded angle or stroke, rad or m, and the pin at which dry friction reverses there: the pin forces jump."""
     growing: set[str]
-    """Those of `list_sizes` that grow without bound within a step."""
+    """Those of `list_sizes` that grow without bound within a step; all where nothing was looked for between."""
 
 
 def list_sizes(solution: Solution) -> dict[str, Array]:
@@ -48,18 +48,16 @@ def list_sizes(solution: Solution) -> dict[str, Array]:
     return {**{name: np.abs(getattr(solution, key)) for name, key in drive.items()}, **forces}
 
 
-def locate_between(scene: Scene, solution: Solution) -> Between | None:
+def locate_between(scene: Scene, solution: Solution) -> Between:
     """Locate what the steps of a sweep, or of a motion law, pass over: by `solve`, at ever finer positions.
 
-    None where nothing stands between the positions: of a released motion, a list of angles, positions alone.
+    Nothing stands between the positions of a released motion, of a list of angles, or where they alone are known.
 
-    Parameters
-    ----------
-    solution : of the scene's positions, or of its sweep in rising order, to the stage "force".
+    `solution`: of the scene's positions, or of its sweep in rising order, to the stage "force".
     """
     motion = scene.motion
     if motion.free is not None or isinstance(motion.angle, np.ndarray) or solution.F12 is None or len(solution) < 2:
-        return None
+        return Between(solution, [], {COUPLE.value, LINE.value, *PIN_FORCES})
 
     def at(places: Array, branch: Branch, stage: str = "force") -> Solution:
         return solve(scene, stage, at=command_at(scene, places, branch))

@@ -252,7 +252,7 @@ def _compute_rms(values: Array) -> float:
     return _make_plain(np.sqrt(_reduce_known(np.nanmean, np.square(values))))  # type: ignore[no-any-return]
 
 
-def write_motor(solution: Solution, units: Conversion, located: Solution | None = None) -> dict[str, Any] | None:
+def write_motor(solution: Solution, units: Conversion, located: Solution) -> dict[str, Any] | None:
     """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
     duty = motor_duty(solution, located)
     if duty is None:
@@ -263,11 +263,10 @@ def write_motor(solution: Solution, units: Conversion, located: Solution | None 
         number = getattr(duty, name)
         entry[name] = None if number is None else number * find_unit_in(unit, units)[1]
     force, angle = find_unit_in("N", units)[1], find_unit_in("rad", units)[1]
-    loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
-    peaks = loads if located is None else {pin: bearing_load(located, pin) for pin in PIN_FORCE}
+    loads = {pin: (bearing_load(located, pin), bearing_load(solution, pin).rms) for pin in PIN_FORCE}
     entry["pins"] = {
-        pin: {"peak": peaks[pin].largest * force, "rms": load.rms * force, "theta_2": peaks[pin].where * angle}
-        for pin, load in loads.items()
+        pin: {"peak": peak.largest * force, "rms": rms * force, "theta_2": peak.where * angle}
+        for pin, (peak, rms) in loads.items()
     }
     entry["units"] = {name: find_unit_in(unit, units)[0] for name, unit in own.items()}
     return entry

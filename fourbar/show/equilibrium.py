@@ -1,6 +1,5 @@
 """What `fourbar equilibrium` prints: where the linkage stays by itself, and what holds it elsewhere."""
 
-import json
 import math
 from typing import Any
 
@@ -9,9 +8,10 @@ import numpy as np
 from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.duty import read_drive
-from fourbar.show.tables import MOST_ROWS, make_plain_table, write_table
+from fourbar.show.tables import MOST_ROWS, make_plain_table, write_cells, write_table
 from fourbar.studies.circuit_curve import RestPosition
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
+from fourbar.writing import write_object
 
 SCHEMA = "fourbar-equilibrium/1"
 MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
@@ -53,17 +53,12 @@ def _write_holding(found: Equilibria) -> tuple[list[str], Any]:
     drive = read_drive(at)
     values, low, high = drive.values, getattr(at, drive.keys.low), getattr(at, drive.keys.high)
     assert values is not None
-    index = range(0, len(at), -(-len(at) // MOST_ROWS))
     heads, columns = ["theta_2 (deg)", f"{drive.name} ({drive.unit})"], [np.degrees(at.theta_2), values]
     if low is not None and high is not None:
         heads, columns = [heads[0], f"from ({drive.unit})", f"to ({drive.unit})"], [columns[0], low, high]
-    rows = [
-        [
-            *(_write_number(column[i]) for column in columns),
-            MOVES[int(found.moves[i])] if at.status_code[i] not in (NOT_ASSEMBLED, SINGULAR) else at.status[i],
-        ]
-        for i in index
-    ]
+    still = np.isin(at.status_code, (NOT_ASSEMBLED, SINGULAR))
+    released = [status if no else MOVES[move] for status, no, move in zip(at.status, still, found.moves, strict=True)]
+    rows = list(zip(*map(write_cells, columns), released, strict=True))[:: -(-len(at) // MOST_ROWS)]
     on = "" if at.drive is not None else f" on bar {at.drive_bar}"
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
     if np.isfinite(values).any():
@@ -94,48 +89,22 @@ def _write_degrees(angle: float) -> str:
     return f"{math.degrees(angle):.4f}"
 
 
-def _null_infinite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _list_finite_parts(of: Any) -> dict[str, Any]:
-    return {name: _null_infinite(value) for name, value in of._asdict().items()}
-
-
-def _write_number(value: float) -> str:
-    return f"{value:.6g}" if math.isfinite(value) else "-"
-
-
 def write_json(title: str, found: Equilibria) -> str:
     """One object, SI and rad."""
-
-    def ends(of: tuple[RestPosition, RestPosition] | None) -> Any:
-        return None if of is None else [_list_finite_parts(place) for place in of]
-
-    def column(values: Any) -> Any:
-        return None if values is None else [*map(_null_infinite, values.tolist())]
-
     at, keys = found.positions, read_drive(found.positions).keys
-    document = {
-        "schema": SCHEMA,
-        "title": title,
-        "proven": found.proven,
-        "equilibria": [
-            {
-                **_list_finite_parts(each),
-                **{"place": _list_finite_parts(each.place), "held": ends(each.held)},
-            }
-            for each in found.found
-        ],
-        "indifferent": [ends(each) for each in found.indifferent],
-        "held": [ends(each) for each in found.held],
-        "not_decided": [_list_finite_parts(place) for place in found.not_decided],
-        "positions": {
+    return write_object(
+        SCHEMA,
+        title=title,
+        proven=found.proven,
+        equilibria=found.found,
+        indifferent=found.indifferent,
+        held=found.held,
+        not_decided=found.not_decided,
+        positions={
             "drive_bar": at.drive_bar,
-            "status": list(at.status),
-            "branch": at.branch.tolist(),
-            **{name: column(getattr(at, name)) for name in ("theta_2", keys.value, keys.low, keys.high)},
-            "moves": found.moves.tolist(),
+            "status": at.status,
+            "branch": at.branch,
+            **{name: getattr(at, name) for name in ("theta_2", keys.value, keys.low, keys.high)},
+            "moves": found.moves,
         },
-    }
-    return json.dumps(document, allow_nan=False) + "\n"
+    )

@@ -1,12 +1,12 @@
 """What `fourbar extremes` prints: each enclosure with its angle, and over what it holds."""
 
-import json
 from typing import TYPE_CHECKING, Any
 
 from fourbar.scene import Scene
 from fourbar.show.tables import make_plain_table, write_value
 from fourbar.solution import DEGREES, Conversion, find_unit, find_unit_in
 from fourbar.studies.enclosure import PROVEN, Extremes
+from fourbar.writing import write_object
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -57,19 +57,18 @@ def write_json(scene: Scene, found: Extremes) -> str:
     """One object, SI and rad."""
 
     def rows(of: Extremes) -> dict[str, Any]:
-        return {name: {"least": of.least[name]._asdict(), "greatest": of.greatest[name]._asdict()} for name in of.least}
+        return {name: {"least": of.least[name], "greatest": of.greatest[name]} for name in of.least}
 
-    document = {
-        "schema": SCHEMA,
-        "title": scene.title,
-        "theta_2": found.parts,
-        "distance_from_poles": found.distance,
-        "boxes": found.boxes,
-        "extremes": rows(found),
-        "nominal": None if found.nominal is None else rows(found.nominal),
-        "over_estimate": {
-            name: {"least": found.over_estimate(name, -1), "greatest": found.over_estimate(name, 1)}
+    return write_object(
+        SCHEMA,
+        title=scene.title,
+        theta_2=found.parts,
+        distance_from_poles=found.distance,
+        boxes=found.boxes,
+        extremes=rows(found),
+        nominal=None if found.nominal is None else rows(found.nominal),
+        over_estimate={
+            name: {word: found.over_estimate(name, sign) for word, sign in (("least", -1), ("greatest", 1))}
             for name in found.least
         },
-    }
-    return json.dumps(document, allow_nan=False) + "\n"
+    )

@@ -3,39 +3,21 @@
 A table and one JSON object of it are what `fourbar analyze --sensitivity` prints.
 """
 
-import json
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES
 from fourbar.show.tables import make_plain_table
-from fourbar.solution import find_unit, null_nan
+from fourbar.solution import find_unit
 from fourbar.studies.derivatives import Sensitivity
+from fourbar.writing import write_object
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 SCHEMA = "fourbar-sensitivity/1"
-HUNDREDTH, DEGREE = 0.01, math.radians(1.0)
-
-
-class Influence(NamedTuple):
-    """Of one number on one quantity, where it is largest."""
-
-    key: str
-    change: float
-    """In the quantity's unit, signed; of a vector that is no force the length of its change."""
-    theta_2: float
-    """rad."""
-
-
-def choose_step(found: Sensitivity, key: str) -> float:
-    """Choose the change of a number that the influences are for: 1 % of it, of an angle 1 deg."""
-    if found.keys[key].unit == "rad":
-        return DEGREE
-    return HUNDREDTH * abs(float(found.numbers[list(found.keys).index(key)]))
 
 
 def list_shown(found: Sensitivity) -> list[str]:
@@ -43,22 +25,6 @@ def list_shown(found: Sensitivity) -> list[str]:
     own = [point.name for point in found.scene.points]
     drive = [name for name in (COUPLE.value, LINE.value) if name in found.by]
     return [*((*drive, *PIN_FORCES) if drive else ("theta_3", "theta_4")), *own]
-
-
-def list_influences(found: Sensitivity, quantity: str) -> list[Influence]:
-    """Of every number on a quantity, the largest first; those without any are left out."""
-    value, rows = found.value(quantity), []
-    for key in found.keys:
-        change = choose_step(found, key) * found.of(quantity, key)
-        if quantity in PIN_FORCES:  # of the magnitude
-            with np.errstate(all="ignore"):
-                change = np.sum(value * change, axis=-1) / np.hypot(*value.T)
-        elif change.ndim == 2:
-            change = np.hypot(*change.T)
-        if np.isfinite(change).any():
-            worst = int(np.nanargmax(np.abs(change)))
-            rows.append(Influence(key, float(change[worst]), float(found.solution.theta_2[worst])))
-    return sorted((row for row in rows if row.change != 0.0), key=lambda row: -abs(row.change))
 
 
 def find_largest(found: Sensitivity, quantity: str) -> float:
@@ -71,10 +37,10 @@ def find_largest(found: Sensitivity, quantity: str) -> float:
 def write_heading(found: Sensitivity) -> list[str]:
     """Write the lines above the table."""
     lines = [
-        "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude",
+        "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude"
     ]
     for name in list_shown(found):
-        own = list_influences(found, name)
+        own = found.influences(name)
         angles = [row for row in own if found.keys[row.key].unit == "rad"]
         most = [rows[0] for rows in ([row for row in own if row not in angles], angles) if rows]
         if most:
@@ -90,7 +56,7 @@ def write_heading(found: Sensitivity) -> list[str]:
 def make_table(found: Sensitivity) -> "Table":
     """List a row for each number that matters, those first that change any quantity most against its largest value."""
     names = list_shown(found)
-    by = {name: {row.key: row.change for row in list_influences(found, name)} for name in names}
+    by = {name: {row.key: row.change for row in found.influences(name)} for name in names}
     rows = [["largest value", *(f"{find_largest(found, name):.4g}" for name in names)]]
     rows += [[key, *(f"{by[name].get(key, 0.0):.3g}" for name in names)] for key in rank_numbers(found, names)]
     return make_plain_table(["", *(f"{name}\n{find_unit(name)}" for name in names)], rows, left=("",))
@@ -101,26 +67,22 @@ def rank_numbers(found: Sensitivity, names: list[str]) -> list[str]:
     share: dict[str, float] = {}
     for name in names:
         size = find_largest(found, name)
-        for row in list_influences(found, name):
+        for row in found.influences(name):
             share[row.key] = max(share.get(row.key, 0.0), abs(row.change) / size if size > 0.0 else 0.0)
     return sorted(share, key=lambda key: -share[key])
 
 
 def write_json(found: Sensitivity) -> str:
     """One object, SI and rad: d(quantity)/d(key) over the positions, vectors as [x, y], null where there is none."""
-    document: dict[str, Any] = {
-        "schema": SCHEMA,
-        "title": found.solution.title,
-        "drive_bar": found.solution.drive_bar,
-        "status": found.status,
-        "theta_2": found.solution.theta_2.tolist(),
-        "keys": {
-            key: {"value": None if math.isnan(number) else number, "unit": entry.unit}
+    return write_object(
+        SCHEMA,
+        title=found.solution.title,
+        drive_bar=found.solution.drive_bar,
+        status=found.status,
+        theta_2=found.solution.theta_2,
+        keys={
+            key: {"value": number, "unit": entry.unit}
             for (key, entry), number in zip(found.keys.items(), found.numbers.tolist(), strict=True)
         },
-        "by": {
-            name: {key: null_nan(row) for key, row in zip(found.keys, rows, strict=True)}
-            for name, rows in found.by.items()
-        },
-    }
-    return json.dumps(document, allow_nan=False) + "\n"
+        by={name: dict(zip(found.keys, rows, strict=True)) for name, rows in found.by.items()},
+    )

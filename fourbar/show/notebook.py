@@ -1,21 +1,18 @@
 """How a scene and a solution show themselves in a notebook, and a solution as a table of pandas."""
 
 from html import escape
-from typing import TYPE_CHECKING
 
 from fourbar.errors import FourBarError, expect
 from fourbar.linkage import BAR_NAMES
+from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.solution import DEGREES, SI, Conversion, Solution
-
-if TYPE_CHECKING:
-    from fourbar.scene import Scene
 
 SHOWN = 5
 """Positions shown at either end of a long sweep."""
 
 
-def show_scene(scene: "Scene", units: Conversion = SI) -> str:
+def show_scene(scene: Scene, units: Conversion = SI) -> str:
     """Draw the linkage, next to what the scene states."""
     from fourbar.show.drawing import draw_scene
     from fourbar.solve import solve
@@ -35,7 +32,7 @@ def show_scene(scene: "Scene", units: Conversion = SI) -> str:
     )
 
 
-def _list_facts(scene: "Scene", units: Conversion) -> list[tuple[str, str]]:
+def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
     from fourbar.formulas.linkage_type import classify
     from fourbar.show.duty import describe_drive
     from fourbar.show.tables import write_value
@@ -86,8 +83,7 @@ def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
 class InUnits:
     """A scene or a solution that a notebook shows in other units."""
 
-    def __init__(self, shown: "Scene | Solution", units: str) -> None:
-        from fourbar.scene import Scene
+    def __init__(self, shown: Scene | Solution, units: str) -> None:
         from fourbar.show.units import units as units_of
 
         expect("shown", shown, Scene, Solution)

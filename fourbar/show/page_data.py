@@ -16,11 +16,12 @@ from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.show.acting import Symbol, list_acting
 from fourbar.show.duty import compute_energies
-from fourbar.show.plot.style import choose_length_unit
+from fourbar.show.plot.style import choose_unit
 from fourbar.show.plot.view import is_over_time, list_sweep, set_branch
 from fourbar.show.tolerances import collect_tolerances
-from fourbar.solution import SI, Array, Conversion, Solution, null_nan
+from fourbar.solution import SI, Array, Conversion, Solution
 from fourbar.solve import solve
+from fourbar.writing import null_nan
 
 MAX_ROWS = 1441
 """Positions embedded in a page: a quarter of a degree over a full turn; a finer sweep is thinned out evenly."""
@@ -55,10 +56,7 @@ def collect_live_data(
 ) -> dict[str, Any]:
     """Collect what the page's script draws, columns as arrays, without tolerances, pictures and the file.
 
-    Parameters
-    ----------
-    signs : the branches of a sweep; left out: the scene's.
-    stage : the last one evaluated; left out: as of `solve`.
+    `signs`: the branches of a sweep; left out: the scene's. `stage`: the last one evaluated; left out: as of `solve`.
     """
     linkage, motion = scene.linkage, scene.motion
     shown = (
@@ -70,7 +68,7 @@ def collect_live_data(
     if not closes.any():
         raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
     shown["start"] = int(closes.argmax()) if shown["start"] is None else shown["start"]
-    factor, unit = choose_length_unit(max(linkage.lengths), units)
+    factor, unit = choose_unit(max(linkage.lengths), "m", units)
     return {
         "lengths": list(linkage.lengths),
         "theta_1": linkage.ground_angle,

@@ -1,19 +1,7 @@
 """What takes minutes shows that it is running."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TypeVar
-
-T = TypeVar("T")
-
-
-def count_items(items: Sequence[T], text: str) -> Iterable[T]:
-    """Pass the items on, with a bar on standard error that says how many are done; no bar where that is no terminal."""
-    from rich.console import Console
-    from rich.progress import track
-
-    console = Console(stderr=True)
-    return track(items, text, console=console, transient=True, disable=not console.is_terminal)
 
 
 @contextmanager

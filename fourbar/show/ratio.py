@@ -1,13 +1,12 @@
 """What `fourbar ratio` prints: the loop as a gear, and what polynomials in its place miss."""
 
-import json
 import math
-from typing import Any
 
 import numpy as np
 
-from fourbar.show.tables import make_plain_table, write_table
+from fourbar.show.tables import make_plain_table, write_cells, write_table
 from fourbar.studies.ratio import Fit, GearRatio
+from fourbar.writing import write_object
 
 SCHEMA = "fourbar-ratio/1"
 ROWS = 36
@@ -17,9 +16,7 @@ ROWS = 36
 def write_tables(title: str, found: GearRatio) -> str:
     """Write both tables, and the numbers to copy."""
     columns = (np.degrees(found.theta_2), found.omega_ratio, found.torque_ratio, found.reflected_inertia)
-    rows = [
-        [_write_number(of[i]) for of in columns] for i in range(0, len(columns[0]), max(1, len(columns[0]) // ROWS))
-    ]
+    rows = list(zip(*map(write_cells, columns), strict=True))[:: max(1, len(found.theta_2) // ROWS)]
     heads = ("theta_2 (deg)", "omega_4/omega_2", "torque on 4 by that on 2", "reflected inertia (kg m^2)")
     text = write_table(title, [], make_plain_table(heads, rows))
     most = float(np.abs(found.torque).max())
@@ -59,18 +56,6 @@ def _write_elements(fits: tuple[Fit, ...]) -> list[str]:
     ]
 
 
-def _write_number(value: float) -> str:
-    return f"{value:.6g}" if math.isfinite(value) else "-"
-
-
 def write_json(title: str, found: GearRatio) -> str:
     """One object, SI and rad."""
-
-    def fit(each: Fit) -> dict[str, Any]:
-        errors = {name: getattr(each, name)._asdict() for name in ("angle", "speed", "torque")}
-        return {**each._asdict(), **errors}
-
-    arrays = ("theta_2", "omega_ratio", "torque_ratio", "reflected_inertia", "torque")
-    columns = {name: [x if math.isfinite(x) else None for x in getattr(found, name).tolist()] for name in arrays}
-    document = {"schema": SCHEMA, "title": title, **columns, "fits": [fit(each) for each in found.fits]}
-    return json.dumps(document, allow_nan=False) + "\n"
+    return write_object(SCHEMA, title=title, **found._asdict())

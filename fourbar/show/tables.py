@@ -23,8 +23,6 @@ MOST_DIGITS = 16
 """Of a double."""
 GAP = 2
 """Blanks between two columns of the table, the divider among them."""
-
-
 MOST_ROWS = 40
 """Rows of the table on a terminal where --every does not state them: they and the summary can be read at a glance."""
 STEPS = (1, 2, 5, 10, 15, 20, 30, 45, 60, 90)
@@ -121,19 +119,19 @@ def write_heading(scene: Scene, solution: Solution, units: Conversion = DEGREES)
             f"t = {solution.stopped_at:.6g} s, where bars 3 and 4 are in line"
         )
     of_drive = read_drive(solution)
-    if scene.motion.speed is None and of_drive.values is None and _is_acted_on(scene):
+    acted_on = scene.loads or scene.effects or any(bar.mass > 0.0 for bar in scene.linkage.moving)
+    if scene.motion.speed is None and of_drive.values is None and acted_on:
         lines.append(f"positions only, since {omega} is left out; {static(scene)}")
     found = locate_between(scene, solution)
-    if found is not None and found.reversals:
+    if found.reversals:
         unit = UNITS[solution.commanded]
         where = ", ".join(f"{write_value(place, unit, units)} ({pin})" for place, pin in found.reversals)
         lines.append(f"dry friction reverses, and the pin forces jump, at {solution.commanded} = {where}")
     if scene.motion.free is None and of_drive.values is not None and np.isfinite(of_drive.values).any():
-        peak = solution if found is None else found.solution
-        values = read_drive(peak).values
+        values = read_drive(found.solution).values
         assert values is not None
         worst = int(np.nanargmax(np.abs(values)))
-        where = write_value(peak.theta_2[worst], "rad", units)
+        where = write_value(found.solution.theta_2[worst], "rad", units)
         most = f"largest {of_drive.name}{_remark_grid(solution, found, of_drive.keys.value)}"
         lines.append(f"{most} {write_value(values[worst], of_drive.unit, units)} at theta_2 = {where}")
         if solution.stroke is not None:
@@ -142,28 +140,22 @@ def write_heading(scene: Scene, solution: Solution, units: Conversion = DEGREES)
         lines += _warn(scene, solution, units)
         lines += _write_motor(solution, units, found)
     if solution.F12 is not None and np.isfinite(solution.F12).any():
-        loads = {pin: bearing_load(solution, pin) for pin in PIN_FORCE}
-        peaks = loads if found is None else {pin: bearing_load(found.solution, pin) for pin in PIN_FORCE}
-        parts = [
-            f"{pin} {write_value(x.largest, 'N', units)} at {write_value(x.where, 'rad', units)}"
-            for pin, x in peaks.items()
-        ]
-        rms = [f"{pin} {write_value(load.rms, 'N', units)}" for pin, load in loads.items()]
+        peaks = ((pin, bearing_load(found.solution, pin)) for pin in PIN_FORCE)
+        parts = [f"{p} {write_value(x.largest, 'N', units)} at {write_value(x.where, 'rad', units)}" for p, x in peaks]
+        rms = [f"{pin} {write_value(bearing_load(solution, pin).rms, 'N', units)}" for pin in PIN_FORCE]
         most = f"largest pin loads{_remark_grid(solution, found, *PIN_FORCES)}"
         lines += [f"{most}: " + ", ".join(parts), "RMS pin loads: " + ", ".join(rms)]
     return lines
 
 
-def _remark_grid(solution: Solution, found: Between | None, *names: str) -> str:
+def _remark_grid(solution: Solution, found: Between, *names: str) -> str:
     """Say that a largest value is that of the positions alone, where between them there may be a larger one."""
-    if len(solution) == 1 or (found is not None and not found.growing.intersection(names)):
-        return ""
-    return " of these positions"
+    return " of these positions" if len(solution) > 1 and found.growing.intersection(names) else ""
 
 
-def _write_motor(solution: Solution, units: Conversion, found: Between | None) -> list[str]:
+def _write_motor(solution: Solution, units: Conversion, found: Between) -> list[str]:
     """Write what the drive delivers, for the choice of a motor."""
-    duty = motor_duty(solution, None if found is None else found.solution)
+    duty = motor_duty(solution, found.solution)
     if duty is None or len(solution) == 1:
         return []
     rms = f"RMS torque {write_value(duty.rms_torque, 'N m', units)}" if duty.rms_torque is not None else ""
@@ -184,11 +176,6 @@ def static(scene: Scene) -> str:
     """Say what asks for forces where a scene states positions alone."""
     unit, what = ("rad/s", "torque") if scene.motion.stroke is None else ("m/s", "force")
     return f'{scene.motion.names[1]} = "0 {unit}" gives the static {what} and pin forces'
-
-
-def _is_acted_on(scene: Scene) -> bool:
-    """Whether anything in the scene would need a torque."""
-    return bool(scene.loads or scene.effects or any(bar.mass > 0.0 for bar in scene.linkage.moving))
 
 
 def write_value(number: float, unit: str, units: Conversion) -> str:
@@ -235,7 +222,7 @@ def list_columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, l
     def add(name: str, unit: str, values: Array | None) -> None:
         assert values is not None
         label, factor = find_unit_in(unit, units)
-        shown[f"{name}\n{label}"] = _write_cells(values * factor, ".4f" if unit == "rad" else ".6g")
+        shown[f"{name}\n{label}"] = write_cells(values * factor, ".4f" if unit == "rad" else ".6g")
 
     if solution.time is not None:
         add("time", "s", solution.time)
@@ -257,7 +244,7 @@ def list_columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, l
     for name in ("stroke", "stroke_speed", *(f"{kind}_{bar}" for kind in ("omega", "alpha") for bar in sought)):
         if getattr(solution, name) is not None:
             add(name, UNITS[name], getattr(solution, name))
-    shown["sin mu\n"] = _write_cells(solution.sin_mu)
+    shown["sin mu\n"] = write_cells(solution.sin_mu)
     if solution.time is None and drive.values is not None and drive.error is not None:
         shown[f"digits\nof {drive.symbol[0]}"] = _count_digits(drive.values, drive.error)
     return shown
@@ -286,7 +273,7 @@ def make_table(
     return make_plain_table(kept, rows[::every] + last, gap=GAP - 1), left_out
 
 
-def _write_cells(values: Array, form: str = ".6g") -> list[str]:
+def write_cells(values: Array, form: str = ".6g") -> list[str]:
     """Six digits, or another form; a dash where there is no value."""
     return [format(value, form) if math.isfinite(value) else "-" for value in values.tolist()]
 
@@ -296,4 +283,4 @@ def _count_digits(torque: Array, error: Array) -> list[str]:
     with np.errstate(all="ignore"):
         digits = np.clip(np.floor(np.log10(np.abs(torque) / error)), 0, MOST_DIGITS)
     known = np.isfinite(torque) & np.isfinite(error)
-    return _write_cells(np.where(known, np.where(error == 0.0, MOST_DIGITS, digits), np.nan))
+    return write_cells(np.where(known, np.where(error == 0.0, MOST_DIGITS, digits), np.nan))

@@ -1,6 +1,5 @@
 """What `fourbar tolerance` prints: a table where the spread is largest, and one JSON object."""
 
-import json
 import math
 from contextlib import nullcontext
 from dataclasses import replace
@@ -13,8 +12,9 @@ from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS
 from fourbar.scene import Scene
 from fourbar.show.progress import show_running
 from fourbar.show.tables import make_plain_table
-from fourbar.solution import DEGREES, Array, Conversion, find_unit_in, null_nan
+from fourbar.solution import DEGREES, Array, Conversion, find_unit_in
 from fourbar.studies.spread import BAND, PARTED, Spread, Tolerances, tolerances
+from fourbar.writing import write_object
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -157,27 +157,27 @@ def collect_tolerances(scene: Scene, places: list[float]) -> dict[str, Any]:
 
 def write_json(found: Tolerances) -> str:
     """One object, SI and rad; arrays over the positions, null where there is no value."""
-    keys = [tolerance.key for tolerance in found.scene.tolerances]
-    rows: dict[str, Any] = {}
-    for part, spread in found.spreads.items():
-        own: dict[str, Any] = {name: null_nan(array) for name, array in spread._asdict().items() if name != "shares"}
-        own["first_order"] = null_nan(spread.first_order)
-        own["shares"] = {key: null_nan(share) for key, share in zip(keys, spread.shares, strict=True)}
-        own["parted"] = spread.parted.tolist()
-        rows[part] = own
-    document = {
-        "schema": SCHEMA,
-        "title": found.scene.title,
-        "samples": found.samples,
-        "seed": found.seed,
-        "tolerances": {
-            each.key: {"width": each.width, "distribution": "normal" if each.sigma else "uniform"}
-            for each in found.scene.tolerances
+    stated = found.scene.tolerances
+    keys = [each.key for each in stated]
+    return write_object(
+        SCHEMA,
+        title=found.scene.title,
+        samples=found.samples,
+        seed=found.seed,
+        tolerances={
+            each.key: {"width": each.width, "distribution": "normal" if each.sigma else "uniform"} for each in stated
         },
-        "apart": found.apart,
-        "invalid": found.invalid,
-        "theta_2": found.theta_2.tolist(),
-        "without_value": found.without.tolist(),
-        "quantities": rows,
-    }
-    return json.dumps(document, allow_nan=False) + "\n"
+        apart=found.apart,
+        invalid=found.invalid,
+        theta_2=found.theta_2,
+        without_value=found.without,
+        quantities={
+            part: {
+                **{name: array for name, array in spread._asdict().items() if name != "shares"},
+                "first_order": spread.first_order,
+                "shares": dict(zip(keys, spread.shares, strict=True)),
+                "parted": spread.parted,
+            }
+            for part, spread in found.spreads.items()
+        },
+    )

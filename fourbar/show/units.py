@@ -1,18 +1,14 @@
 """The units in which results are shown: a list such as "mm N N.mm deg", or "imperial"."""
 
 from fourbar.errors import InputError
-from fourbar.quantities.units import find_factor, to_si
+from fourbar.quantities.units import UnitError, to_si
 from fourbar.solution import SI, Conversion
 
 ALLOWED = 'must be "SI", "imperial" or a list like "mm N N.mm deg rpm"'
 PRESETS = {"si": "", "imperial": "in lbf lbf.in lb deg rpm hp"}
 STATED = ("m", "N", "N m", "kg", "rad", "rad/s", "rad/s^2", "m/s", "m/s^2", "W")
 """The SI units for which another one can be stated, each of a dimension of its own."""
-DERIVED = {
-    "m/s": ("m", "{}/s"),
-    "m/s^2": ("m", "{}/s^2"),
-    "J": ("N m", "{}"),
-}
+DERIVED = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", "{}")}
 """Not stated, these follow another one: energy the unit of torque, speeds that of length."""
 
 
@@ -44,7 +40,7 @@ def units(text: str) -> Conversion:
 def _explain_refusal(name: str, unit: str) -> str:
     """Why a name is no unit for another one; empty where it is."""
     try:
-        find_factor(unit, name)
-    except InputError as error:
-        return error.allowed.rpartition("; must convert")[0].replace('"1 ', '"')
+        to_si(f"1 {name}", unit)
+    except UnitError as error:
+        return str(error).replace('"1 ', '"')
     return ""

@@ -1,6 +1,5 @@
 """In words, what a linkage can do whatever drives it: swings, limit positions, change points, transmission."""
 
-import json
 import math
 from collections.abc import Iterator
 
@@ -10,6 +9,7 @@ from fourbar.formulas.mobility import change_points, limit_positions, swing, tim
 from fourbar.formulas.transmission import transmission_extremes
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
 from fourbar.scene.motion import BRANCH_NAMES
+from fourbar.writing import write_object
 
 BRANCHES = {**BRANCH_NAMES, 0: "both"}
 
@@ -28,25 +28,19 @@ def write_type(linkage: FourBar, unit: str = " m") -> Iterator[str]:
 
 def write_type_json(linkage: FourBar) -> str:
     """Write the type as JSON: SI and radians, null where there is nothing; positions as `LimitPosition` has them."""
-    found = classify(linkage)
-    document: dict[str, object] = {
-        "schema": "fourbar-classify/1",
-        "lengths": dict(zip(BAR_NAMES.values(), linkage.lengths, strict=True)),
-        **found._asdict(),
-    }
+    found, more = classify(linkage), dict[str, object]()
     if found.barker is not None:
         transmission = transmission_extremes(linkage)
-        document |= {
+        more = {
             "swing": {BAR_NAMES[bar]: swing(linkage, bar) for bar in MOVING_BARS},
-            "limit_positions": {
-                BAR_NAMES[bar]: [limit._asdict() for limit in limit_positions(linkage, bar)] for bar in MOVING_BARS
-            },
+            "limit_positions": {BAR_NAMES[bar]: limit_positions(linkage, bar) for bar in MOVING_BARS},
             "change_points": change_points(linkage),
-            "circuits": [circuit._asdict() for circuit in circuits(linkage)],
+            "circuits": circuits(linkage),
             "transmission": {**transmission._asdict(), "worst": transmission.worst},
             "time_ratio": time_ratio(linkage),
         }
-    return json.dumps(document, allow_nan=False)
+    lengths = dict(zip(BAR_NAMES.values(), linkage.lengths, strict=True))
+    return write_object("fourbar-classify/1", lengths=lengths, **found._asdict(), **more)
 
 
 def write_mobility(linkage: FourBar) -> Iterator[str]:

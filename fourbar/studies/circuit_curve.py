@@ -16,10 +16,10 @@ from fourbar.formulas.motion import State
 from fourbar.formulas.position import loop
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Sweep
+from fourbar.solution import Array
 from fourbar.solve import solve
 from fourbar.studies.sloped import Sloped
 
-Array = NDArray[np.float64]
 SAMPLES = 3600
 """Positions of a whole branch that are looked at for friction, and for zeros where they cannot be proven."""
 NOTHING = 1e-11

@@ -1,8 +1,9 @@
 """Sensitivities: the derivative of every quantity by every number of a scene, from the formulas as they stand."""
 
+import math
 from collections.abc import KeysView
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +36,20 @@ if TYPE_CHECKING:
 
 AT_ONCE = 512
 """Positions: each number is then as many rows as the scene has numbers, and stays in the cache."""
+HUNDREDTH, DEGREE = 0.01, math.radians(1.0)
+"""By which a number, or an angle, is changed where its influence is told."""
 AT_REST = "at_rest"
 """Status where dry friction holds a pin at rest: its couple, and all that hangs on it, jumps with the motion."""
+
+
+class Influence(NamedTuple):
+    """Of a hundredth of one number, or of a degree, on one quantity, where it is largest."""
+
+    key: str
+    change: float
+    """In the quantity's unit, signed; of a vector that is no force the length of its change."""
+    theta_2: float
+    """rad."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,13 +98,12 @@ class Sensitivity:
         Raises DependencyError where pandas is not installed.
         """
         n = len(self.status)
-        slopes_of = {part: array for name, rows in self.by.items() for part, array in split_parts(name, rows).items()}
-        columns = {part: rows.ravel() for part, rows in slopes_of.items() if not part.startswith("|")}
-        size = {f"|{name}|": np.ravel([self.of(f"|{name}|", key) for key in self.keys]) for name in PIN_FORCES
-                if name in self.by}  # fmt: skip
+        every = (part for name in self.by for part in split_parts(name, self.value(name)))
+        parts = sorted(every, key=lambda part: part[0] == "|")  # magnitudes last
+        columns = {part: np.ravel([self.of(part, key) for key in self.keys]) for part in parts}
         first = {"key": np.repeat(list(self.keys), n), "theta_2": np.tile(self.solution.theta_2, len(self.keys)),
                  "status": self.status * len(self.keys)}  # fmt: skip
-        return make_data_frame(first | columns | size)
+        return make_data_frame(first | columns)
 
     def _find_whole(self, quantity: str) -> str:
         """Return the quantity of which one is asked, or a component or the magnitude; InputError for any other."""
@@ -101,18 +113,28 @@ class Sensitivity:
                     return name
         raise InputError("sensitivity", quantity, "is not known here; known: " + ", ".join(self.by))
 
+    def influences(self, quantity: str) -> list[Influence]:
+        """List what the numbers change a quantity by, a pin force in its magnitude, the largest first."""
+        value, rows = self.value(quantity), []
+        for (key, entry), number in zip(self.keys.items(), self.numbers.tolist(), strict=True):
+            change = (DEGREE if entry.unit == "rad" else HUNDREDTH * abs(number)) * self.of(quantity, key)
+            if quantity in PIN_FORCES:
+                with np.errstate(all="ignore"):
+                    change = np.sum(value * change, axis=-1) / np.hypot(*value.T)
+            elif change.ndim == 2:
+                change = np.hypot(*change.T)
+            if np.isfinite(change).any():
+                worst = int(np.nanargmax(np.abs(change)))
+                rows.append(Influence(key, float(change[worst]), float(self.solution.theta_2[worst])))
+        return sorted((row for row in rows if row.change != 0.0), key=lambda row: -abs(row.change))
+
     def _list_rows(self) -> list[tuple[str, str, str]]:
-        """By quantity the numbers that change it most, by 1 % of themselves, angles by 1 deg, and that change."""
+        """By quantity its values and the numbers that change it most."""
         rows = []
-        names = [*(name for name in ("torque", "theta_3", "theta_4") if name in self.by), *PIN_FORCES]
-        for part in [f"|{name}|" if name in PIN_FORCES else name for name in names if name in self.by]:
-            changes = {}
-            for (key, entry), number in zip(self.keys.items(), self.numbers, strict=True):
-                own = np.abs(self.of(part, key))
-                step = np.radians(1.0) if entry.unit == "rad" else 0.01 * abs(number)
-                changes[key] = step * np.max(own[np.isfinite(own)], initial=0.0)
-            most = sorted((key for key in changes if changes[key] > 0.0), key=lambda key: -changes[key])[:3]
-            rows.append((part, write_between(self.value(part)), ", ".join(f"{key} {changes[key]:.3g}" for key in most)))
+        for name in (name for name in ("torque", "theta_3", "theta_4", *PIN_FORCES) if name in self.by):
+            part = f"|{name}|" if name in PIN_FORCES else name
+            most = ", ".join(f"{row.key} {abs(row.change):.3g}" for row in self.influences(name)[:3])
+            rows.append((part, write_between(self.value(part)), most))
         return rows
 
     def _title(self) -> str:
@@ -153,7 +175,9 @@ def sensitivity(scene: Scene) -> Sensitivity:
         raise InputError(theta, scene.motion.angle, "has no sensitivities: the limit moves with the lengths")
     at, solution, known = command(scene), solve(scene), list_entries(scene)
     moving = at.speed is not None
-    known = {key: entry for key, entry in known.items() if moving or _is_of_position(key)}
+    if not moving:  # positions depend on these alone
+        of_positions = ("lengths", "points", "drive")
+        known = {key: own for key, own in known.items() if key.startswith(of_positions) or ".centre." in key}
     keys = {theta: SceneNumber((), OF_SCENE[scene.motion.names[0]])} | known
     most = np.nan if at.stroke is None else float(at.stroke.max())
     numbers = [most if key == theta else read_place(scene, entry.place) for key, entry in keys.items()]
@@ -187,11 +211,6 @@ def sensitivity(scene: Scene) -> Sensitivity:
     for name in set(forces) & set(names):
         by[name][:, status != STATUS_NAMES[OK]] = np.nan
     return Sensitivity(scene, solution, keys, np.array(numbers, dtype=float), status.tolist(), by)
-
-
-def _is_of_position(key: str) -> bool:
-    """Whether positions depend on a number; the rest comes in with the motion."""
-    return key.startswith(("lengths", "points", "drive")) or ".centre." in key
 
 
 class _Directed(Gravity):

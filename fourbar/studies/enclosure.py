@@ -163,9 +163,7 @@ class _Search:
     def evaluate(self, theta_2: Balls, moved: Any) -> dict[str, Sloped]:
         """Compute the quantities, the pin forces and the sine of the transmission angle squared, with their slopes.
 
-        Parameters
-        ----------
-        moved : None: over the tolerances; else what each number is off by, in parts of its tolerance, (k, n).
+        `moved`: None: over the tolerances; else what each number is off by, in parts of its tolerance, (k, n).
         """
         self.boxes += len(theta_2)
         numbers = {

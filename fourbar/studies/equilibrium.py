@@ -25,16 +25,9 @@ from fourbar.formulas.torque import inertia
 from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import DEFAULT_STEPS
-from fourbar.solution import Solution
+from fourbar.solution import Array, Solution
 from fourbar.solve import solve
-from fourbar.studies.circuit_curve import (
-    SAMPLES,
-    Array,
-    CircuitCurve,
-    RestPosition,
-    compute_generalised_force,
-    of_input,
-)
+from fourbar.studies.circuit_curve import SAMPLES, CircuitCurve, RestPosition, compute_generalised_force, of_input
 from fourbar.studies.derivatives import make_differentiable
 from fourbar.studies.holding import HALVINGS, CircuitRange, holds, is_inside, list_ranges, moves
 from fourbar.studies.interval import KNOWN
@@ -182,9 +175,7 @@ def _prove_zeros(curve: CircuitCurve, idle: Array) -> Zeros | None:
     Between two change points, where signs of psi and mu tell the ways of moving apart, Q may be zero throughout: a load
     on a bar that rests in one of them. There none is looked for.
 
-    Parameters
-    ----------
-    idle : samples in which Q is nothing.
+    `idle`: samples in which Q is nothing.
     """
     try:
         from flint import arb, ctx

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import JAMMED
-from fourbar.studies.circuit_curve import NOTHING, SAMPLES, Array, CircuitCurve, RestPosition
+from fourbar.solution import Array
+from fourbar.studies.circuit_curve import NOTHING, SAMPLES, CircuitCurve, RestPosition
 
 HALVINGS = 60
 """Of the distance between two samples: to its last digits."""

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fourbar.effects.numbers import ANY, AT_LEAST_ZERO, OF_EFFECT, POSITIVE, ROWS, find_unit
+from fourbar.effects.numbers import OF_EFFECT, ROWS, find_unit
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import namespace, polar
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
+from fourbar.linkage import ANY, AT_LEAST_ZERO, BAR_NAMES, MOVING_BARS, POSITIVE, Bar
 from fourbar.scene import Scene
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")

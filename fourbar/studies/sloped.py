@@ -137,8 +137,10 @@ class Sloped(NDArrayOperatorsMixin):
         if function is np.conjugate:
             return self.conjugate()
         plain = [take_values(x) for x in given]
-        if self.values.dtype == object:
-            plain = [_make_complex_ball(x) if isinstance(x, complex) else x for x in plain]
+        if self.values.dtype == object and any(isinstance(x, complex) for x in plain):
+            from flint import acb  # balls accept no complex number of Python's
+
+            plain = [acb(x) if isinstance(x, complex) else x for x in plain]
         if function is np.absolute:
             size = np.absolute(plain[0])
             along = conjugate(plain[0]) / size
@@ -159,13 +161,6 @@ class Sloped(NDArrayOperatorsMixin):
 
 def _find_by_name(function: Any, args: Sequence[Any], options: Any) -> Any:
     return NotImplemented if function not in FUNCTIONS or options else FUNCTIONS[function](*args)
-
-
-def _make_complex_ball(z: complex) -> Any:
-    """Make a complex constant for numbers that are balls, which accept none of Python's."""
-    from flint import acb
-
-    return acb(z)
 
 
 def take_values(number: Any) -> Any:
@@ -205,13 +200,9 @@ def _choose_where(mask: Any, x: Any, y: Any) -> Sloped:
     return Sloped(np.where(mask, take_values(x), take_values(y)), np.where(mask, take_slopes(x), take_slopes(y)))
 
 
-def _angle(z: Any) -> Any:
-    return np.arctan2(z.imag, z.real)
-
-
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: _choose_where,
-    np.angle: _angle,
+    np.angle: lambda z: np.arctan2(z.imag, z.real),
     np.searchsorted: lambda points, x, side: np.searchsorted(points, x.values, side),
     np.any: lambda x: bool(x.differs(0.0).any()),
     np.shape: lambda x: x.shape,

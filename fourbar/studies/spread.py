@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.quantities import NOT_ASSEMBLED, PIN_FORCES
-from fourbar.scene import Scene, command
+from fourbar.scene import Command, Scene, command
 from fourbar.solution import Array, find_values, split_parts
 from fourbar.solve import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
@@ -158,9 +158,8 @@ def tolerances(
     without, gone = np.zeros(n, dtype=np.intp), np.zeros(len(study), dtype=bool)
     nominal_closes = found.solution.status_code != NOT_ASSEMBLED
     for columns, extra in _list_blocks(study, scene, samples, nominal_closes):
-        own = replace(
-            study, at=study.at._replace(**{name: _take_piece(x, extra) for name, x in study.at._asdict().items()})
-        )
+        pieces: Any = (x[:, extra] if isinstance(x, np.ndarray) and x.size > len(x) else x for x in study.at)
+        own = replace(study, at=Command(*pieces))
         width = columns.stop - columns.start
         solution = solve(own)
         code = solution.status_code[:, -width:]
@@ -211,10 +210,6 @@ def _list_blocks(
     for start in range(0, n, size):
         columns = slice(start, min(start + size, n))
         yield columns, np.array([*begins, *range(columns.start, columns.stop)])
-
-
-def _take_piece(value: Any, index: NDArray[np.intp]) -> Any:
-    return value[:, index] if np.ndim(value) == 2 and value.shape[1] > 1 else value
 
 
 def _compute_first_order(found: Sensitivity, part: str) -> Spread:

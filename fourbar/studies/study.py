@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects.effect import Effect
 from fourbar.effects.numbers import find_unit
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.blocks import choose_block_size, choose_evaluation, evaluate_parts, is_compiled, keep
@@ -23,9 +24,6 @@ from fourbar.solution import Array, Solution
 from fourbar.solve import find_requested, make_arrays, make_solution, unwrap_angles
 from fourbar.studies.keys import COMMAND_KEYS, command_key, list_entries, refuse_key, replace_numbers, replace_place
 from fourbar.writing import describe_extent, list_names
-
-if TYPE_CHECKING:
-    from fourbar.effects import Effect
 
 LENGTHS = tuple(f"lengths.{name}" for name in ("ground", "input", "coupler", "output", "ground_angle"))
 NEAR_A_CHANGE_POINT = 1e-12
@@ -132,7 +130,7 @@ class Study:
         return scene
 
 
-def _find_turns(effects: "Iterable[Effect]") -> dict[int, Any]:
+def _find_turns(effects: Iterable[Effect]) -> dict[int, Any]:
     """Of the effects that know where the motion begins, by their index: the whole turns of each of their pins."""
     found = {index: getattr(effect, "turns", None) for index, effect in enumerate(effects)}
     return {index: turns for index, turns in found.items() if turns is not None}

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from fourbar.formulas.closed_curve import closure
 from fourbar.formulas.position import Loop
+from fourbar.solution import Array
 from fourbar.studies.sloped import Sloped
 
-Array = NDArray[np.float64]
 PI = math.pi
 FIRST = 24
 """Boxes to begin with, to a side."""

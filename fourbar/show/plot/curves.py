@@ -23,7 +23,6 @@ from fourbar.show.plot.style import (
     INK,
     MUTED,
     choose_force_line,
-    choose_length_unit,
     choose_unit,
     find_greatest,
     place_legend,
@@ -234,7 +233,7 @@ def draw_power(axes: "Axes", view: View) -> None:
 def draw_stroke(axes: "Axes", view: View) -> None:
     """Draw the stroke of a linear drive."""
     over = draw_axes(axes, view)
-    factor, unit = choose_length_unit(max(view.scene.linkage.lengths), view.units)
+    factor, unit = choose_unit(max(view.scene.linkage.lengths), "m", view.units)
     axes.plot(over, factor * view.sweep.stroke, color=INK)  # type: ignore[operator]
     axes.set(ylabel=f"stroke ({unit})", title="Stroke of the drive")
 

@@ -9,22 +9,14 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import require
+from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.show.between import locate_between
 from fourbar.show.plot import curves, freebody, hodograph, linkage, studies
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.style import (
-    CAPTION,
-    FORCE_COLOURS,
-    TITLE,
-    apply_style,
-    format_of,
-    render_figure,
-    save,
-    shorten_text,
-)
+from fourbar.show.plot.style import CAPTION, TITLE, apply_style, format_of, render_figure, save, shorten_text
 from fourbar.show.plot.transmission import draw_transmission
-from fourbar.show.plot.view import View, choose_common_position, is_over_time, make_view, set_branch, where_in_words
+from fourbar.show.plot.view import View, choose_common_position, is_over_time, make_view, set_branch
 from fourbar.show.tables import static
 from fourbar.solution import SI, Conversion, require_units
 
@@ -65,7 +57,6 @@ def _draw_overview(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 
 def _draw_kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    del labels
     panels = figure.subplots(3 if shown.moves else 1, 1, squeeze=False)[:, 0]
     painters: tuple[Any, ...] = (curves.draw_angles, curves.draw_velocities, curves.draw_accelerations)
     for axes, paint in zip(panels, painters, strict=False):
@@ -85,18 +76,9 @@ def _draw_single(paint: Callable[[Any, View], None]) -> Painter:
 
 
 def _draw_hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    del labels
     panels = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
-    for axes, name in zip(panels, FORCE_COLOURS, strict=True):
-        hodograph.draw_hodograph(axes, shown, (name,))
-
-
-def _draw_free_bodies(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    here = shown.here
-    if not np.isfinite(here.F12).all():  # type: ignore[arg-type]
-        where = where_in_words(here)
-        raise InputError("figure", "freebody", f"needs forces, which have no value at {where}: {here.status[0]}")
-    freebody.draw_free_bodies(figure, shown, labels)
+    for axes, name in zip(panels, PIN_FORCES, strict=True):
+        hodograph.draw_hodograph(axes, shown, name)
 
 
 FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
@@ -111,7 +93,7 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "hodograph": (_draw_hodographs, (6.4, 6.6), True),
     "energy": (_draw_single(curves.draw_energy), (5.6, 3.2), True),
     "transmission": (_draw_single(draw_transmission), (5.6, 3.2), False),
-    "freebody": (_draw_free_bodies, (9.6, 4.6), True),
+    "freebody": (freebody.draw_free_bodies, (9.6, 4.6), True),
     "sensitivity": (studies.draw_influences, (9.6, 3.6), True),
 }
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
@@ -146,10 +128,10 @@ class Drawing:
         with apply_style():
             return render_figure(self.figure, "svg").decode("utf-8")
 
-    def save(self, path: str | Path, file_format: str | None = None) -> None:
+    def save(self, path: str | Path) -> None:
         """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
         with apply_style():
-            kind = format_of(path, file_format)
+            kind = format_of(path)
             save(self.figure, Path(path), kind)
 
 
@@ -180,8 +162,7 @@ def draw_figure(
 
 def _look_between(shown: View) -> None:
     """Add what stands between the positions of the sweep: jumps are drawn where they are, peaks to their height."""
-    if (found := locate_between(shown.scene, shown.sweep)) is None:
-        return
+    found = locate_between(shown.scene, shown.sweep)
     shown.sweep = found.solution
     if found.reversals:
         axis = shown.axis
@@ -191,21 +172,10 @@ def _look_between(shown: View) -> None:
         )
 
 
-def draw(
-    scene: Scene, path: str | Path, figure: str = "overview", *, file_format: str | None = None, **options: Any
-) -> None:
-    """Draw a figure of a scene into a file, whole or not at all; the same scene gives the same bytes.
-
-    Parameters
-    ----------
-    path : the file; its ending says which of svg, png and pdf is meant.
-    file_format : svg, png or pdf where the path's ending does not say it.
-    figure, options : those of `draw_figure`.
-
-    Raises as `draw_figure` does, and InputError for another format.
-    """
-    format_of(path, file_format)
-    draw_figure(scene, figure, **options).save(path, file_format)
+def draw(scene: Scene, path: str | Path, figure: str = "overview", **options: Any) -> None:
+    """Draw a figure of a scene, as `draw_figure` does, into a file; the same scene gives the same bytes."""
+    format_of(path)
+    draw_figure(scene, figure, **options).save(path)
 
 
 def _compose(painter: Painter, size: tuple[float, float], views: list[View]) -> "Figure":

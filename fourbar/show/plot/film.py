@@ -17,7 +17,7 @@ from fourbar.show.plot.linkage import draw_paths, write_path_legend
 from fourbar.show.plot.mechanism import draw_mechanism, scale_of
 from fourbar.show.plot.style import TITLE, apply_style, shorten_text
 from fourbar.show.plot.view import View, make_view
-from fourbar.show.progress import count_items
+from fourbar.show.progress import show_running
 from fourbar.solution import SI, Conversion
 from fourbar.writing import write_bytes
 
@@ -28,8 +28,6 @@ FRAMES_PER_SECOND = 25
 MAX_FRAMES = 1500
 SIZE = (6.4, 5.6)
 DPI = 100
-
-
 SWEEP_SECONDS = 6.0
 """Of a film of a sweep, where nothing else is stated."""
 WINDOW = 24
@@ -56,14 +54,7 @@ def write_film(
 ) -> None:
     """One sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
 
-    Parameters
-    ----------
-    seconds : length of the film; None: 6 s for a sweep, of a motion through time its own duration.
-    moving : with arrows of velocity and acceleration at the points.
-
-    Raises
-    ------
-    DependencyError : matplotlib or, for MP4, ffmpeg with its H.264 encoder is missing.
+    Raises DependencyError where matplotlib or, for MP4, ffmpeg with its H.264 encoder is missing.
     """
     if seconds is not None and not (math.isfinite(seconds) and 0.0 < seconds * FRAMES_PER_SECOND <= MAX_FRAMES):
         raise InputError("seconds", seconds, f"must be more than 0 and at most {MAX_FRAMES // FRAMES_PER_SECOND}")
@@ -89,10 +80,12 @@ def write_film(
         with tempfile.TemporaryDirectory() as folder:
             draft = Path(folder) / f"film.{kind}"
             try:
-                with writer.saving(figure, str(draft), DPI):
-                    for index in count_items(order, f"{len(order)} frames"):
+                with writer.saving(figure, str(draft), DPI), show_running(f"{len(order)} frames are drawn") as progress:
+                    for done, index in enumerate(order):
                         move(index)
                         writer.grab_frame()
+                        if progress is not None:
+                            progress(done / len(order))
             except (subprocess.CalledProcessError, BrokenPipeError):
                 raise DependencyError("this ffmpeg cannot encode H.264 (libx264); .gif and .html need none") from None
             write_bytes(path, draft.read_bytes())

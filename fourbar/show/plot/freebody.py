@@ -2,15 +2,18 @@
 
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import list_bodies
-from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE
+from fourbar.effects.actions import Actions, list_bodies
+from fourbar.errors import InputError
+from fourbar.formulas.arithmetic import Number
+from fourbar.formulas.motion import State
+from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE, PINS
+from fourbar.scene import Scene
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.mechanism import draw_mass_centre, draw_plate, pin_name
@@ -26,7 +29,7 @@ from fourbar.show.plot.style import (
     write_quantity,
 )
 from fourbar.show.plot.symbols import place_of, split_components
-from fourbar.show.plot.view import Recorder, View, take_one
+from fourbar.show.plot.view import View, where_in_words
 from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
@@ -73,10 +76,9 @@ def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
         arrows.append(Arrow(write_force_name(shown), where[pin] - where[FIRST_PIN[bar]], force, FORCE_COLOURS[name]))
     if view.scene.drive_bar == bar and view.scene.motion.free is None:
         couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))  # type: ignore[index]
-    for text, recorder in _collect_actions(view):
-        name = text.replace("#", str(bar))
-        arrows += [Arrow(name, arm, force, INK) for b, force, arm in recorder.arrows if b == bar]
-        couples += [Couple(name, m) for b, m in recorder.turns if b == bar]
+    recorder = _record_actions(view)
+    arrows += recorder.arrows[bar]
+    couples += recorder.turns[bar]
     described = view.scene.linkage.bar(bar)
     inertia = -described.mass * complex(*getattr(view.here, f"a_G{bar}")[0])
     arrows.append(Arrow(rf"$-m_{bar}\,a_{{G{bar}}}$", take_one(described.to_centre * turned), inertia, INK, True))
@@ -86,27 +88,58 @@ def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
     return [a for a in arrows if a.force != 0.0], [c for c in couples if c.moment != 0.0]
 
 
-def _collect_actions(view: View) -> Iterator[tuple[str, Recorder]]:
-    """Collect loads and effects, each with what it puts on the bars."""
-    state = view.state()
-    if view.scene.drive is not None and view.scene.motion.free is None:
-        recorder = Recorder(view.scene, state)
-        view.scene.drive.act(recorder, view.here.drive_force)
-        yield "$F$", recorder
-    for count, load in enumerate(view.scene.loads, start=1):
-        recorder = Recorder(view.scene, state)
+class Recorder(Actions):
+    """Forces and couples that are kept one by one, under the name of what exerts them."""
+
+    name = ""
+
+    def __init__(self, scene: Scene, state: State) -> None:
+        super().__init__(state, list_bodies(scene.linkage))
+        self.arrows: dict[int, list[Arrow]] = {bar: [] for bar in BAR_NAMES}
+        self.turns: dict[int, list[Couple]] = {bar: [] for bar in BAR_NAMES}
+
+    def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
+        """Add a force on a bar, applied at `arm` from the bar's first pin."""
+        self.arrows[bar].append(Arrow(self.name.replace("#", str(bar)), take_one(arm), take_one(force), INK))
+
+    def moment(self, bar: int, moment: Number) -> None:
+        """Add a pure couple on a bar."""
+        self.turns[bar].append(Couple(self.name.replace("#", str(bar)), take_one(moment).real))
+
+    def couple(self, pin: str, couple: Number) -> None:
+        """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first."""
+        first, second = PINS[pin]
+        self.moment(second, couple)
+        self.moment(first, -couple)
+
+
+def take_one(vector: Any) -> complex:
+    """Return the one complex number of an array, at the position drawn."""
+    return complex(np.ravel(vector)[0])
+
+
+def _record_actions(view: View) -> Recorder:
+    """Record what the drive along a line, loads and effects put on the bars."""
+    scene, state = view.scene, view.state()
+    recorder = Recorder(scene, state)
+    if scene.drive is not None and scene.motion.free is None:
+        recorder.name = "$F$"
+        scene.drive.act(recorder, view.here.drive_force)
+    for count, load in enumerate(scene.loads, start=1):
+        recorder.name = f"load {count}"
         load.act(recorder, state)
-        yield f"load {count}", recorder
-    for effect in view.scene.effects:
-        recorder = Recorder(view.scene, state)
+    for effect in scene.effects:
+        recorder.name = r"$m_#\,g$" if effect.key == "gravity" else effect.key.replace("_", " ")
         effect.act(recorder, state)
         effect.act_known(recorder, {name: getattr(view.here, name) for name in PIN_FORCE.values()})
-        name = r"$m_#\,g$" if effect.key == "gravity" else effect.key.replace("_", " ")
-        yield name, recorder
+    return recorder
 
 
 def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     """Draw the three bars, each freed from its pins, with arrows to one scale, over the couples."""
+    if not np.isfinite(view.here.F12).all():  # type: ignore[arg-type]
+        reason = f"needs forces, which have no value at {where_in_words(view.here)}: {view.here.status[0]}"
+        raise InputError("figure", "freebody", reason)
     freed = [(v, bar, *list_actions(v, bar)) for v in view.alike for bar in MOVING_BARS]  # those of this view first
     panels, below = figure.subplots(2, 3, height_ratios=[PANEL, LINE * max(len(couples) for *_, couples in freed)])
     biggest = max((abs(arrow.force) for *_, arrows, _ in freed for arrow in arrows), default=0.0)
@@ -135,14 +168,7 @@ def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
 
 
 def _draw_one(
-    axes: "Axes",
-    view: View,
-    bar: int,
-    arrows: list[Arrow],
-    scale: float,
-    biggest: float,
-    labels: Labels,
-    span: float,
+    axes: "Axes", view: View, bar: int, arrows: list[Arrow], scale: float, biggest: float, labels: Labels, span: float
 ) -> None:
     where = place_of(view.scene.linkage, view.here, 0, 1.0).pins
     along = where[ENDS[bar][1]] - where[ENDS[bar][0]]
@@ -157,7 +183,8 @@ def _draw_one(
     for arrow in arrows:
         size = abs(arrow.force)
         if size < SHOWN * biggest:
-            short.append(f"{_write_plainly(arrow.text)} = {write_quantity(size, 'N', view.units)}")
+            plain = re.sub(r"[$_{}]", "", arrow.text.replace("\\,", " ")).replace("-", "−")
+            short.append(f"{plain} = {write_quantity(size, 'N', view.units)}")
             continue
         draw_plate(axes, bar, (0.0j, arrow.at, along), labels)
         foot, tip = split_components(arrow.at), split_components(arrow.at + scale * arrow.force)
@@ -192,11 +219,6 @@ def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
     axes.set_axis_off()
     look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45, "color": INK if lines else MUTED}
     axes.text(0.0, 1.0, "\n".join(lines) or "no couples", transform=axes.transAxes, **look)
-
-
-def _write_plainly(text: str) -> str:
-    """Write a typeset name in plain letters, for the caption."""
-    return re.sub(r"[$_{}]", "", text.replace("\\,", " ")).replace("-", "−")
 
 
 def _scale_bar(axes: "Axes", scale: float, biggest: float, units: Conversion) -> None:

@@ -96,7 +96,8 @@ class Labels:
             away = math.atan2(y - sy, x - sx) if (x, y) != (sx, sy) else math.pi / 2
             dots = np.concatenate(samples[id(axes)]) if id(axes) in samples else np.empty((0, 3))
             boxes = [box for owner, box in taken if owner is axes]
-            centre = _choose_spot((x, y), away, half, dots, boxes, per_point, label.dots_clear, _find_panel(axes))
+            panel = axes.get_window_extent().extents
+            centre = _choose_spot((x, y), away, half, dots, boxes, per_point, label.dots_clear, panel)
             taken.append((axes, (centre[0] - half[0], centre[1] - half[1], centre[0] + half[0], centre[1] + half[1])))
             to_data = axes.transData.inverted().transform
             text.set_position(tuple(to_data(centre)))
@@ -104,12 +105,6 @@ class Labels:
             if math.dist(edge, (x, y)) > (LED + label.dots_clear) * per_point:
                 look: dict[str, Any] = {"scalex": False, "scaley": False}  # what was measured stays
                 axes.plot(*zip(label.at, to_data(edge), strict=True), color=label.colour, lw=0.5, zorder=8.5, **look)
-
-
-def _find_panel(axes: "Axes") -> Box:
-    """Return the panel in pixels."""
-    box = axes.get_window_extent()
-    return (box.x0, box.y0, box.x1, box.y1)
 
 
 STEP, MARK = 3.0, 4.5
@@ -131,14 +126,7 @@ def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
 
 
 def _choose_spot(
-    at: Point,
-    away: float,
-    half: Point,
-    dots: np.ndarray,
-    boxes: list[Box],
-    per_point: float,
-    mark: float,
-    inside: Box,
+    at: Point, away: float, half: Point, dots: np.ndarray, boxes: list[Box], per_point: float, mark: float, inside: Box
 ) -> Point:
     """Choose the centre of the label: the candidate that covers least, the nearest and most outward first."""
     best, best_cost, edge = at, math.inf, 0.5 * per_point * dots[:, 2]

@@ -9,16 +9,8 @@ import numpy as np
 
 from fourbar.linkage import ENDS
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.mechanism import (
-    POINT,
-    draw_mechanism,
-    draw_support,
-    locate_pins,
-    pin_name,
-    scale_of,
-    write_bar_name,
-)
-from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN
+from fourbar.show.plot.mechanism import draw_mechanism, draw_support, locate_pins, pin_name, scale_of, write_bar_name
+from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, POINT
 from fourbar.show.plot.symbols import draw_vectors
 from fourbar.show.plot.view import View
 from fourbar.solution import Array

@@ -10,7 +10,7 @@ from fourbar.linkage import ENDS, MOVING_BARS
 from fourbar.show.acting import list_acting
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, choose_length_unit, find_greatest, write_quantity
+from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, POINT, choose_unit, find_greatest, write_quantity
 from fourbar.show.plot.symbols import Place, place_of, split_components
 from fourbar.show.plot.view import View
 from fourbar.solution import Solution
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 Point = tuple[float, float]
-POINT = "#8A3B78"
-"""Of the scene's own points."""
 ON_BAR = 1e-3
 """Of a bar's length: a point that lies nearer to its line is on it, as far as can be seen."""
 
@@ -149,7 +147,7 @@ def scale_of(view: View) -> tuple[float, str, float]:
     most = max(
         find_greatest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(locate_pins(v).values()))) for v in view.alike
     )
-    factor, unit = choose_length_unit(most, view.units)
+    factor, unit = choose_unit(most, "m", view.units)
     sweep = view.sweep
     reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(locate_pins(view).values())])
     return factor, unit, 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.scene import command
-from fourbar.show.influence import find_largest, list_influences, list_shown, rank_numbers
+from fourbar.show.influence import find_largest, list_shown, rank_numbers
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
     CAPTION,
@@ -133,13 +133,12 @@ def _draw_shares(axes: "Axes", found: Tolerances, part: str, units: Conversion) 
 
 def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
     """One panel for each quantity over the same rows."""
-    del labels
     found = sensitivity(shown.scene)
     names = list_shown(found)[:MOST_PANELS]
     keys = rank_numbers(found, names)[:MOST_NUMBERS][::-1]
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, name in zip(panels, names, strict=True):
-        changes = {row.key: abs(row.change) for row in list_influences(found, name)}
+        changes = {row.key: abs(row.change) for row in found.influences(name)}
         sizes = np.array([changes.get(key, 0.0) for key in keys])
         factor, unit = choose_unit(sizes.max(initial=0.0), find_unit(name))
         axes.barh(range(len(keys)), factor * sizes, height=0.62, color=FORCE_COLOURS.get(name, INK))

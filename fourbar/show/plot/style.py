@@ -2,7 +2,6 @@
 
 import io
 import math
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, expect, say_install
+from fourbar.errors import DependencyError, InputError, clean_line, expect, say_install
 from fourbar.quantities import PIN_FORCES
 from fourbar.solution import SI, Array, Conversion, find_unit_in
 from fourbar.writing import write_bytes
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK, MUTED, FAINT = "#1a1a1a", "#6b6b6b", "#d9d9d9"
+POINT = "#8A3B78"
+"""Of the scene's own points."""
 # Okabe and Ito's palette: distinguished by colour-blind readers, and by lightness and dashes in grey
 BAR_COLOURS = {2: "#0072B2", 3: "#D55E00", 4: "#007A5A"}
 BAR_DASHES: dict[int, Any] = {2: "-", 3: (0, (5, 1.6)), 4: (0, (7, 1.6, 1.4, 1.6))}
@@ -70,11 +71,10 @@ def apply_style() -> Iterator[None]:
         yield
 
 
-def format_of(path: str | Path, file_format: str | None = None, formats: tuple[str, ...] = FORMATS) -> str:
-    """Return the format given, or the one that a file's ending names; InputError where it is none of `formats`."""
+def format_of(path: str | Path, formats: tuple[str, ...] = FORMATS) -> str:
+    """Return the format that a file's ending names; InputError where it is none of `formats`."""
     expect("path", path, str, Path)
-    expect("file_format", file_format, str, type(None))
-    kind = (file_format or Path(path).suffix.removeprefix(".")).lower()
+    kind = Path(path).suffix.removeprefix(".").lower()
     if kind not in formats:
         raise InputError("output", str(path), "must end in one of " + ", ".join(f".{end}" for end in formats))
     return kind
@@ -97,12 +97,9 @@ def render_figure(figure: "Figure", file_format: str) -> bytes:
     return buffer.getvalue()
 
 
-CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
-
-
 def shorten_text(text: str, width: int) -> str:
     """Shorten a stranger's text to one line of at most `width` characters."""
-    line = " ".join(CONTROL.sub(" ", text).split())
+    line = clean_line(text)
     return line if len(line) <= width else line[: width - 1].rstrip() + "…"
 
 
@@ -120,16 +117,6 @@ def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[floa
         if largest >= size:
             return 1.0 / size, prefix + unit
     return 1.0 / PREFIXES[-1][0], PREFIXES[-1][1] + unit
-
-
-def choose_length_unit(largest: float, units: Conversion = SI) -> tuple[float, str]:
-    """Lengths in the unit stated, else in km, m, mm or µm by the largest."""
-    if "m" in units:
-        return choose_unit(largest, "m", units)
-    for size, unit in ((1e3, "km"), (1.0, "m"), (1e-3, "mm")):
-        if largest >= size:
-            return 1.0 / size, unit
-    return 1e6, "µm"
 
 
 def find_greatest(*values: Array) -> float:

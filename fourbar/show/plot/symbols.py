@@ -111,24 +111,18 @@ def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol
     drawn, colour = DrawnSymbol(text=symbol.name), COLOURS[symbol.kind]
     if symbol.kind == "gravity":
         _draw_gravity(axes, symbol, drawn)
-    elif symbol.kind == "spring":
-        assert symbol.end is not None
+    elif symbol.end is not None:
         start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
-        _draw_line(axes, drawn, _draw_zigzag(start, end, 0.6 * size), colour, 1.0)
-        drawn.artists += axes.plot(
-            [start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=5.5
-        )
-    elif symbol.kind == "cylinder":
-        assert symbol.end is not None
-        start, end = place.point(symbol.bar, symbol.at), place.point(*symbol.end)
-        along = (end - start) / abs(end - start)
-        _draw_line(axes, drawn, np.array([start, end]), colour, 1.2)
-        _draw_line(axes, drawn, start + np.array([0.1, 1.0]) * place.barrel * along, colour, 4.5)
-        drawn.text, drawn.away = f"${symbol.name}$", 1j * along
-        drawn.label = split_components(start + 0.5 * place.barrel * along)
-        drawn.artists += axes.plot(
-            [start.real, end.real], [start.imag, end.imag], "o", ms=3.5, color=colour, zorder=5.5
-        )
+        if symbol.kind == "spring":
+            _draw_line(axes, drawn, _draw_zigzag(start, end, 0.6 * size), colour, 1.0)
+        else:
+            along = (end - start) / abs(end - start)
+            _draw_line(axes, drawn, np.array([start, end]), colour, 1.2)
+            _draw_line(axes, drawn, start + np.array([0.1, 1.0]) * place.barrel * along, colour, 4.5)
+            drawn.text, drawn.away = f"${symbol.name}$", 1j * along
+            drawn.label = split_components(start + 0.5 * place.barrel * along)
+        x, y = zip(*map(split_components, (start, end)), strict=True)
+        drawn.artists += axes.plot(x, y, "o", ms=3.5, color=colour, zorder=5.5)
     elif symbol.kind == "force":
         _draw_force(axes, symbol, place, size, drawn)
     elif symbol.kind in ("moment", "drive"):

@@ -2,18 +2,16 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.effects.actions import Actions, list_bodies
 from fourbar.errors import NotAssembledError
 from fourbar.evaluation.case import compute_state
-from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, PINS
+from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene, command, command_at, default_places
-from fourbar.show.plot.style import choose_length_unit, choose_unit
+from fourbar.show.plot.style import choose_unit
 from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve
 
@@ -105,7 +103,7 @@ class Axis(NamedTuple):
 def axis_of(scene: Scene, at: Command, units: Conversion) -> Axis:
     """Make the axis of what is commanded."""
     if at.stroke is not None:
-        factor, unit = choose_length_unit(max(scene.linkage.lengths), units)
+        factor, unit = choose_unit(max(scene.linkage.lengths), "m", units)
         return Axis("stroke", "stroke", f" {unit}", factor, factor * at.stroke)
     return Axis(f"θ{'₀₁₂₃₄'[at.bar]}", rf"$\{at.commanded}$", "°", math.degrees(1.0), np.degrees(at.angle))
 
@@ -122,37 +120,6 @@ def collect_point_vectors(scene: Scene, solution: Solution, letter: str) -> dict
     found = {name: getattr(solution, f"{letter}_{name}") for name in drawn}
     found |= solution.velocity if letter == "v" else solution.acceleration
     return {name: values for name, values in found.items() if values is not None}
-
-
-def take_one(vector: Any) -> complex:
-    """Return the one complex number of an array, at the position drawn."""
-    return complex(np.ravel(vector)[0])
-
-
-class Recorder(Actions):
-    """Forces and couples that are kept one by one, each force with its arm, for a free-body diagram."""
-
-    def __init__(self, scene: Scene, state: State) -> None:
-        super().__init__(state, list_bodies(scene.linkage))
-        self.arrows: list[tuple[int, complex, complex]] = []
-        """Bar, force (N), and from the bar's first pin to where it acts (m)."""
-        self.turns: list[tuple[int, float]] = []
-        """Bar and couple, N m."""
-
-    def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
-        """Add a force on a bar, applied at `arm` from the bar's first pin."""
-        self.arrows.append((bar, take_one(force), take_one(arm)))
-
-    def moment(self, bar: int, moment: Number) -> None:
-        """Add a pure couple on a bar."""
-        if bar != 1:
-            self.turns.append((bar, take_one(moment).real))
-
-    def couple(self, pin: str, couple: Number) -> None:
-        """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first."""
-        first, second = PINS[pin]
-        self.moment(second, couple)
-        self.moment(first, -couple)
 
 
 def is_over_time(scene: Scene) -> bool:

@@ -109,7 +109,7 @@ MISTAKES = [
     ("loads as a table", "[[loads]]", "[loads]", ["loads", "[[loads]]"]),
     ("frame misspelt", "bar = 4", 'bar = 4\nframe = "body"', ["loads[0].frame", '"world" or "bar"']),
     ("gravity as truth", '["9.81 m/s^2", "-90 deg"]', "true", ["effects.gravity", "True"]),
-    ("sweep without steps", '"60 deg"', '{ from = "0 deg", to = "9 deg" }', ["motion.theta_2.steps", "missing"]),
+    ("sweep without end", '"60 deg"', '{ from = "0 deg", steps = 9 }', ["motion.theta_2.to", "missing"]),
     ("no steps", '"60 deg"', '{ from = "0 deg", to = "9 deg", steps = 0 }', ["motion.theta_2.steps", "0"]),
     ("half a step", '"60 deg"', '{ from = "0 deg", to = "9 deg", steps = 1.5 }', ["motion.theta_2.steps", "1.5"]),
     ("steps without end", '"60 deg"', '{ from = "0 deg", to = "9 deg", steps = 99999999 }', ["motion.theta_2.steps"]),

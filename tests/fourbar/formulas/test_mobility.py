@@ -7,8 +7,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from fourbar.errors import InputError, NotAssembledError
-from fourbar.formulas.circuits import circuits, find_circuit, is_same_circuit
+from fourbar.errors import InputError
+from fourbar.formulas.circuits import circuits, find_circuit
 from fourbar.formulas.linkage_type import classify
 from fourbar.formulas.mobility import (
     change_points,
@@ -200,13 +200,12 @@ def test_circuits_of_grashof_linkages_by_the_angle_that_never_closes() -> None:
     assert seen == {1, 2, 3, 4}
 
 
-def test_same_circuit_refuses_a_position_that_does_not_exist() -> None:
+def test_positions_that_a_motion_connects_have_one_circuit_and_those_that_do_not_assemble_none() -> None:
     crank_rocker, rocker = uniform(3, 1, 2.5, 2.2), uniform(3, 2.5, 1, 2.2)
-    assert is_same_circuit(crank_rocker, (0.1, 1), (3.0, 1)) and not is_same_circuit(crank_rocker, (0.1, 1), (3.0, -1))
+    assert find_circuit(crank_rocker, np.array([0.1, 3.0, 3.0]), np.array([1, 1, -1])).tolist() == [0, 0, 1]
     start, stop = choose_range(rocker)
-    assert is_same_circuit(rocker, (start, 1), (stop, -1)) and not is_same_circuit(rocker, (start, 1), (-start, 1))
-    with pytest.raises(NotAssembledError, match=r"theta_2 = 3\.0"):
-        is_same_circuit(rocker, (start, 1), (3.0, 1))
+    found = find_circuit(rocker, np.array([start, stop, -start, 3.0]), np.array([1, -1, 1, 1]))
+    assert found.tolist() == [0, 0, 1, -1]
 
 
 def exact_psi(bars: FourBar, bar: int, stretched: bool) -> mp.mpf:

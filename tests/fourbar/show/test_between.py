@@ -34,7 +34,7 @@ def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(steps: int
     stretched, folded = (math.acos((r * r + d * d - c * c) / (2.0 * r * d)) for r in (b + a, b - a))
     scene = swept(WIPER, steps)
     found = locate_between(scene, fourbar.solve(scene))
-    assert found is not None and [pin for _, pin in found.reversals] == ["O4", "O4"]
+    assert [pin for _, pin in found.reversals] == ["O4", "O4"]
     assert np.abs(np.subtract([angle for angle, _ in found.reversals], [stretched, folded + math.pi])).max() < LOCATED
     located = list_sizes(found.solution)
     for name in ("F12", "F32", "F43", "F14"):  # each is largest on one side of the first jump
@@ -52,7 +52,7 @@ def _beside(scene: fourbar.Scene, theta_2: float, step: int) -> dict[str, float]
 def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
     coarse = swept(crank_rocker(), 24)
     found = locate_between(coarse, fourbar.solve(coarse))
-    assert found is not None and not found.growing and not found.reversals
+    assert not found.growing and not found.reversals
     fine = list_sizes(fourbar.solve(replace(coarse, motion=replace(coarse.motion, theta_2=FINE))))
     for name, size in list_sizes(found.solution).items():
         assert size.max() == pytest.approx(fine[name].max(), rel=PEAK), name
@@ -64,7 +64,7 @@ def test_towards_a_pole_no_largest_value_is_made_up() -> None:
     scene = swept(thesis(), 360)
     solution = fourbar.solve(scene)
     found = locate_between(scene, solution)
-    assert found is not None and "torque" in found.growing
+    assert "torque" in found.growing
     assert np.nanmax(np.abs(found.solution.torque)) == np.nanmax(np.abs(solution.torque))
     assert any(line.startswith("largest torque of these positions") for line in write_heading(scene, solution))
     scene = swept(crank_rocker(), 24)
@@ -76,11 +76,11 @@ def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_
     scene = crank_rocker(motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),))
     found = locate_between(scene, fourbar.solve(scene))
     fine = list_sizes(fourbar.solve(replace(scene, motion=fourbar.Motion(law=replace(law, steps=20000)))))
-    assert found is not None and [pin for _, pin in found.reversals] == ["O2"]
+    assert [pin for _, pin in found.reversals] == ["O2"]
     assert np.max(list_sizes(found.solution)["power"]) == pytest.approx(fine["power"].max(), rel=PEAK)
     assert np.all(np.diff(found.solution.time) > 0.0)
     listed = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, 6.0, 9), 10.0))
-    assert locate_between(listed, fourbar.solve(listed)) is None
+    assert locate_between(listed, solution := fourbar.solve(listed)).solution is solution
     assert any("torque of these positions" in line for line in write_heading(listed, fourbar.solve(listed)))
 
 
@@ -92,9 +92,7 @@ def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
         return crank_rocker(motion=motion, drive=drive, effects=(fourbar.Friction((("A", 0.01),)),))
 
     found = locate_between(of(20), fourbar.solve(of(20)))
-    assert (
-        found is not None and found.solution.at.stroke is not None and (np.diff(found.solution.at.stroke) < 0.0).all()
-    )
+    assert found.solution.at.stroke is not None and (np.diff(found.solution.at.stroke) < 0.0).all()
     fine = fourbar.solve(of(20000))
     for name, size in list_sizes(fine).items():
         assert list_sizes(found.solution)[name].max() == pytest.approx(size.max(), rel=PEAK), name

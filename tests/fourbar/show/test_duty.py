@@ -69,7 +69,7 @@ def test_the_duty_of_a_motor() -> None:
 def test_the_summary_and_the_json_hold_the_duty() -> None:
     scene = crank_rocker()
     s, imperial = fourbar.solve(scene), units("imperial")
-    duty, entry = motor_duty(s), write_motor(s, imperial)
+    duty, entry = motor_duty(s), write_motor(s, imperial, s)
     assert duty is not None and entry is not None and duty.energy_out is not None
     inch_pound = 0.0254 * 0.45359237 * 9.80665
     assert entry["units"]["rms_power"] == "hp" and entry["units"]["energy_out"] == "lbf in"
