@@ -83,8 +83,8 @@ def test_statics_and_friction_at_rest_agree_too() -> None:
     assert {"drive_force_low", "drive_force_high"} <= {row.quantity for row in rows if row.verdict == AGREES}
 
 
-def _reversed(self: LinearDrive) -> Any:
-    return (1.0, self.start), (-1.0, self.end)
+def _reversed(self: LinearDrive, actions: Any, force: Any, act: Any = LinearDrive.act) -> None:
+    act(self, actions, -force)
 
 
 def _of_one_end(self: LinearDrive, actions: Any, force: Any) -> None:
@@ -99,7 +99,7 @@ def _of_the_wrong_bar(self: LinearDrive, actions: Any, force: Any) -> None:
 
 
 FAULTS = {
-    "line reversed": ("ends", property(_reversed)),
+    "line reversed": ("act", _reversed),
     "one of its two ends": ("act", _of_one_end),
     "lever of the wrong bar": ("act", _of_the_wrong_bar),
     "sign of the speed": ("speed", lambda self, state, of=LinearDrive.speed: -of(self, state)),
