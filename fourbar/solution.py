@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import POSITIVE, require
-from fourbar.quantities import NOT_ASSEMBLED, OF_LINE, PIN_FORCES, STATUS_NAMES, UNITS, Quantities, is_scalar
+from fourbar.quantities import NOT_ASSEMBLED, OF_LINE, PIN_FORCES, SCALARS, STATUS_NAMES, UNITS, Quantities
 from fourbar.writing import describe_extent, list_names, make_data_frame, write_between, write_object, write_text
 
 Array = NDArray[np.float64]
@@ -141,7 +141,7 @@ class Solution(Quantities):
 
 def split_parts(name: str, values: Array) -> dict[str, Array]:
     """Split a quantity into scalars: components, and the magnitude of a pin force."""
-    if is_scalar(name):
+    if name in SCALARS:
         return {name: values}
     found = {f"{name}_x": values[..., 0], f"{name}_y": values[..., 1]}
     return {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **found} if name in PIN_FORCES else found
@@ -215,7 +215,7 @@ def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array 
     for name in _list_quantities(solution):
         values, unit = find_values(solution, name, units), find_unit(name)
         heading = f" [{find_unit_in(unit, units)[0]}]" if units and unit != "1" else ""
-        if not is_scalar(name):
+        if name not in SCALARS:
             for axis, letter in enumerate("xy"):
                 found[f"{name}_{letter}{heading}"] = None if values is None else values[..., axis].ravel()
             if name in PIN_FORCES:

@@ -19,10 +19,10 @@ from fourbar.quantities import (
     OF_DRY_FRICTION,
     OF_LINE,
     OF_PIN_LOADS,
+    SCALARS,
     STAGE_OF,
     STAGES,
     UNITS,
-    is_scalar,
 )
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion_law import COMMANDS
@@ -162,7 +162,7 @@ def find_requested(
         for name, array in out.items():
             if name not in stages:
                 raise InputError("out", name, "must be among " + ", ".join(stages))
-            wanted_shape = shape if is_scalar(name) else (*shape, 2)
+            wanted_shape = shape if name in SCALARS else (*shape, 2)
             expect(f"out.{name}", array, np.ndarray)
             if array.shape != wanted_shape or array.dtype != np.float64 or not array.flags.writeable:
                 allowed = f"must be float64 of shape {wanted_shape}, writeable"
@@ -177,7 +177,7 @@ def make_arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, 
     """To write into: new ones, or those given."""
     given = {} if out is None else out
     return {
-        name: given[name] if name in given else np.empty(shape if is_scalar(name) else (*shape, 2)) for name in names
+        name: given[name] if name in given else np.empty(shape if name in SCALARS else (*shape, 2)) for name in names
     }
 
 
@@ -267,7 +267,7 @@ def _solve_alone(
         return None
     vectors = table.view(float).reshape(-1, 1, 2)
     scalars = vectors[:, :, 0]
-    return {name: (scalars if is_scalar(name) else vectors)[i] for i, name in enumerate(values)}
+    return {name: (scalars if name in SCALARS else vectors)[i] for i, name in enumerate(values)}
 
 
 def _solve_released(scene: Scene) -> "FreeMotion":

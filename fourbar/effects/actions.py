@@ -161,5 +161,7 @@ class Actions:
 
     def at_pins(self, pins: PinForces) -> PinForces:
         """Return what the pins themselves carry of the forces between their bars."""
+        if not self.through:
+            return pins
         A, B = (self.through.get(pin, 0.0) for pin in ("A", "B"))
-        return pins._replace(F32=pins.F32 + A, F43=pins.F43 + B) if self.through else pins
+        return pins._replace(F32=pins.F32 + A, F43=pins.F43 + B)

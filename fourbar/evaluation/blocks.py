@@ -13,7 +13,7 @@ from fourbar.errors import DependencyError, say_install
 from fourbar.evaluation.case import BLOCK, Case, Evaluated
 from fourbar.evaluation.stages import ERROR, FORCE, Part, evaluate_command
 from fourbar.evaluation.withheld import withhold_in_place
-from fourbar.quantities import is_scalar
+from fourbar.quantities import SCALARS
 from fourbar.solution import Array
 
 WORTH_COMPILING = 2_000_000
@@ -107,7 +107,7 @@ def keep(
     for name, value in values.items():
         if shape is not None and np.ndim(value):
             value = value.reshape(shape)  # noqa: PLW2901
-        if is_scalar(name):
+        if name in SCALARS:
             result[name][part] = value
         else:
             array = result[name]

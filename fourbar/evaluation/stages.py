@@ -148,8 +148,8 @@ def _evaluate_forces(
     sign : of the path's root.
     exact : indices of the positions known in many digits; None: no error bars.
     """
-    found = case.dynamics(state, acceleration, case.side)
-    values: dict[str, Any] = {**found.pins._asdict(), case.names.value: found.drive}
+    found, own = case.dynamics(state, acceleration, case.side), case.names
+    values: dict[str, Any] = {**found.pins._asdict(), own.value: found.drive}
     if "power" in names:
         values["power"] = found.drive * case.drive_speed(state)
     if "drive_condition" in names:
@@ -157,9 +157,9 @@ def _evaluate_forces(
         values["drive_condition"] = condition if found.from_jamming is None else condition * found.from_jamming
     if "friction_residual" in names:
         values["friction_residual"] = 0.0 if found.residual is None else found.residual
-    if case.names.low in names or case.names.high in names:
+    if own.low in names or own.high in names:
         *ends, held = case.drive_interval(state, acceleration, found.drive)
-        values |= zip(case.names[2:], ends, strict=True)
+        values |= zip(own[2:], ends, strict=True)
         if held is not None and found.status is not None:
             found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
     if exact is not None:

@@ -129,7 +129,10 @@ def angle(u: Number) -> Number:
 
 def conjugate(u: Number) -> Number:
     """u*, of a complex number; by its parts in PyTorch, which maps no conjugate over many numbers at once."""
-    return u.conjugate() if hasattr(u, "conjugate") else vector(u.real, -u.imag)
+    try:
+        return u.conjugate()
+    except AttributeError:
+        return vector(u.real, -u.imag)
 
 
 def sign(x: Number) -> Number:

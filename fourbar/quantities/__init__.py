@@ -95,7 +95,7 @@ UNITS = {q.name: q.unit for q in QUANTITIES}
 STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None}
 """Every evaluated quantity and the stage that computes it."""
 STAGES = tuple(dict.fromkeys(STAGE_OF.values()))
-KIND = {q.name: q.kind for q in QUANTITIES}
+SCALARS = frozenset(q.name for q in QUANTITIES if q.kind == "scalar")
 VECTORS = tuple(q.name for q in QUANTITIES if q.kind == "vector")
 ANGLES = tuple(q.name for q in QUANTITIES if q.unit == "rad" and q.stage is not None)
 PIN_FORCES = tuple(name for name in VECTORS if UNITS[name] == "N")
@@ -130,8 +130,3 @@ STATUS_NAMES = (
 OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW, INVALID, NO_LEVER = range(
     len(STATUS_NAMES)
 )
-
-
-def is_scalar(name: str) -> bool:
-    """Whether a quantity is a number at each position; the others, a scene's own points too, are vectors."""
-    return KIND.get(name) == "scalar"

@@ -223,4 +223,5 @@ def command(scene: Scene) -> Command:
         remainder = limit_remainder(linkage, limit, float(places[0]), stated.offset, bar)
     else:
         places = np.array(stated, dtype=float, ndmin=1)
-    return command_at(scene, places)._replace(remainder=remainder)
+    found = command_at(scene, places)
+    return found if remainder is None else found._replace(remainder=remainder)

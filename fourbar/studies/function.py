@@ -11,7 +11,7 @@ from fourbar.evaluation.case import Case, find_undecided
 from fourbar.evaluation.stages import list_kinematics, name_of_command
 from fourbar.formulas.arithmetic import make_like, namespace
 from fourbar.formulas.mobility import change_points
-from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, STAGE_OF, is_scalar
+from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, SCALARS, STAGE_OF
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
@@ -102,11 +102,11 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
                 found["condition"] = found["condition"] * lever
             ok = ok & holds
             parts = {
-                name: (found[name] + zero,) if is_scalar(name) else (found[name].real + zero, found[name].imag + zero)
+                name: (found[name] + zero,) if name in SCALARS else (found[name].real + zero, found[name].imag + zero)
                 for name in wanted
             }
         kept = {name: [xp.where(ok & xp.isfinite(sum(of)), part, xp.nan) for part in of] for name, of in parts.items()}
-        return {name: of[0] if is_scalar(name) else xp.stack(of, axis=-1) for name, of in kept.items()}
+        return {name: of[0] if name in SCALARS else xp.stack(of, axis=-1) for name, of in kept.items()}
 
     return of_numbers
 

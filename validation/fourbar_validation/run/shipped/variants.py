@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
-from fourbar.quantities import LINE, OK, UNKNOWNS, is_scalar
+from fourbar.quantities import LINE, OK, SCALARS, UNKNOWNS
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
@@ -187,7 +187,7 @@ def split_parts(answer: Answer) -> dict[str, Array]:
     result = {}
     for name in (name for name in (*UNKNOWNS, LINE.value) if name in answer.quantities):
         values = answer.quantities[name]
-        if is_scalar(name):
+        if name in SCALARS:
             result[name] = values
         else:
             result |= {f"{name}_x": values[:, 0], f"{name}_y": values[:, 1], f"|{name}|": magnitude(values)}
