@@ -3,10 +3,8 @@
 import json
 import math
 import os
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from html import escape
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
@@ -56,6 +54,8 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
         with name_file(target), target.open("wb") as file:
             file.write(data)
         return
+    import tempfile
+
     with name_file(target):
         handle, temporary = tempfile.mkstemp(prefix=f".{target.name[:100]}.", suffix=TEMPORARY, dir=target.parent)
         try:
@@ -108,6 +108,8 @@ def list_names(what: str, names: Iterable[str]) -> str:
 
 def make_html(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Make what a notebook shows of a result."""
+    from html import escape
+
     lines = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     heads = "".join(f"<th>{escape(cell)}</th>" for cell in head)
     return f"<div><b>{escape(title)}</b><table><tr>{heads}</tr>{lines}</table></div>"

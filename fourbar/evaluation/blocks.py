@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from importlib.util import find_spec
 from typing import Any
 
@@ -80,6 +79,8 @@ def evaluate_parts(evaluate: Callable[[Any], Any], parts: Iterable[Any], *, at_o
         for part in rest:
             quietly(part)
         return
+    from concurrent.futures import ThreadPoolExecutor
+
     with ThreadPoolExecutor(cores) as pool:
         for _ in pool.map(quietly, rest):
             pass
