@@ -17,9 +17,9 @@ test: setup
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-# everything that `make test` samples, in full; each part ends within one hour on two cores. Minutes of two idle cores, from
-# the processor's time of the whole or of a share: free 15, fuzz 14, machines 14, random 7, accuracy 7; the others below 5,
-# but for kills, standing and the hard suite, which are not measured whole
+# everything that `make test` samples, in full; each part ends within one hour on two cores. Minutes of two idle cores: kills
+# at most 16, suites 6, package 3, standing 2; from the processor's time of a share: machines 7 for each kernel that the
+# processor has, free 15, fuzz 14, accuracy 12; the others below 5
 long-test: $(LONG:%=long-%)
 $(LONG:%=long-%): setup
 
