@@ -82,8 +82,7 @@ class Actions:
         """
         pin = next((pin for pin in ("A", "B") if {start.bar, end.bar} == {*PINS[pin]}), None)
         if pin is None:
-            for point, sense in ((start, 1.0), (end, -1.0)):
-                self.force(point.bar, sense * force, point.arm(self.state))
+            self.pull_ends(start, end, force)
             return
         point, sense = (end, -1.0) if end.bar > start.bar else (start, 1.0)
         on_second, arm = self.rounded(sense * force, turned=True), point.arm(self.state)
@@ -91,6 +90,11 @@ class Actions:
             arm = arm - self.state.lengths.c * self.state.at.u4
         self.through[pin] = self.through[pin] + on_second if pin in self.through else on_second
         self.couple(pin, cross(-on_second, arm))
+
+    def pull_ends(self, start: Any, end: Any, force: Number) -> None:
+        """Add the two forces where they act."""
+        for point, sense in ((start, 1.0), (end, -1.0)):
+            self.force(point.bar, sense * force, point.arm(self.state))
 
     def plus(self, unit: "Actions", size: Number) -> "Actions":
         """Make the sum of these and of what a drive of a size does that does `unit` per newton."""

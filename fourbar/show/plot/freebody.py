@@ -102,6 +102,10 @@ class Recorder(Actions):
         """Add a force on a bar, applied at `arm` from the bar's first pin."""
         self.arrows[bar].append(Arrow(self.name.replace("#", str(bar)), take_one(arm), take_one(force), INK))
 
+    def pull(self, start: Any, end: Any, force: Number) -> None:
+        """Add both forces, between neighbours too: a freed bar shows each where it acts."""
+        self.pull_ends(start, end, force)
+
     def moment(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar."""
         self.turns[bar].append(Couple(self.name.replace("#", str(bar)), take_one(moment).real))

@@ -218,13 +218,14 @@ def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     assert crossed + marks["dead centre"][0] == pytest.approx(sum(expected))  # its mirror image in the ground's line
 
 
+SPRUNG = ((1, 3), (2, 3), (4, 3))
 EFFECTS = (
     fourbar.Gravity(),
     fourbar.Viscous.at(A=0.02, O4=0.01),
     fourbar.Friction.at(B=0.03),
     PinFriction.at(A=(0.2, 0.01), O4=(0.1, 0.02)),
     Torsion.at(B=(0.5, 1.0, 0.1)),
-    Springs((Spring(SpringEnd(1, 0.1, -1.5), SpringEnd(3, 0.08, 0.2), 50.0, 0.05),)),
+    Springs(tuple(Spring(SpringEnd(i, 0.1, -1.5), SpringEnd(j, 0.08, 0.2), 50.0, 0.05) for i, j in SPRUNG)),
     Flywheel(0.01, 4),
 )
 
@@ -232,12 +233,16 @@ EFFECTS = (
 CYLINDER = fourbar.LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7))
 
 
-@pytest.mark.parametrize("drive_bar", (2, 3, 4, None))
+BETWEEN_NEIGHBOURS = fourbar.LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(3, 0.09, 0.7))
+
+
+@pytest.mark.parametrize("drive", (2, 3, 4, CYLINDER, BETWEEN_NEIGHBOURS), ids=["2", "3", "4", "2-4", "2-3"])
 @pytest.mark.parametrize(
     "effects", [EFFECTS, *((one,) for one in EFFECTS)], ids=lambda some: "+".join(e.key for e in some)
 )
-def test_free_bodies_balance(drive_bar: int | None, effects: tuple[Effect, ...]) -> None:
-    shown = make_view(crank_rocker(drive_bar=drive_bar, drive=None if drive_bar else CYLINDER, effects=effects))
+def test_free_bodies_balance(drive: int | fourbar.LinearDrive, effects: tuple[Effect, ...]) -> None:
+    drive_bar, line = (drive, None) if isinstance(drive, int) else (None, drive)
+    shown = make_view(crank_rocker(drive_bar=drive_bar, drive=line, effects=effects))
     for bar in (2, 3, 4):
         arrows, couples = list_actions(shown, bar)
         forces = np.array([arrow.force for arrow in arrows])
