@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import warnings
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -77,11 +78,23 @@ def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypa
             assert (tmp_path / "here" / name).read_bytes() == (out / name).read_bytes()
 
 
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense"])
-def test_no_scheduler_is_one_line(address: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "tls://127.0.0.1:1", "tcp://a..b:1", "nonsense"])
+def test_no_scheduler_is_one_line_and_leaves_no_client_half_open(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that is left closes when it is collected: in the thread of the next client, each waits for the other."""
+    made = weakref.WeakSet()
+
+    class Noted(distributed.Client):
+        def __init__(self, *arguments: object, **options: object) -> None:
+            made.add(self)
+            super().__init__(*arguments, **options)
+
+    monkeypatch.setattr(distributed, "Client", Noted)
     with dask.config.set({"distributed.comm.timeouts.connect": "1s"}), pytest.raises(InputError) as caught:
         list(run(Random(1, SEED, TYPES), tmp_path, EXACT, RunOptions(drawn=False, scheduler=address)))
     assert "must be the address of a Dask scheduler" in str(caught.value) and "\n" not in str(caught.value)
+    assert not made
 
 
 def distributed_process(tmp_path: Path, what: str, *options: str, path: Path = ROOT) -> subprocess.Popen[bytes]:

@@ -1,5 +1,6 @@
 """The workers of a Dask scheduler in place of the processes of this machine."""
 
+import gc
 import logging
 import time
 from collections import Counter
@@ -51,12 +52,14 @@ class Cluster:
 
         for of_dask in ("client", "batched"):  # what they log of a lost scheduler, with tracebacks, is one line of ours
             logging.getLogger(f"distributed.{of_dask}").setLevel(logging.CRITICAL)
-        self.scheduler = scheduler
+        self.scheduler, why = scheduler, ""
         try:
             self.client = Client(scheduler, set_as_default=False)  # type: ignore[no-untyped-call]
-        except (OSError, ValueError) as error:  # no answer, or no address
+        except (OSError, TypeError, ValueError) as error:  # no answer, no certificate, or no address
             why = str(error) or "no answer"
-            raise InputError("--scheduler", scheduler, f"must be the address of a Dask scheduler: {why}") from None
+        if why:
+            gc.collect()  # its client closes here: in the thread of a later one, which waits for it, it would wait too
+            raise InputError("--scheduler", scheduler, f"must be the address of a Dask scheduler: {why}")
         try:
             self.machines = self._name_alike()
         except BaseException:
