@@ -4,6 +4,7 @@ import cmath
 import importlib
 import re
 import tempfile
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -152,31 +153,41 @@ MIDWAY = 200
 """Steps after which the closures have settled from the exact start."""
 
 
-@pytest.mark.nightly
-def test_genesis_reads_as_the_comment_says_and_leaves_out_what_it_names(tmp_path: Path) -> None:
-    motion = fourbar.Motion(fourbar.Sweep(0.4, 0.4 + 2.0 * np.pi, 60), 10.0)
-    joints = (fourbar.Gravity(), fourbar.Viscous.at(A=0.05), fourbar.Friction.at(O4=0.1))
-    kept = crank_rocker(motion=motion, loads=(), effects=joints)
-    ends = fourbar.effects.SpringEnd(1, 0.1, -1.5), fourbar.effects.SpringEnd(3, 0.08, 0.3)
-    springs = fourbar.Springs((fourbar.Spring(*ends, 200.0, 0.02),))
-    whole = crank_rocker(motion=motion, effects=(*joints, springs))
-    stiff = replace(kept, effects=(*joints, Torsion.at(O4=(0.5, 0.2, 0.1))))
-    assembled = float(fourbar.solve(kept, "position").theta_4[0]) - kept.linkage.ground_angle
-    resting = replace(kept, effects=(*joints, Torsion.at(O4=(0.5, assembled, 0.0))))
-    at_B = replace(
-        kept, effects=(fourbar.Viscous.at(A=0.05, B=0.1), fourbar.Friction.at(B=0.2), Torsion.at(B=(1, 0, 0)))
-    )
+JOINTS = (fourbar.Gravity(), fourbar.Viscous.at(A=0.05), fourbar.Friction.at(O4=0.1))
+KEPT = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.4, 0.4 + 2.0 * np.pi, 60), 10.0), loads=(), effects=JOINTS)
+"""All of it is in a file for Genesis."""
+ENDS = fourbar.effects.SpringEnd(1, 0.1, -1.5), fourbar.effects.SpringEnd(3, 0.08, 0.3)
+WHOLE = crank_rocker(motion=KEPT.motion, effects=(*JOINTS, fourbar.Springs((fourbar.Spring(*ENDS, 200.0, 0.02),))))
+STIFF = replace(KEPT, effects=(*JOINTS, Torsion.at(O4=(0.5, 0.2, 0.1))))
+
+
+def test_a_file_for_genesis_names_what_it_leaves_out() -> None:
+    at_B = (fourbar.Viscous.at(A=0.05, B=0.1), fourbar.Friction.at(B=0.2), Torsion.at(B=(1, 0, 0)))
     for scene, names in (
-        (kept, []),
-        (whole, ["loads, springs"]),
-        (stiff, ["rest angles of torsion (it rests as assembled)"]),
-        (at_B, ["viscous at B, friction at B, torsion at B"]),
+        (KEPT, []),
+        (WHOLE, ["loads, springs"]),
+        (STIFF, ["rest angles of torsion (it rests as assembled)"]),
+        (replace(KEPT, effects=at_B), ["viscous at B, friction at B, torsion at B"]),
     ):
         assert re.findall(r"it leaves out ([^.]*)\. ", write_mjcf_for(scene, "genesis")) == names
+
+
+@pytest.fixture
+def _genesis() -> Iterator[None]:
+    """Genesis, which starts once in a process: the next test may want other settings."""
     gs = pytest.importorskip("genesis")
     gs.init(backend=gs.cpu, precision="64", logging_level="error")
-    faster = replace(whole, motion=replace(motion, alpha_2=30.0))
-    for scene, moves_as in ((kept, kept), (whole, kept), (faster, kept), (stiff, resting)):
+    yield
+    gs.destroy()
+
+
+@pytest.mark.nightly
+@pytest.mark.usefixtures("_genesis")
+def test_genesis_reads_as_the_comment_says(tmp_path: Path) -> None:
+    assembled = float(fourbar.solve(KEPT, "position").theta_4[0]) - KEPT.linkage.ground_angle
+    resting = replace(KEPT, effects=(*JOINTS, Torsion.at(O4=(0.5, assembled, 0.0))))
+    faster = replace(WHOLE, motion=replace(KEPT.motion, alpha_2=30.0))
+    for scene, moves_as in ((KEPT, KEPT), (WHOLE, KEPT), (faster, KEPT), (STIFF, resting)):
         (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "genesis"))
         read = read_genesis(file, MIDWAY)
         assert max(errors(moves_as, *read)) < YIELDING

@@ -286,6 +286,7 @@ def test_derivatives_are_mapped_over_linkages_and_positions(library: Library) ->
 def test_numbers_of_the_scene_go_to_the_device_of_the_values() -> None:
     """One that computes nothing, and like a GPU takes no array of another."""
     torch = pytest.importorskip("torch")
+    pytest.importorskip("array_api_compat")
     f = function(replace(LOADED, motion=Motion(ANGLES, 8.0)), ["lengths.input"], EVERY)
     assert {of.device.type for of in f(torch.tensor(0.1, device="meta")).values()} == {"meta"}
 
