@@ -81,7 +81,12 @@ def analyze(
     every: int | None,
     out: Path | None,
 ) -> None:
-    """Solve a scene: angles, speeds, accelerations, driving torque and pin forces."""
+    """Solve a scene: angles, speeds, accelerations, driving torque and pin forces.
+
+    A FILE that ends in .csv or .json asks for that form.
+    """
+    if not as_json and not as_csv:
+        as_json, as_csv = given.ends_in(out, ".json"), "." if given.ends_in(out, ".csv") else None
     if sensitivity:
         if as_csv or degrees or every is not None or units:
             raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")

@@ -1,8 +1,10 @@
 """What the commands are given: scenes, numbers with units, places to write to."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -26,7 +28,6 @@ def _read_units(context: click.Context, parameter: click.Parameter, text: str) -
 scene_argument = click.argument("scene", type=FILE)
 out_option = click.option("-o", "--out", type=FILE, required=True, metavar="FILE")
 or_out_option = click.option("-o", "--out", type=FILE, metavar="FILE", help="Write it to FILE instead of printing it.")
-json_option = click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")
 units_option = click.option(
     "--units",
     default="SI",
@@ -34,6 +35,21 @@ units_option = click.option(
     metavar="UNITS",
     help='"imperial", or a list like "mm N.mm deg"; left out: SI.',
 )
+
+
+def json_option(command: Callable[..., None]) -> Callable[..., None]:
+    """Add --json, which a file of -o that ends in .json asks for too."""
+
+    @wraps(command)
+    def formed(as_json: bool, **others: Any) -> None:
+        command(as_json=as_json or ends_in(others.get("out"), ".json"), **others)
+
+    return click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")(formed)
+
+
+def ends_in(out: Path | None, suffix: str) -> bool:
+    """Whether there is a file to write to, and its name has this ending."""
+    return out is not None and out.suffix.lower() == suffix
 
 
 @contextmanager

@@ -117,6 +117,18 @@ def test_a_free_motion_has_time_and_no_drive(tmp_path: Path, run: Fourbar) -> No
     assert "released, no drive" in out and "time" in out and "T2" not in out and "torque" not in out
 
 
+@pytest.mark.parametrize("ending", ["csv", "json", "txt"])
+def test_the_name_of_a_file_asks_for_its_form(ending: str, tmp_path: Path, run: Fourbar) -> None:
+    scene, named, asked = tmp_path / "scene.toml", tmp_path / f"named.{ending}", tmp_path / "asked"
+    save(crank_rocker(), scene)
+    form = () if ending == "txt" else (f"--{ending}",)
+    assert run("analyze", scene, "-o", named)[0] == 0 == run("analyze", scene, *form, "-o", asked)[0]
+    assert named.read_bytes() == asked.read_bytes()
+    if ending == "json":
+        assert run("classify", 4, 2, 3, 3, "-o", named)[0] == 0 == run("classify", 4, 2, 3, 3, "--json", "-o", asked)[0]
+        assert named.read_bytes() == asked.read_bytes()
+
+
 def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     file = MODELS / "crank_rocker.toml"
     code, out, err = run("analyze", file, "--csv")
