@@ -193,16 +193,6 @@ def test_every_command_ends_with_its_status(
     assert command([files.get(word, word) for word in line.split()]) == status
 
 
-@pytest.mark.parametrize("old", fourbar_validation.cli.RENAMED)
-def test_an_earlier_name_of_a_command_names_the_new_one(old: str, capsys: pytest.CaptureFixture[str]) -> None:
-    new = fourbar_validation.cli.RENAMED[old]
-    assert old not in fourbar_validation.cli.COMMANDS and set(new.split(", or ")) <= set(
-        fourbar_validation.cli.COMMANDS
-    )
-    assert VALIDATION([old, "--out", "x"]) == BAD_INPUT
-    assert capsys.readouterr().err == f"error: {old} is now called {new}\n"
-
-
 def test_an_option_that_makes_another_command_may_stand_anywhere(capsys: pytest.CaptureFixture[str]) -> None:
     for line in ("fuzz --files --count 2", "fuzz --count 2 --files"):
         assert VALIDATION(line.split()) == HOLDS
@@ -307,7 +297,6 @@ PROCESSES = [
     ("validation", "faults --mutants --most -1", BAD_INPUT),
     ("validation", "fuzz --scenes 0", BAD_INPUT),
     ("validation", "faults --workers 0", BAD_INPUT),
-    *(("validation", old, BAD_INPUT) for old in fourbar_validation.cli.RENAMED),
     ("validation", "stability --samples 0", BAD_INPUT),
     ("validation", "bench --positions 1", BAD_INPUT),
     ("validation", f"cost {NO_FILE}", BAD_INPUT),
@@ -328,7 +317,7 @@ def test_every_command_is_in_the_table_of_processes() -> None:
     tried = {
         (program, next((form for form in forms if line.startswith(f"{form} ")), line.split()[0]))
         for program, line, _ in PROCESSES
-    } - {("validation", old) for old in fourbar_validation.cli.RENAMED}
+    }
     assert tried == {
         *(("fourbar", name) for name in fourbar.cli.group.commands),
         *(("validation", name) for name in fourbar_validation.cli.COMMANDS),

@@ -34,16 +34,6 @@ COMMANDS = {
     "write --problems": "fourbar_validation.lab.simulators.problems:command",
 }
 """By name, some with the option that makes another command of it, with options of its own."""
-RENAMED = {
-    "fuzz-files": "fuzz --files",
-    "models": "write",
-    "problems": "write --problems",
-    "mutation": "faults, or faults --mutants",
-    "advise-study": "advise --study",
-    "effects-cost": "cost --effects",
-    "versions": "standing --versions",
-}
-"""Earlier names of commands."""
 
 
 class LazyGroup(click.Group):
@@ -70,8 +60,6 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Choose by name and option."""
         name, *options = args
-        if name in RENAMED:
-            raise click.UsageError(f"{name} is now called {RENAMED[name]}", ctx)
         for option in options:
             if f"{name} {option}" in COMMANDS:
                 options.remove(option)
