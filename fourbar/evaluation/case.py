@@ -104,6 +104,8 @@ class Case(NamedTuple):
     """In which sense pins at rest are about to turn, or the part of its torque that dry friction holds them with."""
     drive: "LinearDrive | None" = None
     """In place of a couple on the driven bar."""
+    stroke: Any = None
+    """Commanded, m: the commanded angle and its rates are rounded from it."""
 
     @classmethod
     def of(cls, scene: Scene, bar: int = 2) -> "Case":

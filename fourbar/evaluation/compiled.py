@@ -177,7 +177,8 @@ def change_position(
     """Change every number of position i in its last digit, as `error_bars` does; compute pin forces and torque."""
     lengths, in_unit = read_lengths(rows, i)
     u1, u2, turned, half = compute_directions(in_unit, rows, i, tangent, of_theta_2)
-    half = round_half_angle(in_unit, half, number(rows, 15, i), False, take_thirteen(signs, 2))
+    own = take_thirteen(signs, 2)
+    half = round_half_angle(in_unit, half, number(rows, 15, i) * np.sign(own[0]), False, own)
     u2 = select(turned, u2, vector(half.kk - half.ss, 2.0 * half.sk))
     near = close_loop(in_unit, u1, u2, half, number(rows, 14, i), lengths.d / in_unit.d)
     k = coefficients(in_unit, near)

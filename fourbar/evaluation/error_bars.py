@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects.actions import keep_number
 from fourbar.evaluation.case import Case, Dynamics
 from fourbar.formulas.arithmetic import angle, is_any, select, split_sum
 from fourbar.formulas.motion import Coefficients, State, find_fast_turns, may_turn_fast, rates
 from fourbar.formulas.path import read_from
 from fourbar.formulas.position import HalfAngle, Loop, Position
+from fourbar.scene.stroke import find_triangle
 
 EVALUATIONS = 14
 """Of the orders of seven changes up and seven down half are the others reversed, which leaves NUMBERS of them: so many
@@ -86,15 +88,19 @@ def compute_error_bars(
     exact : indices of the positions whose half angle is known in many digits.
     """
     rounded, path = Roundings(state.at.u1), case.path
-    q = state.theta_2 if state.q is None else state.q
-    lost = split_sum(q, -path.theta_1)[1]
+    q, speed = state.theta_2 if state.q is None else state.q, state.speed
     known = exact.size > 0 and np.isin(np.arange(np.size(state.at.half.ss)), exact)
-    half = round_half_angle(path.lengths, state.at.half, lost, known, rounded.next(6))
+    signs = rounded.next(6)
+    turned = select(known, 0.0, split_sum(q, -path.theta_1)[1]) * np.sign(signs[0])
+    if case.stroke is not None:
+        moved, faster, harder = change_command(case, q, speed, acceleration, rounded)
+        q, turned, speed, acceleration = q + moved, turned + moved, speed + faster, acceleration + harder
+    half = round_half_angle(path.lengths, state.at.half, turned, known, signs)
     near, k = path.motion(path.position(q, half, sign), sign)
     near = near._replace(sin_mu=rounded(near.sin_mu), diagonal=rounded(near.diagonal))
     near = near._replace(u2=rounded(near.u2), u3=rounded(near.u3), u4=rounded(near.u4))
     k = read_from(path.bar, round_coefficients(path.lengths, near, read_from(path.bar, k), rounded.next(13)))
-    nearby = state._replace(at=near, k=k, moving=rates(k, state.speed, acceleration))
+    nearby = state._replace(theta_2=q, at=near, k=k, speed=speed, moving=rates(k, speed, acceleration))
     if path.bar != 2:  # there both are found from the directions
         to_O4, to_A = rounded(case.lengths.d * near.u1), case.lengths.a * near.u2
         nearby = nearby._replace(at=near._replace(diagonal=rounded(to_O4 - to_A)), theta_2=rounded(angle(near.u2)))
@@ -108,19 +114,30 @@ def compute_error_bars(
     return {case.names.error: drive_error, "force_error": force_error}
 
 
+def change_command(case: Case, q: Any, speed: Any, acceleration: Any, rounded: Roundings) -> list[Any]:
+    """Compute by how much roundings change the angle, speed and acceleration that a commanded stroke gives its bar."""
+    exact, near = (find_triangle(case.linkage, case.drive, by) for by in (keep_number, rounded))
+    across, along = (exact.length * exact.reach * of(q - exact.angle) for of in (np.sin, np.cos))
+    lever = across / case.stroke  # of either sign, as the side
+    growth = lever * acceleration + (along - lever * lever) * speed * speed / case.stroke
+    given = (case.stroke, lever * speed, growth, "left" if np.nansum(lever) > 0.0 else "right")
+    pairs = zip(exact.turned(*given), near.turned(*given, rounded), strict=True)
+    return [after - before for before, after in pairs][:3]
+
+
 def round_real(x: Any, sign: Any) -> Any:
     """Return the next double up or down."""
     return x + x * sign
 
 
-def round_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, signs: Any) -> HalfAngle:
-    """Compute the five numbers with their own roundings, that of theta_2 - theta_1, and those of the two sums.
+def round_half_angle(lengths: Loop, half: HalfAngle, turned: Any, known: Any, signs: Any) -> HalfAngle:
+    """Compute the five numbers with their own roundings, a change of theta_2 - theta_1, and those of the two sums.
 
     Parameters
     ----------
-    lost : what the difference theta_2 - theta_1 lost, rad.
+    turned : by how much theta_2 - theta_1 is changed, rad.
     known : where the five are known in many digits and carry one rounding each.
-    signs : six of them.
+    signs : six of them, of which the first is that of the change.
     """
     d, a, b, c, E1, E2 = lengths
     ss, kk, sk, outer, inner = half
@@ -128,7 +145,6 @@ def round_half_angle(lengths: Loop, half: HalfAngle, lost: Any, known: Any, sign
     of_outer, of_inner = abs(E1) + four_ad * kk, abs(E2) + four_ad * ss
     of_outer, of_inner = np.minimum(of_outer, four_bc + of_inner), np.minimum(of_inner, four_bc + of_outer)
     of_outer, of_inner = select(known, outer, of_outer), select(known, inner, of_inner)
-    turned = select(known, 0.0, lost) * np.sign(signs[0])
     return HalfAngle(
         round_real(ss, signs[1]) + sk * turned,
         round_real(kk, signs[2]) - sk * turned,

@@ -68,6 +68,8 @@ def evaluate_command(case: Case, where: Command, part: Part, wanted: int, names:
         values["condition"] = values["condition"] * where.lever[part]
     if wanted >= FORCE:
         known = exact if wanted == ERROR else None
+        if where.lever is not None and where.stroke is not None:
+            case = case._replace(stroke=where.stroke[part])
         codes, forces = _evaluate_forces(case, state, acceleration, branch, branch, codes, names, known)
         values |= forces
     return codes, values, state.at

@@ -4,10 +4,12 @@ With l from the pivot to the end on the bar, r to the end on the ground, beta th
     s^2 = l^2 + r^2 - 2 l r cos beta,   ds/dbeta = l r sin beta/s = the lever from the pivot to the line.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from fourbar.effects.actions import keep_number
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number, angle, divisor, namespace, polar, select
 from fourbar.linkage import FourBar
@@ -44,38 +46,48 @@ class Triangle(NamedTuple):
             bad = float(stroke[np.argmin(inside)])
             raise InputError("motion.stroke", bad, f"this cylinder can have {least:.6g} to {most:.6g} m")
 
-    def turned(self, stroke: Any, speed: Any, acceleration: Any, side: str | None) -> tuple[Any, Any, Any, Any]:
+    def turned(
+        self,
+        stroke: Any,
+        speed: Any,
+        acceleration: Any,
+        side: str | None,
+        rounded: Callable[..., Any] = keep_number,
+    ) -> tuple[Any, Any, Any, Any]:
         """Compute angle, speed and acceleration of the bar, and the lever as a part of the longer of l and r.
 
         NaN where the cylinder cannot have the stroke; in libraries other than NumPy the lever alone says so, by 0. All
         may be arrays, and numbers that carry their derivatives.
         """
         assert side is not None
-        gap, most = self.length - self.reach, self.length + self.reach
+        gap, most = rounded(self.length - self.reach), rounded(self.length + self.reach)
         sign, product, xp = SIDES[side], self.length * self.reach, namespace(stroke, self.length, self.reach)
-        near, far = (stroke - gap) * (stroke + gap), (most - stroke) * (most + stroke)
+        near, far = rounded((stroke - gap) * (stroke + gap)), rounded((most - stroke) * (most + stroke))
         inside = xp is np or (near > 0.0) & (far > 0.0)
         near, far, stroke = (divisor(x, inside) for x in (near, far, stroke))
         with np.errstate(all="ignore"):
             near, far = xp.sqrt(near), xp.sqrt(far)
-            beta = 2.0 * xp.atan2(near, far)
-            lever = near * far / (2.0 * stroke)
-            theta, share = self.angle + sign * beta, select(inside, lever / (0.5 * (most + abs(gap))), 0.0)
+            beta = rounded(2.0 * xp.atan2(near, far))
+            lever = rounded(near * far / (2.0 * stroke))
+            theta, share = rounded(self.angle + sign * beta), select(inside, lever / (0.5 * (most + abs(gap))), 0.0)
             if speed is None:
                 return theta, None, np.zeros(np.shape(theta)), share
-            rate = speed / lever
-            growth = (speed * speed + stroke * acceleration - product * xp.cos(beta) * rate * rate) / (lever * stroke)
+            rate = rounded(speed / lever)
+            own, turning = rounded(speed * speed) + rounded(stroke * acceleration), product * xp.cos(beta) * rate * rate
+            growth = rounded((own - rounded(turning)) / (lever * stroke))
         return theta, sign * rate, sign * growth, share
 
 
-def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
+def find_triangle(linkage: FourBar, drive: "LinearDrive | None", rounded: Callable[..., Any] = keep_number) -> Triangle:
     """Return the triangle of a cylinder between the ground and bar 2 or 4; InputError for any other drive."""
     if drive is None or {drive.start.bar, drive.end.bar} not in ({1, 2}, {1, 4}):
         drives = "no cylinder" if drive is None else f"one from bar {drive.start.bar} to bar {drive.end.bar}"
         raise InputError("motion.stroke", drives, "is of a cylinder ([drive]) between the ground and bar 2 or 4")
     own, other = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
     pivot = 0.0 if own.bar == 2 else polar(linkage.ground, linkage.ground_angle)
-    to_ground = polar(other.distance, other.angle + linkage.ground_angle) - pivot
+    end = polar(other.distance, rounded(other.angle + linkage.ground_angle))
+    to_ground = rounded(end, turned=True) - rounded(pivot, turned=True)
     forwards = 0.0 * own.distance  # of its kind
     along = select(own.distance >= 0.0, forwards, np.pi + forwards)
-    return Triangle(own.bar, abs(own.distance), abs(to_ground), angle(to_ground) - own.angle - along)
+    direction = rounded(rounded(angle(to_ground)) - own.angle - along)
+    return Triangle(own.bar, abs(own.distance), rounded(abs(to_ground)), direction)

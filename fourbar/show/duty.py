@@ -238,9 +238,10 @@ def _integrate_power(solution: Solution, power: Array) -> tuple[float | None, fl
     parts = [
         0.5 * spans * (part[..., :-1] + part[..., 1:]) for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0))
     ]
-    if not np.isfinite(parts[0]).any():
+    known = np.isfinite(parts[0]).any(axis=-1)
+    if not known.any():
         return None, None
-    energy_in, energy_out = (_make_plain(np.nansum(part, axis=-1)) for part in parts)
+    energy_in, energy_out = (_make_plain(np.where(known, np.nansum(part, axis=-1), np.nan)) for part in parts)
     return energy_in, energy_out
 
 

@@ -75,6 +75,12 @@ class GearRatio(NamedTuple):
     """Of degree 1, 2, ... up to the one asked for."""
 
 
+class _OpenActions(Actions):
+    """Of polynomials in the place of the loop, which leave it open at B: a spring across that pin works there too."""
+
+    pull = Actions.pull_ends
+
+
 def ratio(scene: Scene, degree: int = MOST) -> GearRatio:
     """Compute the transmission of a linkage over the range of its scene, and the polynomials in its place.
 
@@ -146,7 +152,7 @@ def _list_positions(scene: Scene) -> Command:
 
 def _compute_torque(case: Case, state: State, alpha_2: Any) -> Array:
     """Compute the torque on the input, by virtual work; the state need not close the loop."""
-    actions = Actions(state, case.bodies)
+    actions = _OpenActions(state, case.bodies)
     for term in case.terms:
         term.act(actions, state)
     a, at, k = case.lengths.a, state.at, state.k

@@ -79,13 +79,8 @@ class Study:
         code[self.invalid] = INVALID
         for array in result.values():
             array[self.invalid] = np.nan
-        solution, linkage = make_solution(self.scene, at, code, result), self.scene.linkage
-        length, angle = (self.values.get(f"lengths.{name}") for name in ("ground", "ground_angle"))
-        solution.ground = (
-            linkage.ground if length is None else length[:, None],
-            linkage.ground_angle if angle is None else angle[:, None],
-        )
-        return solution
+        numbers = {key: values[:, None] for key, values in self.values.items()}
+        return make_solution(replace_numbers(self.scene, numbers), at, code, result)
 
     def _list_command(self, rows: slice, columns: slice) -> Command:
         """List some positions of some members, one after the other, (k,)."""

@@ -26,10 +26,11 @@ FIRST = 24
 """Boxes to begin with, to a side."""
 SLACK = 1e-9
 """rad; by how much the boxes overlap a whole turn, so that none of it is left out by rounding."""
-FINEST = 1e-6
-"""rad; a box as narrow that is not decided stays so: there the function and its derivative vanish both."""
 AT_CHANGE_POINT = 1e-4
 """rad; nearer to a change point nothing is decided: the curve crosses itself there."""
+FINEST = 1e-3 * AT_CHANGE_POINT
+"""rad; a box as narrow that is not decided stays so: there the function and its derivative vanish both. A box of a
+hundredth of the distance from a change point is too wide to tell: where A comes to O4 the diagonal turns over it."""
 MANY = 10_000
 """Boxes evaluated; a function that nearly vanishes along the curve needs more, and is given up."""
 STEPS = 6

@@ -366,6 +366,11 @@ def test_the_frame_bears_what_changes_the_momentum_of_the_bars(one: int, other: 
     pins = np.abs(s.F12).max() + np.abs(s.F14).max()
     assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * pins
     assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * pins
+    elsewhere = {"drive.from.at.0": [0.17, 0.12], "drive.to.at.1": [0.7, 0.6]}  # the bars move as before
+    study = fourbar.solve(fourbar.vary(scene, elsewhere))
+    pins = np.abs(study.F12).max() + np.abs(study.F14).max()
+    assert np.abs(shaking_force(study) - force).max() < ROUND_OFF * pins
+    assert np.abs(shaking_moment(study) - moment).max() < ROUND_OFF * pins
     duty, entry = motor_duty(s), write_motor(s, {}, s)
     assert duty.peak_force == np.abs(s.drive_force).max() and duty.peak_torque is None
     assert duty.peak_speed == np.abs(s.stroke_speed).max() and entry["units"]["peak_speed"] == "m/s"

@@ -21,6 +21,8 @@ from tests.support.scenes import crank_rocker
 
 ROUND_OFF = 1e-11
 """Relative: eps over the conditions of these sweeps, 1e-4 at least."""
+BARS = 10.0
+"""Of an error bar, 0.64 standard deviations wide: 2 in ten billion normal errors are beyond."""
 ENDS = {2: SpringEnd(2, 0.12, 0.4), 4: SpringEnd(4, 0.15, -0.6)}
 GROUND = SpringEnd(1, 0.3, 2.2)
 SAMPLED = 0.02
@@ -89,6 +91,18 @@ def test_free_bodies_find_the_angle_by_halving_and_agree(bar: int, side: str) ->
     assert not [row for row in rows if row.failed]
     known = {row.quantity for row in rows if row.engine == "free-body" and row.verdict == AGREES}
     assert known >= {"stroke", "stroke_speed", "drive_force", "omega_3", "alpha_3", "condition", "F43"}
+
+
+@pytest.mark.parametrize(("bar", "strokes"), [(2, [0.181, 0.4, 0.4199999]), (4, [0.4, 0.45, 0.5])])
+def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar: int, strokes: list[float]) -> None:
+    """The ground turned with all that is on it: the same force, every number of which rounds otherwise."""
+    own = replace(scene(bar, np.array(strokes), stroke_speed=0.2, stroke_acceleration=0.1), effects=(), loads=())
+    angles = own.linkage.ground_angle + np.linspace(0.0, 3.0, 100)
+    s = fourbar.solve(fourbar.vary(own, {"lengths.ground_angle": angles}), "error")
+    assert (s.status_code == 0).all() and s.drive_force is not None and s.drive_force_error is not None
+    off = np.abs(s.drive_force - np.median(s.drive_force, axis=0)) / s.drive_force_error
+    assert np.quantile(off, 0.5, axis=0).max() < 1.0 and off.max() < BARS
+    assert np.quantile(off, 0.9, axis=0).min() > 0.1  # no bar is wide enough to hide anything
 
 
 def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular() -> None:

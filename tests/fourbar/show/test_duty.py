@@ -104,4 +104,5 @@ def test_a_study_has_what_each_of_its_members_has() -> None:
             for array, number in zip(of_study, one, strict=True):  # type: ignore[arg-type]
                 assert number == (None if array is None else pytest.approx(array[member], rel=1e-12))
     assert np.isnan(load.largest[3]) and np.isnan(duty.rms_power[3]) and np.isnan(moment[3]).all()  # type: ignore[index]
+    assert np.isnan([duty.energy_in[3], duty.energy_out[3]]).all()  # type: ignore[index]
     assert duty.closed.tolist()[:3] == [True, True, False]  # type: ignore[attr-defined]

@@ -185,6 +185,16 @@ def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move() -> None
         assert min(abs(torques.torque_low[1]), abs(torques.torque_high[1])) <= 1e-9 * size
 
 
+@pytest.mark.parametrize("lengths", [(3.0, 3.0, 4.0, 4.0), (4.0, 4.0, 3.0, 3.0), (1.0, 1.0, 3.0, 3.0)])
+def test_beside_a_change_point_nothing_is_taken_for_a_rest(lengths: tuple[float, ...]) -> None:
+    """A kite in which A comes to O4, turned with its gravity: as many equilibria, and as many undecided, none."""
+    d, a, b, c = lengths
+    for turn in (0.0, 0.3, 2.0):
+        linkage = FourBar(d, Bar(a, 50.0, None, (1.2, 2.4)), Bar(b, 1.0), Bar(c, 6.0), turn)
+        found = equilibrium(Scene(linkage, Motion(1.0 + turn), effects=(Gravity(9.81, turn - 1.9),)))
+        assert found.proven and sorted(each.stability for each in found.found) == ["stable"] * 2 + ["unstable"] * 2
+
+
 def test_what_has_no_answer_says_so() -> None:
     assert equilibrium(crank_as_pendulum()).indifferent and not equilibrium(crank_as_pendulum()).found
     balanced = crank_as_pendulum(DOWN)

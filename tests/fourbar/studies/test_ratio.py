@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import mujoco
@@ -70,7 +71,9 @@ def test_the_errors_are_those_of_the_polynomials(bonnet: tuple[Scene, GearRatio]
 def test_the_torque_of_a_mimic_joint_is_the_work_of_its_energy() -> None:
     """dE/dt at constant omega_2, E from the polynomials alone: no kinematic coefficient, no formula for J'."""
     linkage = uniform(0.3, 0.1, 0.25, 0.22)
-    scene = Scene(linkage, Motion(Sweep(0.5, 1.5, 50), 7.0), effects=(fourbar.Gravity(),))
+    ends = {bar: SpringEnd(bar, 0.08, angle) for bar, angle in ((2, 0.5), (3, -0.7), (4, 0.9))}
+    springs = fourbar.Springs(tuple(fourbar.Spring(ends[i], ends[j], 300.0, 0.05) for i, j in combinations(ends, 2)))
+    scene = Scene(linkage, Motion(Sweep(0.5, 1.5, 50), 7.0), effects=(fourbar.Gravity(), springs))
     gear = ratio(scene, 2)
     fit, omega, h = gear.fits[1], 7.0, 1e-4
 
@@ -86,7 +89,12 @@ def test_the_torque_of_a_mimic_joint_is_the_work_of_its_energy() -> None:
         for bar, here, (G0, t0), (G1, t1) in zip(linkage.moving, places(q), places(q - h), places(q + h), strict=True):
             v, w = omega * (G1 - G0) / (2 * h), omega * (t1 - t0) / (2 * h)
             total += 0.5 * bar.mass * abs(v) ** 2 + 0.5 * bar.moment_of_inertia * w * w + 9.81 * bar.mass * here[0].imag
-        return float(total)
+        feet = (0.0, 0.1 * np.exp(1j * q), 0.3)
+        held = [
+            foot + ends[bar].distance * np.exp(1j * (here[1] + ends[bar].angle))
+            for foot, bar, here in zip(feet, ends, places(q), strict=True)
+        ]
+        return float(total + sum(150.0 * (abs(one - other) - 0.05) ** 2 for one, other in combinations(held, 2)))
 
     worst = fit.torque.theta_2
     mimic = (energy(worst + h) - energy(worst - h)) / (2.0 * h)
