@@ -157,8 +157,8 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     _scale_bar(panels[0], scale, biggest, view.units)
     note(
         view,
-        "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a at G (d'Alembert), with which "
-        "the forces and the moments on each bar add up to zero.",
+        f"At {view.at}. Bars and forces each to one scale, in world axes; dashed: inertia forces −m a at G "
+        "(d'Alembert), with which the forces and the moments on each bar add up to zero.",
     )
 
 
