@@ -26,7 +26,7 @@ class InputError(FourBarError):
     Parameters
     ----------
     key : dotted name of the offending entry, for example ``"bars.input.mass"``.
-    value : what was given.
+    value : what was given; None is not shown, as of an entry that is left out.
     allowed : one phrase that says what would have been accepted.
     file : the file it stands in, where there is one.
     """
@@ -37,7 +37,7 @@ class InputError(FourBarError):
         if len(shown) > LONGEST_SHOWN:  # of a long path the end says which
             shown = f"{shown[: LONGEST_SHOWN // 2 - 3]}...{shown[-LONGEST_SHOWN // 2 :]}"
         where = f"{file}: " if file else ""
-        super().__init__(f"{where}{key} = {shown}: {allowed}")
+        super().__init__(f"{where}{key}{'' if value is None else f' = {shown}'}: {allowed}")
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         """Let the error cross from one process to another as it was made."""

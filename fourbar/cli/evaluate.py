@@ -57,7 +57,8 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
             "--lengths", bare[0], "the unit is missing; write each with its own, like 300mm, or --unit mm once"
         )
     write_text(file, write_new_scene([f"{text} {unit}" if text in bare else text for text in lengths]))
-    click.echo(f"wrote {file}; edit it, then: fourbar analyze {file}")
+    shown = str(file) if " " not in str(file) else f'"{file}"'  # to be copied into any shell
+    click.echo(f"wrote {file}; edit it, then: fourbar analyze {shown}")
 
 
 @click.command()

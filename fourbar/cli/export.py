@@ -39,10 +39,10 @@ def plot(
     """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
     from fourbar.show.plot import draw
 
-    if position is not None and given.is_bare(position):  # it may have been meant in any unit
-        raise InputError("--position", position, f'the unit is missing; did you mean "{position} deg"?')
     with given.open_scene(scene) as described, given.show_waiting(described):
-        unit = "rad" if described.motion.stroke is None else "m"
+        unit, likely = ("rad", "deg") if described.motion.stroke is None else ("m", "mm")
+        if position is not None and given.is_bare(position):  # it may have been meant in any unit
+            raise InputError("--position", position, f'the unit is missing; did you mean "{position} {likely}"?')
         at = None if position is None else given.read_number("--position", position, unit)
         draw(described, out, figure, position=at, branches=branches, units=units, dimensions=dimensions)
 

@@ -60,15 +60,13 @@ def open_scene(path: Path) -> Iterator[Scene]:
     file too.
     """
     from fourbar.files import load
-    from fourbar.scene.motion import Free, Sweep
+    from fourbar.scene.motion import require_steps
     from fourbar.writing import require_file
 
     scene, out = load(path), click.get_current_context().params.get("out")
     if out is not None:
         require_file(out, path)
-    for key, described in ((f"motion.{scene.motion.names[0]}", scene.motion.angle), ("motion.free", scene.motion.free)):
-        if isinstance(described, (Sweep, Free)) and described.steps >= MOST_POSITIONS:
-            raise InputError(f"{key}.steps", described.steps, f"must be below {MOST_POSITIONS} here", str(path))
+    require_steps(scene.motion, MOST_POSITIONS, "here", str(path))
     try:
         yield scene
     except InputError as error:

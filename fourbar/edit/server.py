@@ -138,12 +138,17 @@ class Workbench:
     async def _sample(self, data: dict[str, Any]) -> None:
         """Send what the tolerances do, unless something has changed meanwhile."""
         scene = self.session.now.scene
+
+        def give_up(_: float) -> None:
+            if self.ended.is_set() or scene is not self.session.now.scene:
+                raise FourBarError("nobody waits for these samples any more")
+
         if scene.tolerances:
-            found = await self.loop.run_in_executor(
-                self.aside, collect_tolerances, scene, data["over"]["values"] or data["theta_2"]
-            )
-            if scene is self.session.now.scene:
-                self.tell({"tolerances": found})
+            with suppress(FourBarError):
+                places = data["over"]["values"] or data["theta_2"]
+                found = await self.loop.run_in_executor(self.aside, collect_tolerances, scene, places, give_up)
+                if scene is self.session.now.scene:
+                    self.tell({"tolerances": found})
 
     async def serve(self, port: int, browse: bool) -> None:
         """Serve until all pages have gone, or until Ctrl-C."""

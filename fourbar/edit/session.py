@@ -19,6 +19,7 @@ from fourbar.files.new import write_new_scene
 from fourbar.files.reading import read_bytes
 from fourbar.files.scene_file import LARGEST_FILE
 from fourbar.scene import Scene
+from fourbar.scene.motion import require_steps
 from fourbar.show.units import units
 from fourbar.solution import Conversion
 from fourbar.studies.keys import list_entries, read_place
@@ -28,6 +29,8 @@ SCHEMA = "fourbar-edit/1"
 ENDING = ".edit"
 MOST_STATES = 500
 """That are kept for undo."""
+MOST_POSITIONS = 100_000
+"""That a change solves anew, in a second; a slip of the finger on the number of steps is not to fill the memory."""
 LARGEST_STATE = 100_000_000
 """Bytes of a state file."""
 TOKEN = re.compile(r"[A-Za-z0-9_-]{32,100}")
@@ -104,7 +107,9 @@ class Session:
     def _read(self, text: str) -> SceneState:
         if len(text.encode()) > LARGEST_FILE:
             raise InputError("scene file", len(text), f"must not exceed {LARGEST_FILE} bytes")
-        return SceneState(text, loads(text, str(self.path)), tomllib.loads(text))
+        scene = loads(text, str(self.path))
+        require_steps(scene.motion, MOST_POSITIONS, "in the workbench", str(self.path))
+        return SceneState(text, scene, tomllib.loads(text))
 
     # ---- what a page asks for ----------------------------------------------------------------
 

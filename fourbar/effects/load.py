@@ -90,9 +90,9 @@ class Table:
         # a position just below the first angle has come round to a whole turn above it
         round_ = beyond & (first + TURN - place < 1e-12 * TURN)
         if not (round_ == beyond).all():
-            raise InputError(
-                "loads.table.theta_2", float(np.max(place)), f"covers {first:g} to {last:g} rad; this lies outside"
-            )
+            ends, bad = np.degrees((first, last)), math.degrees(float(np.max(place)))
+            allowed = f"covers {ends[0]:.6g} to {ends[1]:.6g} deg; the position at {bad:.6g} deg lies outside"
+            raise InputError("loads.table.theta_2", None, allowed)
         return np.where(round_, first, place)
 
 

@@ -59,7 +59,7 @@ class Reader:
     def number(self, key: str, value: object) -> float:
         """Read a number without a dimension."""
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise self.refuse(key, value, "must be a finite number without a unit")
+            raise self.refuse(key, value, "must be a finite number without a unit, and without quotes")
         return float(value)
 
     def quantity(self, key: str, value: object, unit: str, bound: str = ANY) -> float:

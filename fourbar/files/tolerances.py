@@ -7,7 +7,7 @@ from fourbar.files.fields import Reader, write_quantity
 from fourbar.linkage import ANY, POSITIVE
 from fourbar.scene import Scene
 from fourbar.scene.tolerance import Tolerance
-from fourbar.studies.keys import LEFT_OUT, is_left_out, list_entries, read_place, refuse_key
+from fourbar.studies.keys import COMMAND_KEYS, LEFT_OUT, is_left_out, list_entries, read_place, refuse_key
 
 SIGMA = "sigma"
 
@@ -17,6 +17,8 @@ def read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Toleranc
     known, found = list_entries(scene), []
     for key, given in _flatten(read, value).items():
         name = f'tolerances."{key}"'
+        if key in COMMAND_KEYS:
+            raise read.refuse(name, given, "is what is commanded, and is held; its speed and acceleration may scatter")
         if key not in known:
             raise read.refuse(name, given, refuse_key(key, given, list(known)).allowed)
         entry, sigma = known[key], isinstance(given, list)

@@ -105,7 +105,7 @@ def _suggest(number: str, name: str, unit: str) -> str:
     candidates = [words.sub(lambda match, by=by: by[match[0]], name) for by in swapped]  # type: ignore[misc]
     candidates += [
         f"{name}/rad",
-        f"rad {name.removeprefix('1')}",
+        f"rev{name.removeprefix('1')}" if name.endswith("min") else f"rad{name.removeprefix('1')}",
         re.sub(r"(?<=[A-Za-z])([23])(?![0-9])", r"^\1", name),
     ]
     for candidate in candidates:

@@ -189,3 +189,10 @@ class Motion:
     def acceleration(self) -> float:
         """Of the commanded bar, rad/s^2."""
         return getattr(self, self.names[2])  # type: ignore[no-any-return]
+
+
+def require_steps(motion: Motion, most: int, where: str, file: str) -> None:
+    """Raise InputError for as many steps or more: of a sweep, a law or a release each is a position in the memory."""
+    for name, stated in ((motion.names[0], motion.angle), ("law", motion.law), ("free", motion.free)):
+        if isinstance(stated, (Sweep, Law, Free)) and stated.steps >= most:
+            raise InputError(f"motion.{name}.steps", stated.steps, f"must be below {most} {where}", file)

@@ -63,7 +63,8 @@ def _write_holding(found: Equilibria) -> tuple[list[str], Any]:
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
     if np.isfinite(values).any():
         most = int(np.nanargmax(np.abs(values)))
-        lines.append(f"largest: {values[most]:.6g} {drive.unit} at theta_2 = {_write_degrees(at.theta_2[most])} deg")
+        largest = "largest" if low is None else "largest without friction"
+        lines.append(f"{largest}: {values[most]:.6g} {drive.unit} at theta_2 = {_write_degrees(at.theta_2[most])} deg")
     return lines, make_plain_table([*heads, "released"], rows, left=("released",))
 
 

@@ -1,6 +1,7 @@
 """What `fourbar tolerance` prints: a table where the spread is largest, and one JSON object."""
 
 import math
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -121,17 +122,21 @@ def _name_largest(found: Tolerances, spread: Spread, at: int) -> str:
     return ", ".join(f"{100.0 * shares[i] / total:.0f} % {found.scene.tolerances[i].key}" for i in order)
 
 
-def collect_tolerances(scene: Scene, places: list[float]) -> dict[str, Any]:
+def collect_tolerances(
+    scene: Scene, places: list[float], progress: Callable[[float], None] | None = None
+) -> dict[str, Any]:
     """Collect what a page shows of them at places of its axis: deviations from the nominal, shares of the variance.
 
-    A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so.
+    A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so. `progress` is
+    that of `tolerances`; left out, a line in the terminal.
     """
     given: dict[str, Any] = {scene.motion.names[0]: np.array(places)}
     positions = scene if scene.motion.law else replace(scene, motion=replace(scene.motion, **given))
-    shown = nullcontext() if scene.motion.free is not None else show_running("the samples of the tolerances are solved")
+    quiet = progress is not None or scene.motion.free is not None
+    shown = nullcontext(progress) if quiet else show_running("the samples of the tolerances are solved")
     try:
-        with shown as progress:
-            found = tolerances(positions, PAGE_SAMPLES, progress=progress)
+        with shown as report:
+            found = tolerances(positions, PAGE_SAMPLES, progress=report)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
     at = np.linspace(0, len(found.theta_2) - 1, len(places)).round().astype(int)  # a law is thinned as in `page_data`

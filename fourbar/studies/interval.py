@@ -40,7 +40,7 @@ def require(scene: Scene) -> None:
         if term.key not in KNOWN or getattr(term, "table", None) is not None:
             key = "loads" if term.key == "load" else f"effects.{term.key}"
             allowed = "gravity, viscous, springs, flywheel and loads without a table"
-            raise InputError(key, term.key, f"its extremes cannot be guaranteed; those with {allowed} can")
+            raise InputError(key, None, f"its extremes cannot be guaranteed; those with {allowed} can")
 
 
 def find_interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float]:

@@ -100,7 +100,7 @@ def ratio(scene: Scene, degree: int = MOST) -> GearRatio:
     degree = require_whole("degree", degree, range(1, MOST + 1), f"must be 1 to {MOST}")
     for term in scene.effects:
         if term.loaded_pins:
-            raise InputError(f"effects.{term.key}", term.key, "needs pin forces, which a mimic joint does not have")
+            raise InputError(f"effects.{term.key}", None, "needs pin forces, which a mimic joint does not have")
     at = _list_positions(scene)
     low, high = float(at.theta_2.min()), float(at.theta_2.max())
     for point in change_points(scene.linkage) if scene.motion.through == "sign" else ():

@@ -317,6 +317,7 @@ def test_a_read_only_folder_is_reported(tmp_path: Path) -> None:
     ("motion", "key"),
     [
         ('theta_2 = { from = "0 deg", to = "9 deg", steps = %d }', "motion.theta_2"),
+        ('law = { time = ["0 s", "1 s"], theta_2 = ["0 deg", "9 deg"], ends = "rest", steps = %d }', "motion.law"),
         ('theta_2 = "1 deg"\nfree = { duration = "1 s", steps = %d }', "motion.free"),
     ],
 )

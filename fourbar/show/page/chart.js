@@ -36,7 +36,7 @@ function chartFrame(chart, low, high) {
   set(chart, { viewBox: `0 0 ${width} ${height}` });
   const { values: over, factor, sign } = axis(), first = over[0], span = over[over.length - 1] - first || 1;
   const x = t => left + (width - left - 12) * (t - first) / span, y = v => 10 + (height - 10 - bottom) * (high - v) / (high - low);
-  const most = Math.max(3, width / 75), wide = Math.abs(span) * factor, decade = 10 ** Math.floor(Math.log10(wide / most));
+  const most = Math.max(3, (width - left - 12) / (factor === DEG ? 60 : 85)), wide = Math.abs(span) * factor, decade = 10 ** Math.floor(Math.log10(wide / most));
   const step = (factor === DEG ? [15, 30, 45, 60, 90, 180] : [1, 2, 5, 10].map(m => m * decade)).find(d => wide / d <= most) ?? 360;
   for (let n = Math.ceil(first * factor / step - 1e-9); n * step <= (first + span) * factor + 1e-9 * step; n++) {
     const at = x(n * step / factor), shown = String(Number((n * step).toPrecision(12)));

@@ -151,14 +151,15 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
     scale = 0.75 * longest / biggest if biggest > 0.0 else 0.0
     # one window size: the bars, too, are to one scale
     span = WINDOW * max(float(np.ptp(_reach(v, bar, arrows, scale), axis=0).max()) for v, bar, arrows, _ in freed)
+    note(view, f"At {view.at}.")
     for axes, text, (_, bar, arrows, couples) in zip(panels, below, freed, strict=False):
         _draw_one(axes, view, bar, arrows, scale, biggest, labels, span)
         _write_couples(text, view, couples)
     _scale_bar(panels[0], scale, biggest, view.units)
     note(
         view,
-        "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a at G (d'Alembert), with which "
-        "the forces and the moments on each bar add up to zero.",
+        "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a at G "
+        "(d'Alembert), with which the forces and the moments on each bar add up to zero.",
     )
 
 

@@ -140,14 +140,13 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
     for axes, name in zip(panels, names, strict=True):
         changes = {row.key: abs(row.change) for row in found.influences(name)}
         sizes = np.array([changes.get(key, 0.0) for key in keys])
-        factor, unit = choose_unit(sizes.max(initial=0.0), find_unit(name))
+        factor, unit = choose_unit(sizes.max(initial=0.0), find_unit(name), shown.units)
         axes.barh(range(len(keys)), factor * sizes, height=0.62, color=FORCE_COLOURS.get(name, INK))
         axes.set_yticks(range(len(keys)), keys if axes is panels[0] else [""] * len(keys), size=6.8)
-        title = name if len(name) <= 10 else name[:9] + "…"
-        axes.set(ylim=(-0.6, len(keys) - 0.4), title=title, xlabel=unit)
+        axes.set(ylim=(-0.6, len(keys) - 0.4), title=shorten_text(name, 12), xlabel=unit)
         axes.grid(False, axis="y")
         axes.locator_params(axis="x", nbins=3)
-        most, own_unit = choose_unit(find_largest(found, name), find_unit(name))
+        most, own_unit = choose_unit(find_largest(found, name), find_unit(name), shown.units)
         text = f"largest\n{most * find_largest(found, name):.3g} {own_unit}"
         axes.text(0.98, 0.02, text, transform=axes.transAxes, ha="right", va="bottom", size=6.8)
     shown.notes.append(

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import re
+import shlex
 import stat
 import subprocess
 import sys
@@ -211,7 +212,7 @@ def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None
     [
         (("analyze", "x.toml", "--json", "--csv"), "give one of them"),
         (("analyze", "x.toml", "--json", "--every", 2), "hold every position"),
-        (("plot", "x.toml", "-o", "a.svg", "--position", "12"), 'did you mean "12 deg"?'),
+        (("plot", MODELS / "crank_rocker.toml", "-o", "a.svg", "--position", "12"), 'did you mean "12 deg"?'),
         (("new", "--lengths", 3, 1, 2, 2), "name the new file once"),
     ],
 )
@@ -348,6 +349,24 @@ def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> No
     assert (tmp_path / "b.xml").read_text() == write_mjcf_for(scene)
     assert run("mjcf", MODELS / "thesis.toml", "--drive", "motor", "-o", tmp_path / "c.xml")[0] == HOLDS
     assert (tmp_path / "c.xml").read_text() == write_mjcf_for(load(MODELS / "thesis.toml"), drive="motor")
+
+
+def test_a_bare_position_on_a_stroke_may_be_millimetres_and_no_angle(tmp_path: Path, run: Fourbar) -> None:
+    path = tmp_path / "cylinder.toml"
+    text = (MODELS / "crank_rocker.toml").read_text(encoding="utf-8")
+    motion = '[motion]\nstroke = "0.35 m"\nside = "left"\n'
+    ends = 'from = { bar = 1, at = ["0.4 m", "180 deg"] }\nto = { bar = 2, at = ["0.1 m", "0 deg"] }\n'
+    head, _, rest = text.partition("[motion]")
+    path.write_text(f"{head}{motion}[drive]\n{ends}", encoding="utf-8")
+    assert rest and run("analyze", path)[0] == HOLDS
+    code, _, err = run("plot", path, "-o", tmp_path / "a.svg", "--position", "350")
+    assert code == BAD_INPUT and 'did you mean "350 mm"?' in err
+
+
+def test_the_command_that_new_names_can_be_copied(tmp_path: Path, run: Fourbar) -> None:
+    path = tmp_path / "my wiper.toml"
+    out = run("new", path, "--lengths", "3 m", "1 m", "2.5 m", "2.2 m")[1]
+    assert shlex.split(out.strip())[-3:] == ["fourbar", "analyze", str(path)]
 
 
 @pytest.mark.parametrize("form", ["sdf", "usd"])

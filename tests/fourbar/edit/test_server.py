@@ -8,6 +8,7 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Awaitable, Callable
@@ -184,6 +185,30 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench) -> None:
 
     session = bench(ask)
     assert session.state_file.exists()  # it is not saved
+
+
+def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch) -> None:
+    collect, changed, finished = server.collect_tolerances, threading.Event(), []
+
+    def watched(*given):
+        changed.wait(20)
+        finished.append(collect(*given))
+        return finished[-1]
+
+    async def ask(made: Workbench, address: str) -> None:
+        text = made.session.now.text + '[tolerances]\n"lengths.input" = "0.1 mm"\n'
+        data = made.session.do({"do": "text", "text": text})["data"]
+        sampled = asyncio.create_task(made._sample(data))
+        await asyncio.sleep(0)
+        made.session.do({"do": "set", "path": ["lengths", "input"], "value": "101 mm"})
+        changed.set()
+        await sampled
+        assert not finished
+        await made._sample(data)
+        assert len(finished) == 1
+
+    monkeypatch.setattr(server, "collect_tolerances", watched)
+    bench(ask)
 
 
 def test_it_ends_when_the_last_page_has_gone_and_not_before(bench) -> None:

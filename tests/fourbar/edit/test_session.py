@@ -295,3 +295,12 @@ def test_a_new_scene_begins_where_there_is_no_file(tmp_path: Path) -> None:
     assert not session.saved and session.answer()["undo"] is False
     session.do({"do": "save"})
     assert fourbar.load(session.path).linkage.ground == 0.3
+
+
+def test_a_slip_of_the_finger_on_the_steps_does_not_fill_the_memory(session: Session) -> None:
+    from fourbar.edit.session import MOST_POSITIONS
+
+    path = ["motion", "theta_2", "steps"]
+    answer = session.do({"do": "set", "path": path, "value": str(MOST_POSITIONS)})
+    assert answer["refused"] == f"motion.theta_2.steps: must be below {MOST_POSITIONS} in the workbench"
+    assert "refused" not in session.do({"do": "set", "path": path, "value": "100"})

@@ -342,3 +342,9 @@ def test_a_flywheel_on_the_driven_bar_asks_for_its_inertia_times_the_acceleratio
 def test_a_sweep_without_theta_2_still_runs_over_the_range() -> None:
     assert len(solve(crank_rocker(motion=Motion(None, 1.0)), "position")) == 361
     assert isinstance(crank_rocker().motion.theta_2, Sweep)
+
+
+def test_a_table_says_in_degrees_what_it_covers_and_what_lies_outside() -> None:
+    table = fourbar.effects.Table(("0 deg", "90 deg"), (0.0, 1.0))
+    with pytest.raises(InputError, match="covers 0 to 90 deg; the position at 120 deg lies outside"):
+        table.at(np.radians([45.0, 120.0]))

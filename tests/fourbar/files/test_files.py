@@ -123,7 +123,8 @@ def test_an_angle_is_a_dimension(text: str) -> None:
     [
         ("5 lb", "N", "5 lbf"), ("5 lbf", "kg", "5 lb"), ("3 oz in", "N m", "3 ozf in"), ("5 Hz", "rad/s", "5 rev/s"),
         ("5 RPM", "rad/s", "5 rpm"), ("5 Newton", "N", "5 newton"), ("2 N m", "N m/rad", "2 N m/rad"),
-        ("5 1/s", "rad/s", "5 rad /s"), ("5 kg cm2", "kg m^2", "5 kg cm^2"), ("1 m/s2", "m/s^2", "1 m/s^2"),
+        ("5 1/s", "rad/s", "5 rad/s"),
+        ("5 1/min", "rad/s", "5 rev/min"), ("5 kg cm2", "kg m^2", "5 kg cm^2"), ("1 m/s2", "m/s^2", "1 m/s^2"),
         ("30 cms", "m", "30 cm"), ("300 MM", "m", "300 mm"), ("5 pounds", "N", "5 lbf"), ("0,3 m", "m", "0.3 m"),
     ],
 )  # fmt: skip

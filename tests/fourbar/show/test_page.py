@@ -3,6 +3,7 @@
 import math
 import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -226,6 +227,19 @@ def test_another_command_is_the_axis_and_the_linkage_follows(browse, motion, nam
     assert driver.find_element("id", "over").text == "Over θ₂" and driver.find_element("id", "branch").is_displayed()
     driver.find_element("id", "original").click()
     assert driver.find_element("id", "over").text == over
+
+
+@pytest.mark.parametrize("width", [360, 400, 480, 1280])
+def test_the_numbers_of_an_axis_stand_clear_of_each_other(browse, width: int) -> None:
+    drive = fourbar.LinearDrive(SpringEnd(1, 1.45, math.radians(-160.0)), SpringEnd(2, 0.29, 0.17))
+    motion = fourbar.Motion(stroke=fourbar.Sweep(1.2, 1.7, 40), stroke_speed=0.2, side="left")
+    scene = fourbar.Scene(fourbar.uniform(0.9, 0.3, 0.75, 0.66), motion, drive=drive)
+    boxes = browse(animate.write_page(scene), width).execute_script(
+        "return [...chart.querySelectorAll('text')].filter(t => t.textContent.endsWith('mm'))"
+        ".map(t => t.getBoundingClientRect()).map(box => [box.left, box.right])"
+    )
+    assert len(boxes) > 2, boxes
+    assert all(after - before > 3.0 for (_, before), (after, _) in pairwise(boxes))
 
 
 def test_a_changed_length_redraws_by_the_formulas_and_hides_the_forces(browse) -> None:

@@ -91,7 +91,7 @@ def test_with_tolerances_no_linkage_lies_outside(rocker: tuple[Scene, Extremes])
     ("changes", "words"),
     [
         ({"motion": Motion(1.0)}, "is needed for extremes"),
-        ({"effects": (Friction.at(B=0.05),)}, "cannot be guaranteed; those with gravity"),
+        ({"effects": (Friction.at(B=0.05),)}, "effects.friction: its extremes cannot be guaranteed; those with"),
         ({"linkage": fourbar.uniform(0.3, 0.1, 0.3, 0.1)}, "change point"),
         ({"tolerances": (Tolerance("bars.coupler.inertia", 1e-4),)}, "is no number that the scene states"),
     ],

@@ -225,3 +225,6 @@ def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whol
     print_table(summary_of([replace(demo(draw=False), name=row.scene, rows=[row])]), tmp_path)
     line = next(line for line in capsys.readouterr().out.splitlines() if "mujoco-simulated" in line)
     assert line.split() == ["mujoco-simulated", "limit_positions", "3.1e+00", "1.0e-09", "3.1e+09", "28.6"]
+    nowhere = replace(row, theta_2=float("nan"))
+    print_table(summary_of([replace(demo(draw=False), name=row.scene, rows=[nowhere])]), tmp_path)
+    assert "3.1e+09 -" in " ".join(capsys.readouterr().out.split())  # what holds at no one position

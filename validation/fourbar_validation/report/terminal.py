@@ -37,7 +37,7 @@ def print_table(summary: Summary, out: Path) -> None:
                 write_short(w.row.error),
                 write_short(w.row.allowed),
                 f"{w.used:.2g}",
-                f"{math.degrees(w.row.theta_2):.1f}",
+                "-" if math.isnan(w.row.theta_2) else f"{math.degrees(w.row.theta_2):.1f}",
             )
             words = (f"  {escape(w.row.engine)}", escape(w.row.quantity))
             shown.add_row(*words, *numbers, style="" if w.failed == 0 else "bold red")

@@ -12,7 +12,8 @@ from typing import Protocol
 from fourbar.errors import InputError
 from fourbar.files import loads, read_text, reading
 from fourbar.scene import Scene
-from fourbar.scene.motion import DEFAULT_STEPS, Free, Sweep
+from fourbar.scene.motion import DEFAULT_STEPS, Free, Sweep, require_steps
+from fourbar.scene.motion_law import Law
 from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
@@ -125,14 +126,13 @@ def _write_printed(name: str) -> str:
 
 def _count_positions(scene: Scene, file: Path) -> int:
     """Count the positions that a scene asks for, or what takes as long; InputError beyond the most."""
-    for key, stated in ((f"motion.{scene.motion.names[0]}", scene.motion.angle), ("motion.free", scene.motion.free)):
-        if isinstance(stated, (Sweep, Free)):
-            if stated.steps >= MOST_POSITIONS:
-                raise InputError(f"{key}.steps", stated.steps, f"must be below {MOST_POSITIONS} in a run", str(file))
+    require_steps(scene.motion, MOST_POSITIONS, "in a run", str(file))
+    for stated in (scene.motion.angle, scene.motion.law, scene.motion.free):
+        if isinstance(stated, (Sweep, Law, Free)):
             seconds = stated.duration if isinstance(stated, Free) else 0.0
             if seconds > MOST_SECONDS:
                 allowed = f"must not exceed {MOST_SECONDS:g} s in a run: engines go through it in steps of 1 ms"
-                raise InputError(f"{key}.duration", seconds, allowed, str(file))
+                raise InputError("motion.free.duration", seconds, allowed, str(file))
             return stated.steps + 1 + math.ceil(AS_LONG_AS * seconds)
     return DEFAULT_STEPS + 1
 

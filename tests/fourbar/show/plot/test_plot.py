@@ -171,6 +171,18 @@ def test_couples_of_a_free_body_have_an_arrow_and_no_sign() -> None:
     assert lines and not any(" = −" in line for line in lines)
 
 
+def test_free_bodies_say_at_which_position_they_are_drawn() -> None:
+    figure = composed(crank_rocker(), "freebody", position=math.radians(135.0))
+    assert " ".join(figure.subfigs[0].get_supxlabel().split()).startswith("At θ₂ = 135°. ")
+
+
+def test_the_sensitivities_have_the_units_asked_for_and_whole_names() -> None:
+    panels = composed(crank_rocker(), "sensitivity", units="imperial").axes
+    assert [axes.get_xlabel() for axes in panels[:2]] == ["lbf in", "lbf"]
+    largest = np.abs(fourbar.solve(crank_rocker()).torque).max() / 0.112984829
+    assert f"{largest:.3g} lbf in" in panels[0].texts[0].get_text()
+
+
 def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line() -> None:
     shown = make_view(thesis(FULL_TURN))
     panel = composed(thesis(FULL_TURN), "torque").axes[0]
