@@ -37,6 +37,7 @@ HARNESS = fourbar_validation.cli.group
 GROUPS = {"fourbar": fourbar.cli.group, "validation": HARNESS, "fourbar-validation": HARNESS}
 TOP = ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")
 PAGES = [*(ROOT / f"{name}.md" for name in TOP), *sorted(DOCS.rglob("*.md"))]
+FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
 
 
 def read(name: str) -> str:
@@ -157,7 +158,7 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
     assert {effect.key for effect in scene.effects} <= set(REGISTRY)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*PAGES, *FORMS], ids=lambda page: page.name)
 def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> None:
     """Those in running text and shell blocks run for minutes or name a SCENE: they are parsed as they stand."""
     text = page.read_text(encoding="utf-8")
@@ -166,6 +167,8 @@ def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> N
     for line in lines:
         words = shlex.split(line.removeprefix("python -m "), comments=True)
         program = GROUPS[words[0]]
+        if words[1:] == ["--version"]:
+            continue
         _, command, arguments = program.resolve_command(click.Context(program), words[1:])
         assert command is not None, line
         if arguments:
