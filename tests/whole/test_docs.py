@@ -243,6 +243,13 @@ def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
     assert read("docs/theory.svg") == runpy.run_path(str(DOCS / "theory.py"))["text"]()
 
 
+def test_the_picture_of_the_readme_is_the_one_that_is_drawn(tmp_path: Path) -> None:
+    """By what is written in it: another matplotlib draws other paths."""
+    assert status(["plot", str(ROOT / "models" / "crank_rocker.toml"), "-o", str(tmp_path / "drawn.svg")]) == HOLDS
+    drawn, kept = (path.read_text(encoding="utf-8") for path in (tmp_path / "drawn.svg", DOCS / "crank_rocker.svg"))
+    assert re.findall("<!-- (.*) -->", drawn) == re.findall("<!-- (.*) -->", kept)
+
+
 def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
     suite = read_suite(GALLERY / "suite.txt")
     names = [suite.name(index) for index in range(len(suite))]
