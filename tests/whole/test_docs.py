@@ -59,6 +59,14 @@ def test_the_examples_of_continuous_integration_use_commands_and_options_that_ex
             assert wanted <= known and wanted, (file.name, name, wanted - known)
 
 
+def test_the_run_of_a_pull_request_makes_the_folder_of_its_reports(checkout: Path) -> None:
+    (line,) = re.findall(r"validation (run [^:]*?)\n\s+- ", read("docs/ci/four-bar.yml"))
+    assert not Path("results").exists()
+    assert harness([*line.split(), "models/crank_rocker.toml", "--engines=free-body", "--no-pictures"]) == HOLDS
+    assert "comparisons" in Path("results/changes.md").read_text(encoding="utf-8")
+    assert "<testcase" in Path("results/changes.xml").read_text(encoding="utf-8")
+
+
 def test_every_long_part_is_run_in_the_night() -> None:
     (parts,) = re.findall(r"^LONG := (.*)$", read("Makefile"), re.MULTILINE)
     (nightly,) = re.findall(r"part: \[(.*)\]", read(".github/workflows/nightly.yml"))
