@@ -92,9 +92,11 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None) 
     import click  # on the command line alone
 
     given = sys.argv[1:] if arguments is None else arguments
+    # a program without a console, or one started with `>&-`, has none
+    streams = tuple(each or open(os.devnull, "w", encoding="utf-8") for each in (sys.stdout, sys.stderr))  # noqa: SIM115
+    sys.stdout, sys.stderr = streams
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal that has no Greek still gets its table
-    streams = (sys.stdout, sys.stderr)
     try:
         result = group.main(args=given, prog_name=program, standalone_mode=False)
         status = HOLDS if result is None else int(result)
@@ -121,7 +123,7 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None) 
         return _say(f"internal error: {type(error).__name__}: {error} (FOURBAR_TRACEBACK=1 shows where)", BROKEN)
 
 
-def _read_exit(left: SystemExit, streams: tuple[TextIO | None, ...]) -> int:
+def _read_exit(left: SystemExit, streams: tuple[TextIO, ...]) -> int:
     """Return the exit status of a command that raised SystemExit.
 
     Click and rich leave with 1 where the reader of a pipe has gone; it has what it wants. Click lets go of standard
@@ -136,23 +138,22 @@ def _read_exit(left: SystemExit, streams: tuple[TextIO | None, ...]) -> int:
     return _say(left.code, BROKEN)
 
 
-def _is_unread(stream: TextIO | None) -> bool:
+def _is_unread(stream: TextIO) -> bool:
     """Whether a stream is a pipe that nobody reads any more; taken for one where the system does not know."""
     if not hasattr(select, "poll"):
         return True
     try:
         poll = select.poll()
-        poll.register(stream.fileno(), select.POLLOUT)  # type: ignore[union-attr]
+        poll.register(stream.fileno(), select.POLLOUT)
         return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(0))
-    except (AttributeError, OSError, ValueError):  # no stream, or one without a file
+    except (OSError, ValueError):  # one without a file
         return False
 
 
 def _flush() -> None:
     """Write out what was printed while an error can still be reported; a reader that has gone is none."""
     try:
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        sys.stdout.flush()
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter reports it at its end
 

@@ -37,6 +37,7 @@ HARNESS = fourbar_validation.cli.group
 GROUPS = {"fourbar": fourbar.cli.group, "validation": HARNESS, "fourbar-validation": HARNESS}
 TOP = ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")
 PAGES = [*(ROOT / f"{name}.md" for name in TOP), *sorted(DOCS.rglob("*.md"))]
+FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
 
 
 def read(name: str) -> str:
@@ -56,6 +57,14 @@ def test_the_examples_of_continuous_integration_use_commands_and_options_that_ex
             known = {option for each in group.get_command(None, name).params for option in each.opts}  # type: ignore[arg-type,union-attr]
             wanted = set(re.findall(r"(?<=\s)--[a-z-]+", options))
             assert wanted <= known and wanted, (file.name, name, wanted - known)
+
+
+def test_the_run_of_a_pull_request_makes_the_folder_of_its_reports(checkout: Path) -> None:
+    (line,) = re.findall(r"validation (run [^:]*?)\n\s+- ", read("docs/ci/four-bar.yml"))
+    assert not Path("results").exists()
+    assert harness([*line.split(), "models/crank_rocker.toml", "--engines=free-body", "--no-pictures"]) == HOLDS
+    assert "comparisons" in Path("results/changes.md").read_text(encoding="utf-8")
+    assert "<testcase" in Path("results/changes.xml").read_text(encoding="utf-8")
 
 
 def test_every_long_part_is_run_in_the_night() -> None:
@@ -157,7 +166,7 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
     assert {effect.key for effect in scene.effects} <= set(REGISTRY)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*PAGES, *FORMS], ids=lambda page: page.name)
 def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> None:
     """Those in running text and shell blocks run for minutes or name a SCENE: they are parsed as they stand."""
     text = page.read_text(encoding="utf-8")
@@ -166,6 +175,8 @@ def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> N
     for line in lines:
         words = shlex.split(line.removeprefix("python -m "), comments=True)
         program = GROUPS[words[0]]
+        if words[1:] == ["--version"]:
+            continue
         _, command, arguments = program.resolve_command(click.Context(program), words[1:])
         assert command is not None, line
         if arguments:
@@ -238,6 +249,13 @@ def test_pages_keep_to_their_length() -> None:
 
 def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
     assert read("docs/theory.svg") == runpy.run_path(str(DOCS / "theory.py"))["text"]()
+
+
+def test_the_picture_of_the_readme_is_the_one_that_is_drawn(tmp_path: Path) -> None:
+    """By what is written in it: another matplotlib draws other paths."""
+    assert status(["plot", str(ROOT / "models" / "crank_rocker.toml"), "-o", str(tmp_path / "drawn.svg")]) == HOLDS
+    drawn, kept = (path.read_text(encoding="utf-8") for path in (tmp_path / "drawn.svg", DOCS / "crank_rocker.svg"))
+    assert re.findall("<!-- (.*) -->", drawn) == re.findall("<!-- (.*) -->", kept)
 
 
 def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:

@@ -124,6 +124,15 @@ def test_an_interruption_while_the_libraries_are_imported_is_one_line(module: st
     assert (done.returncode, done.stderr) == (INTERRUPTED, "error: interrupted\n")
 
 
+def test_a_program_without_output_streams_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One started with `>&- 2>&-`, or on Windows without a console."""
+    for stream in ("stdout", "stderr"):
+        monkeypatch.setattr(sys, stream, None)
+    assert [fourbar.cli.status(["analyze", file]) for file in (MODEL, NO_FILE)] == [HOLDS, BAD_INPUT]
+    sys.stdout.close()
+    sys.stderr.close()
+
+
 def test_a_full_disk_names_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")

@@ -8,6 +8,7 @@ import ast
 import fnmatch
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -100,6 +101,16 @@ def test_another_interpreter_finds_the_code_of_a_wheel_and_no_library_of_it(monk
     with import_path() as path:
         assert sorted(entry.name for entry in Path(path).iterdir()) == ["fourbar", "fourbar_validation"]
     assert not Path(path).exists()
+
+
+def test_a_wheel_in_a_folder_of_another_project_takes_that_for_no_checkout(tmp_path: Path) -> None:
+    """`pip install --target vendor` at the top of a project."""
+    package = tmp_path / "vendor" / "fourbar_validation"
+    shutil.copytree(ROOT / "models", package / "models")
+    shutil.copy(ROOT / "validation" / "fourbar_validation" / "places.py", package)
+    (tmp_path / "pyproject.toml").touch()
+    places = runpy.run_path(str(package / "places.py"))
+    assert places["CHECKOUT"] is None and (places["MODELS"] / "thesis.toml").is_file()
 
 
 def test_every_library_that_fourbar_imports_is_declared() -> None:

@@ -12,8 +12,8 @@ from fourbar.errors import FourBarError
 
 PACKAGE = Path(__file__).resolve().parent
 FORMULAS = Path(fourbar.__file__).resolve().parent
-CHECKOUT = PACKAGE.parents[1] if (PACKAGE.parents[1] / "pyproject.toml").is_file() else None
-"""The folder of pyproject.toml, models, tests and docs; None where the package is installed without them."""
+CHECKOUT = None if (PACKAGE / "models" / "problems").is_dir() else PACKAGE.parents[1]
+"""The folder of pyproject.toml, models, tests and docs; None where the package is installed, with the models in it."""
 MODELS = PACKAGE / "models" if CHECKOUT is None else CHECKOUT / "models"
 PROGRAM = "fourbar-validation" if CHECKOUT is None else "python -m validation"
 """How the harness is called here."""

@@ -117,7 +117,8 @@ def command(
                 raise InputError(
                     f"--{form}", str(path), "tells differences; say --against BASELINE or --python PATH too"
                 )
-            require_file(path, *scenes)
+            if out.exists() or path.parent != out:  # a folder that the run will make
+                require_file(path, *scenes)
     if against is not None:
         open_run(find_baseline(against))  # before anything runs
     suite, witnesses = select_scenes(scenes, named, count, seed or 0, types or ALL_TYPES, adapters)
