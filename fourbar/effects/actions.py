@@ -87,7 +87,7 @@ class Actions:
         point, sense = (end, -1.0) if end.bar > start.bar else (start, 1.0)
         on_second, arm = self.rounded(sense * force, turned=True), point.arm(self.state)
         if pin == "B":  # which is no first pin
-            arm = arm - self.state.lengths.c * self.state.at.u4
+            arm = self.rounded(point.of(self.state) - self.state.lengths.c, turned=True) * self.state.at.u4
         self.through[pin] = self.through[pin] + on_second if pin in self.through else on_second
         self.couple(pin, cross(-on_second, arm))
 

@@ -15,11 +15,14 @@ from dataclasses import dataclass
 from fourbar.effects.actions import Actions, keep_number
 from fourbar.effects.spring import COINCIDE, SpringEnd, require_ends
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import Number, dot, is_any, namespace
+from fourbar.formulas.arithmetic import Number, is_any, namespace
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.formulas.pin_forces import Body
 from fourbar.linkage import ENDS, MOVING_BARS, PINS, FourBar
 from fourbar.quantities import NO_DIRECTION, NO_LEVER, OK
+
+MASSLESS = (Body(0.0, 0.0, 0.0j),) * 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +68,9 @@ class LinearDrive:
         stroke = rounded(namespace(across).abs(across))
         return stroke, across / stroke
 
-    def speed(self, state: State) -> Number:
-        """ds/dt, m/s."""
-        one, other = (state.velocity(point.bar, point.of(state)) for _, point in self.ends)
-        return dot(self.line(state)[1], other - one)
+    def gain(self, state: State) -> Number:
+        """ds/dq, m: the work of 1 N of it, whose parts between two bars that meet go by the turn at their pin."""
+        return self.per_newton(Actions(state, MASSLESS)).work()[0]
 
     def act(self, actions: Actions, force: Number) -> None:
         """Push its ends apart."""
@@ -88,12 +90,11 @@ class LinearDrive:
         `sines`: of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2, as of a drive on bar 2, 3, 4.
         """
         _, a, b, c, _, _ = state.lengths
-        turning = {"h2": sines[2], "h3": (-a / b) * sines[3], "h4": (-a / c) * sines[4]}
-        turned = state._replace(k=state.k._replace(**turning))
-        one, other = (turned.point_coefficient(point.bar, point.of(state)) for _, point in self.ends)
+        h2, h3, h4 = sines[2], (-a / b) * sines[3], (-a / c) * sines[4]
+        turned = state._replace(k=state.k._replace(h2=h2, h3=h3, h4=h4, h23=h2 - h3, h43=h4 - h3))
         reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
         most = sum(reach[p.bar][0] + reach[p.bar][1] * abs(p.distance) for _, p in self.ends)
-        return dot(self.line(state)[1], other - one), most
+        return self.gain(turned), most
 
     def status(self, state: State, sines: dict[int, Number]) -> Number:
         """NO_DIRECTION where the ends coincide, NO_LEVER where P lies within its rounding; None: nowhere.

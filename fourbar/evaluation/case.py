@@ -130,7 +130,7 @@ class Case(NamedTuple):
 
     def drive_speed(self, state: State) -> Any:
         """Speed at which the drive works: of the driven bar, rad/s, or of the stroke, m/s."""
-        return state.omega(self.drive_bar) if self.drive is None else self.drive.speed(state)
+        return state.omega(self.drive_bar) if self.drive is None else self.drive.gain(state) * state.speed
 
     def drive_condition(self, state: State) -> Any:
         """Compute the drive's leverage as a part of the most it could have, in [0, 1]."""

@@ -64,6 +64,9 @@ def evaluate_command(case: Case, where: Command, part: Part, wanted: int, names:
     values = list_kinematics(case, state, names)
     if where.bar != 2:
         values |= {name: value for name, value in name_of_command(case, at, state, q).items() if name in names}
+    for name, own in (("stroke", where.stroke), ("stroke_speed", where.stroke_speed)):
+        if own is not None and name in values:  # as commanded, wherever the other numbers have a value
+            values[name] = take_piece(own, part) + 0.0 * values[name]
     if where.lever is not None and "condition" in values:
         values["condition"] = values["condition"] * where.lever[part]
     if wanted >= FORCE:
@@ -212,7 +215,7 @@ def list_kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str
     values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
     if case.drive is not None and not wanted.isdisjoint(OF_LINE):
         stroke, unit = case.drive.line(state)
-        own = {"stroke": stroke, "drive_line": unit, "stroke_speed": case.drive.speed(state)}
+        own = {"stroke": stroke, "drive_line": unit, "stroke_speed": case.drive_speed(state)}
         values |= {name: value for name, value in own.items() if name in wanted}
     if not case.points and wanted.isdisjoint(PLACES):
         return values

@@ -117,6 +117,8 @@ class Command(NamedTuple):
     """(n,), m; where a stroke is commanded, from which the others follow."""
     lever: Array | None = None
     """(n,), of that cylinder, as a part of the longest that it could be."""
+    stroke_speed: float | Array | None = None
+    """m/s; None where no stroke is commanded, or positions only."""
 
     @property
     def commanded(self) -> str:
@@ -179,8 +181,8 @@ def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = No
 
     `branch`: at each of them; left out: the scene's, which may follow its smooth path.
     """
-    motion, bar, time, lever = scene.motion, scene.motion.bar, None, None
-    angle = places
+    motion, bar, time = scene.motion, scene.motion.bar, None
+    angle, stroke, lever, stroke_speed = places, None, None, None
     speed: float | Array | None = motion.speed
     acceleration: float | Array = motion.acceleration
     if motion.stroke is not None:
@@ -188,6 +190,7 @@ def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = No
 
         own = find_triangle(scene.linkage, scene.drive)
         own.require(places)
+        stroke, stroke_speed = places, speed
         angle, speed, acceleration, lever = own.turned(places, speed, acceleration, motion.side)
     elif motion.law is not None:
         time, (angle, speed, acceleration) = places, motion.law.at(places)
@@ -195,8 +198,7 @@ def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = No
         branch = np.full(angle.shape, motion.branch, dtype=np.int8)
         if motion.through == "follow":
             branch = follow_smooth_path(scene.linkage, angle, motion.branch, bar)
-    stroke = None if lever is None else places
-    return Command(angle, branch, speed, acceleration, None, time, bar, stroke, lever)
+    return Command(angle, branch, speed, acceleration, None, time, bar, stroke, lever, stroke_speed)
 
 
 def command(scene: Scene) -> Command:

@@ -11,12 +11,13 @@ import numpy as np
 
 from fourbar.effects.actions import keep_number
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import Number, angle, divisor, namespace, polar, select
+from fourbar.formulas.arithmetic import Number, angle, divisor, exact_difference, namespace, polar, select
 from fourbar.linkage import FourBar
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
     from fourbar.effects.linear_drive import LinearDrive
+    from fourbar.effects.spring import SpringEnd
 
 SIDES = {"left": 1.0, "right": -1.0}
 """On which side of the line from the bar's pivot to the end on the ground, seen towards that, the other end lies."""
@@ -60,21 +61,23 @@ class Triangle(NamedTuple):
         may be arrays, and numbers that carry their derivatives.
         """
         assert side is not None
-        gap, most = rounded(self.length - self.reach), rounded(self.length + self.reach)
-        sign, product, xp = SIDES[side], self.length * self.reach, namespace(stroke, self.length, self.reach)
-        near, far = rounded((stroke - gap) * (stroke + gap)), rounded((most - stroke) * (most + stroke))
+        length, reach, zero = self.length, self.reach, 0.0 * self.length
+        sign, xp = SIDES[side], namespace(stroke, length, reach)
+        near = rounded(exact_difference(stroke, reach, length, zero) * exact_difference(stroke, length, reach, zero))
+        far = rounded(exact_difference(length, reach, stroke, zero) * (length + reach + stroke))
         inside = xp is np or (near > 0.0) & (far > 0.0)
         near, far, stroke = (divisor(x, inside) for x in (near, far, stroke))
         with np.errstate(all="ignore"):
             near, far = xp.sqrt(near), xp.sqrt(far)
             beta = rounded(2.0 * xp.atan2(near, far))
             lever = rounded(near * far / (2.0 * stroke))
-            theta, share = rounded(self.angle + sign * beta), select(inside, lever / (0.5 * (most + abs(gap))), 0.0)
+            longer = 0.5 * (length + reach + abs(length - reach))
+            theta, share = rounded(self.angle + sign * beta), select(inside, lever / longer, 0.0)
             if speed is None:
                 return theta, None, np.zeros(np.shape(theta)), share
             rate = rounded(speed / lever)
-            own, turning = rounded(speed * speed) + rounded(stroke * acceleration), product * xp.cos(beta) * rate * rate
-            growth = rounded((own - rounded(turning)) / (lever * stroke))
+            own, along = rounded(speed * speed) + rounded(stroke * acceleration), length * reach * xp.cos(beta)
+            growth = rounded((own - rounded(along * rate * rate)) / (lever * stroke))
         return theta, sign * rate, sign * growth, share
 
 
@@ -84,10 +87,16 @@ def find_triangle(linkage: FourBar, drive: "LinearDrive | None", rounded: Callab
         drives = "no cylinder" if drive is None else f"one from bar {drive.start.bar} to bar {drive.end.bar}"
         raise InputError("motion.stroke", drives, "is of a cylinder ([drive]) between the ground and bar 2 or 4")
     own, other = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
-    pivot = 0.0 if own.bar == 2 else polar(linkage.ground, linkage.ground_angle)
-    end = polar(other.distance, rounded(other.angle + linkage.ground_angle))
-    to_ground = rounded(end, turned=True) - rounded(pivot, turned=True)
-    forwards = 0.0 * own.distance  # of its kind
-    along = select(own.distance >= 0.0, forwards, np.pi + forwards)
-    direction = rounded(rounded(angle(to_ground)) - own.angle - along)
-    return Triangle(own.bar, abs(own.distance), rounded(abs(to_ground)), direction)
+    if own.bar == 2:  # the ground's points are polar about its pin
+        reach, towards = abs(other.distance), rounded(other.angle + linkage.ground_angle) + _reverse(other)
+    else:
+        end = polar(other.distance, rounded(other.angle + linkage.ground_angle))
+        across = rounded(end, turned=True) - rounded(polar(linkage.ground, linkage.ground_angle), turned=True)
+        reach, towards = rounded(abs(across)), rounded(angle(across))
+    return Triangle(own.bar, abs(own.distance), reach, rounded(towards - own.angle - _reverse(own)))
+
+
+def _reverse(point: "SpringEnd") -> Any:
+    """Half a turn for a point at a distance that is negative."""
+    forwards = 0.0 * point.distance  # of its kind
+    return select(point.distance >= 0.0, forwards, np.pi + forwards)

@@ -308,6 +308,7 @@ def _compute_derivatives(
         seeded(f"motion.{name}", number) for name, number in zip(scene.motion.names, numbers, strict=True)
     )
     if at.stroke is not None:
+        commanded = {"stroke": q, "stroke_speed": speed}
         turned = find_triangle(scene.linkage, scene.drive).turned(q, speed, acceleration, scene.motion.side)
         q, speed, acceleration, lever = turned
     case, branch = Case.of(scene, at.bar), at.branch[index].astype(float)
@@ -315,7 +316,7 @@ def _compute_derivatives(
     state = case.state(case.path, q, position, branch, speed, acceleration, moving=moving)
     found = list_kinematics(case, state, names) | name_of_command(case, position, state, q)
     if at.stroke is not None:
-        found |= {"theta_2": state.theta_2, "condition": found["condition"] * lever}
+        found |= {"theta_2": state.theta_2, "condition": found["condition"] * lever, **commanded}
     held = np.zeros(len(index), dtype=bool)
     if moving:
         actions = Actions(state, case.bodies)

@@ -91,13 +91,15 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
                 q = make_like((stated.angle if stated.stroke is None else stated.stroke).reshape(shape), zero)
                 if motion.law is not None:
                     speed, acceleration = (make_like(x, zero) for x in (stated.speed, stated.acceleration))
-            q, lever = q + zero, 1.0
+            q, lever, commanded = q + zero, 1.0, {}
             if motion.stroke is not None:
+                commanded = {"stroke": q, "stroke_speed": speed}
                 triangle = find_triangle(changed.linkage, changed.drive)
                 q, speed, acceleration, lever = triangle.turned(q, speed, acceleration, motion.side)
                 holds = holds & (lever > NO_DIGIT_LEFT * given.eps)
             case, moved = Case.of(changed, motion.bar), (0.0 if speed is None else speed, acceleration)
             found, ok = _evaluate(case, q, float(motion.branch), moved, given, wanted)
+            found |= commanded
             if "condition" in wanted:
                 found["condition"] = found["condition"] * lever
             ok = ok & holds

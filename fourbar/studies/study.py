@@ -182,7 +182,7 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         invalid = invalid | ~known[key].holds(array)
     numbers = {key: np.where(invalid, np.nan, array) for key, array in numbers.items()}
     angle = np.broadcast_to(angles, (m, angles.shape[1]))
-    stroke = lever = None
+    stroke = lever = stroke_speed = None
     motion: Any = scene.motion if scene.motion.law is None else command(scene)
     speed, acceleration = (
         numbers.pop(f"motion.{name}")[:, None] if f"motion.{name}" in numbers else number
@@ -192,10 +192,11 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         speed, acceleration = (np.broadcast_to(value, angle.shape) for value in (speed, acceleration))
     if scene.motion.stroke is not None:
         varied = replace_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
-        own, stroke = find_triangle(varied.linkage, varied.drive), angle
+        own, stroke, stroke_speed = find_triangle(varied.linkage, varied.drive), angle, speed
         angle, speed, acceleration, lever = own.turned(stroke, speed, acceleration, scene.motion.side)
     branch = _find_branches(scene, numbers, angles if stroke is None else angle, m)
-    at = Command(angle, branch, speed, acceleration, bar=scene.motion.bar, stroke=stroke, lever=lever)
+    of_stroke = {"stroke": stroke, "lever": lever, "stroke_speed": stroke_speed}
+    at = Command(angle, branch, speed, acceleration, bar=scene.motion.bar, **of_stroke)
     return Study(scene, numbers, invalid, at)
 
 

@@ -54,9 +54,9 @@ JUDGED_BY = {
     "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limit_positions "
     "transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
-    "validation/engines/test_engines.py": "validation/engines: balls description drake exudyn exudyn_elements limits "
-    "loaded loop opensim pinocchio prediction tree witnesses; validation/scenes: random; "
-    "validation/engines/mujoco: closed_loop inverse",
+    "validation/engines/test_engines.py": "validation/engines: ball_drive ball_vectors balls description "
+    "drake exudyn exudyn_elements limits loaded loop opensim pinocchio prediction tree witnesses; "
+    "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
     "validation/engines/test_added_guests.py": "validation/engines: checked output workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects free_body_stroke",
     "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "

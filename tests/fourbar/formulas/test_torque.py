@@ -90,7 +90,7 @@ def exactly(scene: fourbar.Scene, at: Command) -> dict[str, arb] | None:
         x = {name: arb(value) for name, value in collect_inputs(scene, float(at.theta_2[0])).items()}
         if at.remainder is not None:
             x["theta_2"] += arb(mp.nstr(at.remainder, 100))
-        return compute_outputs(scene, int(at.branch[0]), x, scene.drive_bar)
+        return compute_outputs(scene, int(at.branch[0]), x)
     finally:
         ctx.prec = before
 

@@ -18,7 +18,8 @@ from fourbar.scene.motion import Free, FromLimit, Motion
 from fourbar.solution import find_values
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import list_entries
-from fourbar_validation.engines.balls import BITS, Values, collect_inputs, compute_outputs
+from fourbar_validation.engines.ball_vectors import Values
+from fourbar_validation.engines.balls import BITS, collect_inputs, compute_outputs
 from tests.fourbar.studies.test_study import ANGLES, DRIVEN, LINK, LOADS, RUBBING, scene
 
 TABLED = Load(4, (2.0, 0.1), (0.0, 0.0), 0.3, "world", Table((0.0, 2.0, 6.0), (0.0, 1.0, 2.0)))
@@ -72,9 +73,7 @@ def check_against_balls(of: Scene, found: Sensitivity) -> int:
         exact = moved(of, exact, "motion.omega_2", arb(0))  # what is left out, unrounded
         for key, entry in found.keys.items():
             step = arb(STEP) * max(abs(float(exact[part(key)])), 1e-3)
-            ends = [
-                compute_outputs(of, int(at.branch[i]), moved(of, exact, key, h), of.drive_bar) for h in (-step, step)
-            ]
+            ends = [compute_outputs(of, int(at.branch[i]), moved(of, exact, key, h)) for h in (-step, step)]
             assert ends[0] is not None and ends[1] is not None, entry
             for name in found.by:
                 value, own = found.value(name)[i], found.of(name, key)[i]

@@ -102,7 +102,7 @@ FAULTS = {
     "line reversed": ("act", _reversed),
     "one of its two ends": ("act", _of_one_end),
     "lever of the wrong bar": ("act", _of_the_wrong_bar),
-    "sign of the speed": ("speed", lambda self, state, of=LinearDrive.speed: -of(self, state)),
+    "sign of the speed": ("gain", lambda self, state, of=LinearDrive.gain: -of(self, state)),
     "half the leverage": ("leverage", lambda *given, of=LinearDrive.leverage: (0.5 * of(*given)[0], of(*given)[1])),
 }
 

@@ -8,13 +8,14 @@ and the torque from the full thirteen Newton-Euler equations about the mass cent
 import math
 from bisect import bisect
 from collections.abc import Iterable
-from typing import Any, TypeAlias
 
 from flint import acb, arb, arb_mat, ctx
 
 from fourbar.effects import Flywheel, Friction, Gravity, Spring, Springs, Table, Torsion, Viscous
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
+from fourbar_validation.engines.ball_drive import collect_ends, compute_condition, find_line, turn_by_stroke
+from fourbar_validation.engines.ball_vectors import Ball, Complex, Values, polar, wedge
 from fourbar_validation.engines.description import PINS, find_centre, find_inertia
 
 BITS = 320
@@ -25,11 +26,6 @@ STEP_BITS = 90
 """Sensitivities are difference quotients with a relative step of 2^-90: wrong by about 2^-90 / (distance to the
 nearest singular position), and the cancelled 90 bits are there to lose."""
 
-Ball: TypeAlias = Any
-Complex: TypeAlias = Any
-"""A vector of the plane, x + i y, of two balls."""
-Values: TypeAlias = dict[str, Ball]
-
 
 def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     """Collect the stored doubles that the outputs at one position, of the commanded angle, depend on."""
@@ -37,6 +33,7 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     d, a, b, c = link.lengths
     values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle}
     values |= dict(zip(motion.names, (angle, motion.speed or 0.0, motion.acceleration), strict=True))
+    values |= collect_ends(scene.drive)
     for k in MOVING_BARS:
         bar = link.bar(k)
         values |= {f"m{k}": bar.mass, f"I{k}": find_inertia(bar)}
@@ -74,16 +71,6 @@ def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
     return {name: arb(value) for name, value in (collect_inputs(scene, angle) | motion).items()}
 
 
-def polar(r: Ball, angle: Ball) -> Complex:
-    """Return r e^{i angle}."""
-    return acb(r * angle.cos(), r * angle.sin())
-
-
-def wedge(u: Complex, v: Complex) -> Ball:
-    """u_x v_y - u_y v_x."""
-    return (u.conjugate() * v).imag
-
-
 def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     """e^{i theta_2}, e^{i theta_3}, e^{i theta_4}; None where the loop does not close.
 
@@ -118,16 +105,17 @@ def solve_linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
     return [solution[k, 0] for k in range(len(right))]
 
 
-def compute_outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Values | None:  # noqa: PLR0915 - one system
+def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:  # noqa: PLR0915 - one system
     """Compute every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
-    closed = closure(x, branch)
-    if closed is None:
+    x = turn_by_stroke(scene, inputs) if "stroke" in inputs else inputs
+    closed = None if x is None else closure(x, branch)
+    if x is None or closed is None:
         return None
     w = dict(zip(MOVING_BARS, closed, strict=True))
     a, b, c, bar = x["a"], x["b"], x["c"], find_commanded(x)
-    y: Values = {f"theta_{k}": w[k].arg() for k in MOVING_BARS if k != bar}
+    y: Values = {f"theta_{k}": w[k].arg() for k in MOVING_BARS if f"theta_{k}" not in inputs}
     sines = {2: wedge(w[3], w[4]), 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
-    y |= {"sin_mu": sines[2], "condition": abs(sines[bar])}
+    y |= {"sin_mu": sines[2], "condition": abs(sines[bar]) * x.get("lever", 1)}
     if not y["condition"] > 0:  # singular; NaN where A lies on O4, about which bars 3 and 4 then turn freely
         return y
     zero = acb(0)
@@ -163,7 +151,8 @@ def compute_outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Val
 
     force = {k: x[f"m{k}"] * polar(x["g"], x["g_angle"]) if "g" in x else zero for k in MOVING_BARS}
     moment = {k: x.get(f"couple_{k}", arb(0)) for k in MOVING_BARS}  # about G; a probe may add one
-    _add_effects(scene, x, {1: polar(arb(1), x["theta_1"]), **w}, first_pin, centre, force, moment)
+    directions = {1: polar(arb(1), x["theta_1"]), **w}
+    _add_effects(scene, x, directions, first_pin, centre, force, moment)
     for effect in scene.effects:
         if isinstance(effect, Flywheel):
             moment[effect.bar] -= x["J"] * alpha[effect.bar]
@@ -172,6 +161,7 @@ def compute_outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Val
         sign = arb(1) if slip > 0 else arb(-1) if slip < 0 else arb(0) if slip == 0 else arb(0, 1)
         couple = -x.get(f"viscous_{pin}", arb(0)) * slip - x.get(f"friction_{pin}", arb(0)) * sign
         _add_twist(moment, pin, couple)
+    line = find_line(scene.drive, x, directions, first_pin) if scene.drive else None
     # unknowns F12 F32 F23 F43 F34 F14 (x, y each) and T
     joints = {2: ((0, "first_pin"), (1, "tip")), 3: ((2, "first_pin"), (3, "tip")), 4: ((4, "tip"), (5, "first_pin"))}
     matrix = [[arb(0)] * 13 for _ in range(13)]
@@ -181,22 +171,28 @@ def compute_outputs(scene: Scene, branch: int, x: Values, drive_bar: int) -> Val
             arm = -centre[k] if end == "first_pin" else tip[k] - centre[k]
             matrix[3 * n][2 * column] = matrix[3 * n + 1][2 * column + 1] = arb(1)
             matrix[3 * n + 2][2 * column], matrix[3 * n + 2][2 * column + 1] = -arm.imag, arm.real
-        if k == drive_bar:
-            matrix[3 * n + 2][12] = arb(1)
+        pushed = line.push(k, centre[k]) if line else (arb(0), arb(0), arb(k == scene.drive_bar))
+        for row, value in enumerate(pushed, start=3 * n):
+            matrix[row][12] = value
         needed = x[f"m{k}"] * acceleration[k] - force[k]
         known += [needed.real, needed.imag, x[f"I{k}"] * alpha[k] - moment[k]]
     for row, (i, j) in enumerate(((2, 4), (3, 5), (6, 8), (7, 9)), start=9):
         matrix[row][i] = matrix[row][j] = arb(1)
         known.append(arb(0))
-    y["drive_condition"] = abs(sines[drive_bar])
+    if line is None:
+        drive, y["drive_condition"], speed = "torque", abs(sines[scene.drive_bar]), omega[scene.drive_bar]
+    else:
+        drive, y["drive_condition"] = "drive_force", compute_condition(line, x, tip[2], sines)
+        speed = line.speed({1: zero, **v_foot}, {1: arb(0), **omega})
+        y |= {"stroke": line.stroke, "stroke_speed": speed}
+        _put(y, {"drive_line": line.line})
     try:
         solved = solve_linear(matrix, known)
     except ZeroDivisionError:
         return y
     columns = {"F12": 0, "F32": 1, "F43": 3, "F14": 5}
     _put(y, {name: acb(solved[2 * column], solved[2 * column + 1]) for name, column in columns.items()})
-    y["torque"] = solved[12]
-    y["power"] = solved[12] * y[f"omega_{drive_bar}"]
+    y[drive], y["power"] = solved[12], solved[12] * speed
     return y
 
 
@@ -298,7 +294,7 @@ def compute_reference(scene: Scene, branch: int, angle: float) -> tuple[Values, 
     exact |= {f"{name}_{k}": arb(1) for k, load in enumerate(scene.loads) if load.table for name in OF_PIECE}
 
     def evaluate(**changed: Ball) -> Values | None:
-        return compute_outputs(scene, branch, exact | changed, scene.drive_bar)
+        return compute_outputs(scene, branch, exact | changed)
 
     base = evaluate()
     if base is None:

@@ -45,7 +45,7 @@ class BallArithmetic:
             motion = {"omega_2": float(omega[i]), "alpha_2": float(alpha[i])}
             exact = make_balls(scene, float(command.theta_2[i]), **motion)
             exact["theta_2"] += arb(0 if command.remainder is None else command.remainder)
-            values = compute_outputs(scene, int(command.branch[i]), exact, scene.drive_bar)
+            values = compute_outputs(scene, int(command.branch[i]), exact)
             if values is None:
                 continue
             assembled[i] = True
@@ -67,7 +67,8 @@ def compute_sines(linkage: FourBar, command: Command) -> Array:
     """Compute sin(theta_4 - theta_3) of each position in many digits, (n,); NaN where the loop does not close."""
     from flint import arb, ctx
 
-    from fourbar_validation.engines.balls import BITS, closure, wedge
+    from fourbar_validation.engines.ball_vectors import wedge
+    from fourbar_validation.engines.balls import BITS, closure
 
     ctx.prec = BITS
     x = {name: arb(length) for name, length in zip("dabc", linkage.lengths, strict=True)}

@@ -106,14 +106,14 @@ def _compute_sensitivity(
     from fourbar_validation.engines.balls import STEP_BITS, compute_outputs, compute_response, make_balls
 
     exact = make_balls(scene, theta_2, omega_2=omega_2, alpha_2=alpha_2)
-    base = compute_outputs(scene, branch, exact, scene.drive_bar)
+    base = compute_outputs(scene, branch, exact)
     if base is None:
         return None
     step = arb(2) ** -STEP_BITS
 
     def add(total: dict[str, float], changes: list[dict[str, Any]]) -> None:
         """Add the change under the first of several changes of the inputs with which the loop still closes."""
-        moved = (compute_outputs(scene, branch, exact | changed, scene.drive_bar) for changed in changes)
+        moved = (compute_outputs(scene, branch, exact | changed) for changed in changes)
         for output, rate in compute_response(base, moved).items():
             total[output] = total.get(output, 0.0) + rate
 

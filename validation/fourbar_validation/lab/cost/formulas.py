@@ -108,7 +108,7 @@ def evaluate_balls(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quant
         result = []
         for theta_2, branch in zip(at.theta_2.tolist(), at.branch.tolist(), strict=True):
             x = {name: arb(value) for name, value in collect_inputs(scene, theta_2).items()}
-            result.append(compute_outputs(scene, branch, x, scene.drive_bar) or {})
+            result.append(compute_outputs(scene, branch, x) or {})
     finally:
         ctx.prec = before
     out: Quantities = {"torque": [y.get("torque") for y in result]}

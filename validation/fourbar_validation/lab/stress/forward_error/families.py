@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from fourbar.effects import Load, Spring, SpringEnd, Springs, Table, Torsion
+from fourbar.effects import LinearDrive, Load, Spring, SpringEnd, Springs, Table, Torsion
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
 from fourbar.scene import Scene
+from fourbar.scene.motion import Motion
 from fourbar.scene.point import Point
 from fourbar.solve import solve
 from fourbar_validation.scenes.random import (
@@ -189,6 +190,35 @@ def tables(rng: np.random.Generator) -> Scene:
     return replace(scene, linkage=replace(linkage, ground_angle=0.0), loads=(load,), motion=motion)
 
 
+def drives(rng: np.random.Generator) -> Scene:
+    """Draw a cylinder between any two bars."""
+    return _put_cylinder(random(rng), rng, *rng.choice((1, *MOVING_BARS), 2, replace=False).tolist())
+
+
+def strokes(rng: np.random.Generator) -> Scene:
+    """Command the stroke of a cylinder from the ground to bar 2 or 4, as it comes out where the input is."""
+    bar = int(rng.choice([2, 4]))
+    scene = _put_cylinder(random(rng), rng, 1, bar)
+    found = solve(scene, "acceleration")
+    assert found.stroke is not None and found.stroke_speed is not None
+    assert found.theta_3 is not None and found.theta_4 is not None and found.omega_4 is not None
+    one, other = (found.theta_3, found.theta_4) if bar == 2 else (found.theta_2, found.theta_3)
+    grows = found.stroke_speed[0] * (float(scene.motion.speed or 0.0) if bar == 2 else found.omega_4[0]) > 0.0
+    motion = Motion(
+        stroke=float(found.stroke[0]),
+        stroke_speed=float(found.stroke_speed[0]),
+        stroke_acceleration=float(rng.uniform(-2.0, 2.0)),
+        side="left" if grows else "right",
+        branch=1 if math.sin(other[0] - one[0]) > 0.0 else -1,
+    )
+    return replace(scene, motion=motion)
+
+
+def _put_cylinder(scene: Scene, rng: np.random.Generator, one: int, other: int) -> Scene:
+    ends = (SpringEnd(bar, *rng.uniform((0.05, -3.0), (1.0, 3.0)).tolist()) for bar in (one, other))
+    return replace(scene, drive_bar=None, drive=LinearDrive(*ends))  # type: ignore[arg-type]
+
+
 FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "random": random,
     "limit": limit,
@@ -199,4 +229,6 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "springs": springs,
     "torsion": torsion,
     "tables": tables,
+    "drives": drives,
+    "strokes": strokes,
 }

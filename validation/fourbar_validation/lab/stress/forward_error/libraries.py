@@ -20,7 +20,7 @@ from fourbar.studies.keys import command_key, is_left_out, list_entries, read_pl
 from fourbar_validation.engines.description import PINS
 
 LIBRARIES = ("jax", "torch")
-QUANTITIES = tuple(name for name in STAGE_OF if name not in {*NEVER, *OF_LINE})
+QUANTITIES = tuple(name for name in STAGE_OF if name not in NEVER)
 
 
 def load_library(library: str) -> tuple[Any, Any]:
@@ -107,7 +107,8 @@ def _make_program(scene: Scene, library: str, derivatives: bool) -> Callable[...
 
     Derivatives go forwards in JAX, backwards in PyTorch.
     """
-    f = function(scene, list(list_numbers(scene)), QUANTITIES)
+    of_others = {"torque"} if scene.drive else OF_LINE
+    f = function(scene, list(list_numbers(scene)), [name for name in QUANTITIES if name not in of_others])
 
     def of_row(x: Any) -> Any:
         return f(*x)

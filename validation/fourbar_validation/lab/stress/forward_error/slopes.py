@@ -15,7 +15,8 @@ from fourbar.effects import Friction
 from fourbar.scene import Scene
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.keys import command_key, replace_numbers
-from fourbar_validation.engines.balls import STEP_BITS, Values, compute_outputs, make_balls
+from fourbar_validation.engines.ball_vectors import Values
+from fourbar_validation.engines.balls import STEP_BITS, compute_outputs, make_balls
 from fourbar_validation.engines.description import PINS
 from fourbar_validation.lab.stress.forward_error.libraries import evaluate, list_numbers, make_alike
 from fourbar_validation.lab.stress.forward_error.tally import Tally, compute_ratio, is_untold, list_components
@@ -39,10 +40,10 @@ def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
             changed[key] = changed[key] + steps[key]
         stated = changed.pop(angle)
         other = replace_numbers(scene, {key: changed[key] for key in set(keys) - {angle}})
-        return compute_outputs(other, scene.motion.branch, make_balls(other, stated), scene.drive_bar) or {}
+        return compute_outputs(other, scene.motion.branch, make_balls(other, stated)) or {}
 
     base = moved()
-    if "torque" not in base:
+    if ("torque" if scene.drive is None else "drive_force") not in base:
         return base, {}
     once = {key: moved(key) for key in numbers}
     by: dict[str, dict[str, Any]] = {name: {} for name in base}
@@ -79,7 +80,7 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
     (values, exact), found, numbers = compute_exact_slopes(scene), differentiate(scene, library), list_numbers(scene)
     if not values:
         tally.not_assembled += 1
-        if np.nan_to_num(found["torque"]).any():  # a library's are 0: its value is a constant, NaN
+        if np.nan_to_num(found["F12"]).any():  # a library's are 0: its value is a constant, NaN
             tally.worst["assembled"] = (math.inf, sample)
         return
     if not exact or _is_held(scene, values):

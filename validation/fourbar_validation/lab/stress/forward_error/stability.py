@@ -12,7 +12,7 @@ import numpy as np
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.quantities import OK, PIN_FORCES, UNITS
-from fourbar.scene import Command, Scene
+from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solve import solve
@@ -41,10 +41,10 @@ CHUNK = 250
 
 def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
     """Solve one position with error bars; `solve` evaluates one in plain numbers, two in arrays."""
-    motion, times = scene.motion, 1 + hash(angle) % 2  # as good as random, and the same on every run
-    branch = np.full(times, motion.branch, np.int8)
-    at = Command(np.full(times, angle), branch, motion.speed, motion.acceleration, bar=motion.bar)
-    solution = solve(scene, "error", at=at)
+    times = 1 + hash(angle) % 2  # as good as random, and the same on every run
+    commanded = np.full(times, angle)
+    scene = replace(scene, motion=replace(scene.motion, **{scene.motion.names[0]: commanded}))  # type: ignore[arg-type]
+    solution = solve(scene, "error")
     return {name: array[0] for name in UNITS if (array := getattr(solution, name)) is not None}
 
 
@@ -52,6 +52,7 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
     """Compare one position with the reference."""
     tally.samples += 1
     motion, angle = scene.motion, float(np.asarray(scene.motion.angle))
+    drive = "torque" if scene.drive is None else "drive_force"
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         found = solve_position(scene, angle) if library == "numpy" else evaluate(scene, library)
@@ -59,7 +60,7 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
     exact = compute_reference(scene, motion.branch, angle)
     if exact is None:
         tally.not_assembled += 1
-        if math.isfinite(found["torque"]):
+        if math.isfinite(found[drive]):
             tally.worst["assembled"] = (math.inf, sample)
         return
     values, sensitivity = exact
@@ -72,19 +73,21 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
             if component not in values or name == motion.names[0] or name.endswith("_error"):
                 continue
             own, rate = np.ravel(found[name])[index], sensitivity[component]
+            if scene.drive and name in PIN_FORCES:  # a component that the drive has no part in is left of larger ones
+                rate = max(sensitivity[other] for other, _ in list_components(name))
             if library != "numpy":  # whose lengths are no constants: no bar rests or stays parallel exactly
                 rate += max(compute_allowed(0.0, sensitivity[other]) for other, _ in list_components(name))
             part, errors[component] = compute_ratio(name, own, values[component], rate)
             tally.note(component, part, sample)
-    if "torque" not in values:
+    if drive not in values:
         tally.no_torque += 1
         return
-    if "torque_error" not in found:
+    if f"{drive}_error" not in found:
         return
     force = max(math.hypot(errors[f"{name}_x"], errors[f"{name}_y"]) for name in PIN_FORCES)
     strongest = max(math.hypot(*found[name]) for name in PIN_FORCES)
     for name, error, size in (
-        ("torque_error", errors["torque"], abs(found["torque"])),
+        (f"{drive}_error", errors[drive], abs(found[drive])),
         ("force_error", force, strongest),
     ):
         bar = float(found[name])
@@ -168,7 +171,8 @@ def stability(
     for name in dict.fromkeys(name for tally in tallies.values() for name in tally.worst):
         cells = [tallies[family].worst.get(name, (math.nan, ""))[0] for family in chosen]
         rows.append((name, *("-" if math.isnan(cell) else f"{cell:.3f}" + " fails" * (cell > 1.0) for cell in cells)))
-    for name in ("torque_error", "force_error") if library == "numpy" and not derivatives else ():
+    bars = ("torque_error", "drive_force_error", "force_error")
+    for name in (name for name in bars if any(name in tally.too_small for tally in tallies.values())):
         rows.append((f"error / {name}", *(f"{tallies[family].too_small.get(name, math.nan):.2f}" for family in chosen)))
         shares = (100.0 * tallies[family].too_large.get(name, 0) / tallies[family].samples for family in chosen)
         rows.append((f"% {name} > {TOO_LARGE:.0f} x error", *(f"{share:.2f}" for share in shares)))

@@ -155,7 +155,8 @@ def _evaluate_ball(scene: Scene, name: str, parts: Array, theta_2: float) -> Any
     """Evaluate a ball by the thirteen equations of the free bodies; NaN where there is no value."""
     from flint import acb, arb
 
-    from fourbar_validation.engines.balls import closure, compute_outputs, make_balls, wedge
+    from fourbar_validation.engines.ball_vectors import wedge
+    from fourbar_validation.engines.balls import closure, compute_outputs, make_balls
 
     member = replace_numbers(scene, _move_numbers(scene, parts))
     x, branch = make_balls(member, theta_2), scene.motion.branch
@@ -165,7 +166,7 @@ def _evaluate_ball(scene: Scene, name: str, parts: Array, theta_2: float) -> Any
     if name == "transmission":
         closed = closure(x, branch)
         return closed and acb(abs((closed[1].conjugate() * closed[2]).real), abs(wedge(*closed[1:]))).arg()
-    y = compute_outputs(member, branch, x, scene.drive_bar) or {}
+    y = compute_outputs(member, branch, x) or {}
     if name == "torque":
         return y.get(name, arb("nan"))
     x_and_y = [y.get(f"{name.strip('|')}_{axis}", arb("nan")) for axis in "xy"]
