@@ -169,6 +169,7 @@ STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
     (FOURBAR, "mjcf scene.toml -o out", HOLDS),
     (FOURBAR, "mjcf -o out", BAD_INPUT),
     (FOURBAR, "no-such-command", BAD_INPUT),
+    (VALIDATION, "--version", HOLDS),
     (VALIDATION, "--help", HOLDS),
     (VALIDATION, "no-such-command", BAD_INPUT),
     (VALIDATION, "compare good.csv good.csv", HOLDS),

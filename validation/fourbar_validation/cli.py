@@ -5,6 +5,7 @@ from pkgutil import resolve_name
 
 import click
 
+from fourbar import __version__
 from fourbar.errors import run
 from fourbar_validation.places import PROGRAM
 
@@ -81,6 +82,7 @@ def _stand_in(name: str, missing: ModuleNotFoundError) -> click.Command:
 
 
 @click.group(cls=LazyGroup, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, "-V", "--version", prog_name="fourbar-validation")
 @click.pass_context
 def group(context: click.Context) -> None:
     """Check the closed formulas of the planar four-bar linkage against independent engines.

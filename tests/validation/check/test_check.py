@@ -15,6 +15,7 @@ import fourbar
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar.quantities import OF_LINE, OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.motion_law import Law
 from fourbar.solve import solve
 from fourbar_validation.check.judge import Allowance
 from fourbar_validation.check.judgement import Judgement, judge_table
@@ -319,7 +320,7 @@ def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque: str, co
 def test_a_released_scene_is_not_judged_at_the_speed_of_its_start(tmp_path: Path) -> None:
     released = replace(SCENES["crank_rocker"], motion=fourbar.Motion(1.0, 2.0, free=fourbar.Free(1.0, 10)))
     path = write(tmp_path / "theirs.csv", right(SCENES["crank_rocker"]))
-    with pytest.raises(fourbar.InputError, match="not while released"):
+    with pytest.raises(fourbar.InputError, match="not judged while released"):
         judged(released, path)
 
 
@@ -534,3 +535,42 @@ def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(tm
     found = judged(scene, tmp_path / "theirs.csv")
     assert {*solve(scene).branch.tolist()} == {1, -1}
     assert found.differing == [] and found.not_assembled == [] and found.compared > 100
+
+
+def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(tmp_path: Path) -> None:
+    scene = SCENES["crank_rocker"]
+    speed, acceleration = np.linspace(2.0, 9.0, 12), np.linspace(-30.0, 40.0, 12)
+    log = right(scene, omega_2=speed, alpha_2=acceleration) | {"omega_2": speed, "alpha_2": acceleration}
+    table = write(tmp_path / "log.csv", log, ("omega_2", "alpha_2", *ALL))
+    still = replace(scene, motion=replace(scene.motion, omega_2=None, alpha_2=0.0))
+    assert judge_table(scene, read_table(table)).status == FAILED  # at the scene's one speed
+    judgement = judge_table(still, read_table(table))
+    assert judgement.status == HOLDS and {f.quantity for f in judgement.findings} == {*ALL}
+    log["torque"][5] *= 1.0 + 1e-9
+    assert [
+        f.line for f in judge_table(still, read_table(write(table, log, ("omega_2", "alpha_2", *ALL)))).differing
+    ] == [7]
+    assert (
+        judge_table(still, read_table(write(table, log, ("omega_2", "alpha_2")))).status == FAILED
+    )  # nothing compared
+    log["omega_2"][3] = np.nan
+    text = write(table, log, ("omega_2", "alpha_2", "F12")).read_text().replace("nan", "")
+    table.write_text(text)
+    assert judge_table(still, read_table(table)).not_assembled == [5]
+
+
+@pytest.mark.parametrize(
+    ("motion", "words"),
+    [
+        ({"theta_4": "140 deg", "omega_4": "1 rad/s"}, "motion.theta_4: a table of results takes a command of theta_2"),
+        ({"law": Law((0.0, 0.5, 1.0, 1.5), (0.0, 1.0, 2.0, 3.0))}, "along a law at the scene's own positions"),
+    ],
+)
+def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
+    motion: dict[str, object], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = write(tmp_path / "theirs.csv", right(SCENES["crank_rocker"]))
+    scene = replace(SCENES["crank_rocker"], motion=fourbar.Motion(**motion))  # type: ignore[arg-type]
+    (tmp_path / "scene.toml").write_text(fourbar.dump(scene))
+    assert status(["check", str(tmp_path / "scene.toml"), str(table)]) == BAD_INPUT
+    assert words in capsys.readouterr().err

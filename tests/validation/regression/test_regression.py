@@ -177,17 +177,21 @@ def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path: Path, capsys: p
     kept = tmp_path / "kept"
     assert status(["accept", str(good), "--to", str(kept)]) == 0
     before = {path: path.read_bytes() for path in kept.iterdir()}
-    accepting, adding = ["accept", str(run), "--to", str(kept)], ["history", str(kept), "--add", str(run)]
-    comparing = (["compare", str(run), str(good)], ["compare", str(good), str(run)])
+    commands = {
+        "RESULTS": ["accept", str(run), "--to", str(kept)],
+        "--add": ["history", str(kept), "--add", str(run)],
+        "OLD": ["compare", str(run), str(good)],
+        "NEW": ["compare", str(good), str(run)],
+    }
     capsys.readouterr()
     for file, words in damaged(run):
-        for command in (accepting, adding, *comparing):
+        for key, command in commands.items():
             assert status(command) == 2
             out, message = capsys.readouterr()
-            assert not out and message.startswith(f"error: RESULTS = '{file}': ") and words in message
+            assert not out and message.startswith(f"error: {key} = '{file}': ") and words in message
             assert message.count("\n") == 1
         assert {path: path.read_bytes() for path in kept.iterdir()} == before
-    assert [status(command) for command in (accepting, adding, *comparing)] == [0, 0, 0, 0]
+    assert [status(command) for command in commands.values()] == [0, 0, 0, 0]
 
 
 def test_every_bit_of_a_history_is_guarded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -253,7 +257,7 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
         (["--seed", "3"], "say --random N too"),
         (["--random", "3", "--type", "crank"], "crank-rocker, drag-link"),
         (["--engines", ","], "must be among pinocchio-inverse"),
-        (["--against", "no-such-run"], "must be a folder with results.csv"),
+        (["--against", "no-such-run"], "error: --against = 'no-such-run': must be a folder with results.csv"),
         (["--against", "accepted", "--python", "python"], "cannot be combined with --python"),
         (["--html", "changes.html"], "say --against BASELINE or --python PATH too"),
         (["--mjcf", "theirs.xml", "--name", "coupler=link"], "check-mjcf SCENE THEIRS.xml"),

@@ -217,10 +217,11 @@ def test_every_witness_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.Mon
     assert all(choose_style(name).colour in colours.VARIABLES for name in names)
 
 
+@pytest.mark.parametrize("columns", ["80", "40"])
 def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    columns: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("COLUMNS", columns)
     row = Row("thesis_printed_inertias", "mujoco-simulated", "RK4", "limit_positions", 3.14, 1e-9, FAILS, "", 0.5, 0.3)
     print_table(summary_of([replace(demo(draw=False), name=row.scene, rows=[row])]), tmp_path)
     line = next(line for line in capsys.readouterr().out.splitlines() if "mujoco-simulated" in line)

@@ -46,7 +46,8 @@ def check(
     Columns are named as by `fourbar analyze --csv`, whose file is read as it is; a unit may follow in
     brackets: theta_2 [deg], torque [lbf ft], F12_x, F12_y, F43 [kN] (a magnitude). A spreadsheet's
     semicolons and blank cells are understood. Half a unit of the last printed digit is allowed; with
-    --rtol or --atol these decide, and how many agree exactly is printed too.
+    --rtol or --atol these decide, and how many agree exactly is printed too. Where the scene states no
+    omega_2 each row is judged at its own omega_2 and alpha_2.
     """
     table = read_table(theirs)
     for path in (json, junit):

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from fourbar.errors import InputError
 from fourbar.formulas.mobility import follow_smooth_path
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command
+from fourbar.scene.scene import require_input
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.check.theirs import Array, TheirTable, name_quantity
@@ -29,6 +30,7 @@ from fourbar_validation.compare.tolerance import (
 
 Mask = NDArray[np.bool_]
 
+OWN_MOTION = ("omega_2", "alpha_2")
 AS_PRINTED = 4.0 * EPS
 """Relative; a position of the scene that went to degrees and back."""
 
@@ -81,8 +83,10 @@ class Judge:
     """Numbers of a table against the formulas at its positions."""
 
     def __init__(self, scene: Scene, table: TheirTable, tolerance: Allowance | None) -> None:
-        self.scene, self.table, self.tolerance = scene, table, tolerance
+        self.scene, self.tolerance = scene, tolerance
         self.at = make_command(scene, table)
+        given = OWN_MOTION if _moves_itself(scene, table) else ()
+        self.table = replace(table, values={key: value for key, value in table.values.items() if key not in given})
         self.stage = "position" if self.at.omega_2 is None else "force"
         self.right = solve(scene, self.stage, at=self.at)
         self.ok = self.right.status_code == OK
@@ -90,7 +94,7 @@ class Judge:
         for key in table.values:
             if getattr(self.right, name_quantity(key)) is None:
                 if self.at.omega_2 is None:
-                    raise InputError("motion.omega_2", None, f"is needed in the scene to judge {key}")
+                    raise InputError("motion.omega_2", None, f"is needed in the scene or the table to judge {key}")
                 raise InputError("header", key, "does not exist in this scene: it has no dry friction")
 
     def ours(self, key: str, solution: Solution | None = None) -> Array:
@@ -181,20 +185,32 @@ class Judge:
 
 
 def make_command(scene: Scene, table: TheirTable) -> Command:
-    """Build the command at each row of the table: the scene's own where it has the same positions."""
+    """Build the command at each row of the table: the scene's own where it has the same positions.
+
+    Where the scene states no speed it is that of the row, as in the log of a simulator or a test stand.
+    """
+    require_input(scene, "a table of results")
     base = command(scene)
     if scene.motion.free is not None:
-        raise InputError("motion.free", scene.title, "a table is judged at one omega_2 and alpha_2, not while released")
+        allowed = "not judged while released; without free and omega_2 each row is judged at its own omega_2"
+        raise InputError("motion.free", scene.title, allowed)
+    if _moves_itself(scene, table):
+        base = base._replace(speed=table.values["omega_2"], acceleration=table.values.get("alpha_2", base.acceleration))
     theta_2 = table.theta_2
     if base.theta_2.shape == theta_2.shape and np.allclose(base.theta_2, theta_2, rtol=AS_PRINTED, atol=0.0):
         return base
-    if np.ndim(base.omega_2 or 0.0) or np.ndim(base.alpha_2):
+    if scene.motion.law is not None:
         allowed = "a table is judged along a law at the scene's own positions, all of them in its order"
         raise InputError("motion.law", scene.title, allowed)
     branch = np.full(len(theta_2), scene.motion.branch, dtype=np.int8)
     if scene.motion.through == "follow":
         branch = follow_smooth_path(scene.linkage, theta_2, scene.motion.branch)
     return Command(theta_2, branch, base.omega_2, base.alpha_2)
+
+
+def _moves_itself(scene: Scene, table: TheirTable) -> bool:
+    """Whether the table states the motion that its rows are judged at, and not the scene."""
+    return scene.motion.law is None and scene.motion.speed is None and "omega_2" in table.values
 
 
 @dataclass(frozen=True, slots=True)

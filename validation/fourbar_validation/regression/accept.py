@@ -66,7 +66,7 @@ def report_differences(
     from rich.console import Console
     from rich.progress import track
 
-    before, after = open_run(old), open_run(new)
+    before, after = open_run(old, "OLD"), open_run(new, "NEW")
     names = find_renamed(before.about.scenes, after.about.scenes)
     keep = _is_chosen(chosen or {}, lambda column: chain(before.words(column), after.words(column)), names)
     engines = set(after.words("engine"))
@@ -160,7 +160,7 @@ def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
 def _require_verified(run: Recorded) -> None:
     """InputError for a run of which nothing says whether it lost some of its rows."""
     if not run.verified:
-        raise InputError("RESULTS", str(run.table), f"needs a {ABOUT} with its rows and SHA-256; `run` writes one")
+        raise InputError(run.key, str(run.table), f"needs a {ABOUT} with its rows and SHA-256; `run` writes one")
 
 
 def _read_whole(run: Recorded) -> tuple[tuple[About, list[Row]], dict[tuple[str, str], float]]:
@@ -190,7 +190,7 @@ def history(
 
     file = history / HISTORY if history.is_dir() or not history.suffix else history
     if add is not None:
-        run = open_run(add)
+        run = open_run(add, "--add")
         _require_verified(run)
         append(file, *_read_whole(run))
     runs = read_history(file)

@@ -102,7 +102,7 @@ def _hash_own(kept: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
 
 
-def _require_whole(tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str) -> None:
+def _require_whole(tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str, key: str) -> None:
     """InputError that names the first table of a folder that is not what its record says."""
     there = {name for name in TABLES if (folder / name).is_file()}
     for name in sorted({*tables, *there, read}):
@@ -119,7 +119,7 @@ def _require_whole(tables: Mapping[str, Mapping[str, Any]], folder: Path, read: 
             except (KeyError, OSError, ValueError):
                 rows = "no rows that can be read"
             why = f"is damaged: {rows} of {tables[name]['rows']}, and not the SHA-256 that {ABOUT} states"
-        raise InputError("RESULTS", str(path), why)
+        raise InputError(key, str(path), why)
 
 
 NOTHING_KNOWN = About({}, "unknown machine", {})
@@ -133,6 +133,8 @@ class Recorded:
     table: Path
     verified: bool = False
     """Whether the tables are those that the record was written with; older records do not say."""
+    key: str = "RESULTS"
+    """What an error calls it: the argument or option that named it."""
 
     def rows(self) -> Iterator[Row]:
         """Its rows in their order; InputError where the table is damaged."""
@@ -160,16 +162,16 @@ class Recorded:
                         [(make_plain(read_cell_text(row["engine"])), float(row["times_formulas"])) for row in some],
                     )
         except (KeyError, TypeError, ValueError, csv.Error):
-            raise InputError("RESULTS", str(table), "is not a table of times written by `run`") from None
+            raise InputError(self.key, str(table), "is not a table of times written by `run`") from None
 
     def _read(self, found: Iterator[T]) -> Iterator[T]:
         try:
             yield from found
         except (KeyError, TypeError, ValueError, OSError):  # a column, a cell or a number is missing, or is no text
-            raise InputError("RESULTS", str(self.table), "is not a table written by `run`") from None
+            raise InputError(self.key, str(self.table), "is not a table written by `run`") from None
 
 
-def open_run(path: Path) -> Recorded:
+def open_run(path: Path, key: str = "RESULTS") -> Recorded:
     """Open a run by its folder, or by a results.csv only (then how it was made is unknown).
 
     Raises InputError where there is no readable table, an empty or a damaged one, or that of an unfinished run.
@@ -179,30 +181,30 @@ def open_run(path: Path) -> Recorded:
     if not table.is_file() and long.is_file():  # too many rows for a text
         table = long
     if not table.is_file():
-        raise InputError("RESULTS", str(path), f"must be a folder with {TABLE} or {COLUMNS}, or such a file")
+        raise InputError(key, str(path), f"must be a folder with {TABLE} or {COLUMNS}, or such a file")
     if (table.parent / UNFINISHED).is_file():
-        raise InputError("RESULTS", str(table), "must be of a run that was finished: run it again, and it is resumed")
+        raise InputError(key, str(table), "must be of a run that was finished: run it again, and it is resumed")
     record = table.parent / ABOUT
-    result = _open_described(record, table) if record.is_file() else Recorded(NOTHING_KNOWN, table)
+    result = _open_described(record, table, key) if record.is_file() else Recorded(NOTHING_KNOWN, table, key=key)
     if next(result.rows(), None) is None:
-        raise InputError("RESULTS", str(table), "must hold at least one comparison: it has none")
+        raise InputError(key, str(table), "must hold at least one comparison: it has none")
     return result
 
 
-def _open_described(record: Path, table: Path) -> Recorded:
+def _open_described(record: Path, table: Path, key: str) -> Recorded:
     """Open a table with what its record says of it; InputError where either is damaged."""
     try:
         kept = json.loads(record.read_text(encoding="utf-8"))
         stated = kept.pop("sha256", None)
         about, tables = make_record(kept), kept.get("tables")
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
-        raise InputError("RESULTS", str(record), "is not a record written by `run`") from None
+        raise InputError(key, str(record), "is not a record written by `run`") from None
     if stated is None and tables is None:
-        return Recorded(about, table)
+        return Recorded(about, table, key=key)
     if stated != _hash_own(kept):
-        raise InputError("RESULTS", str(record), "is damaged: it is not what `run` wrote")
-    _require_whole(tables, table.parent, table.name)
-    return Recorded(about, table, verified=True)
+        raise InputError(key, str(record), "is damaged: it is not what `run` wrote")
+    _require_whole(tables, table.parent, table.name, key)
+    return Recorded(about, table, True, key)
 
 
 def read_run(path: Path) -> tuple[About, list[Row]]:

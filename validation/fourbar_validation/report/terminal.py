@@ -13,6 +13,9 @@ from fourbar_validation.report.templating import write_number
 if TYPE_CHECKING:
     from rich.table import Table
 
+NARROWEST = 80
+"""Columns of the table at least: a narrower terminal breaks its lines, where rich would cut its numbers."""
+
 
 def print_table(summary: Summary, out: Path) -> None:
     """Print the worst row of every scene and engine, the verdict last."""
@@ -41,7 +44,7 @@ def print_table(summary: Summary, out: Path) -> None:
             )
             words = (f"  {escape(w.row.engine)}", escape(w.row.quantity))
             shown.add_row(*words, *numbers, style="" if w.failed == 0 else "bold red")
-    console.print(shown)
+    Console(width=max(console.width, NARROWEST)).print(shown)
     for row in summary.failures[:20]:
         console.print(
             f"[bold red]fails[/] {escape(clean_line(row.scene))} {escape(row.engine)} {escape(row.quantity)}: "

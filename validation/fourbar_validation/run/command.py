@@ -120,7 +120,7 @@ def command(
             if out.exists() or path.parent != out:  # a folder that the run will make
                 require_file(path, *scenes)
     if against is not None:
-        open_run(find_baseline(against))  # before anything runs
+        open_run(find_baseline(against), "--against")  # before anything runs
     suite, witnesses = select_scenes(scenes, named, count, seed or 0, types or ALL_TYPES, adapters)
     if wanted is not None:
         from fourbar_validation.run.required_error import adjust_witnesses

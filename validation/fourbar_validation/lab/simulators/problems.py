@@ -26,7 +26,8 @@ CONVENTIONS = (
     "SI units, radians, world axes x and y, angles counter-clockwise from x. Pins: O2 at the origin, A, B, O4; bars: 1 "
     "ground O2-O4, 2 input O2-A, 3 coupler A-B, 4 output O4-B; theta_3 points from A to B, theta_4 from O4 to B. "
     "centre: from the bar's first pin (O2, A, O4), along the bar and across it, to the left. Fij: force of bar i on "
-    "bar j. torque: the couple that the ground exerts on bar 2. branch 1: B left of the line from A to O4, -1: right. "
+    "bar j. torque: the couple that the ground exerts on bar 2. branch 1: B left of the line from A to O4, -1: right; "
+    "through a change point a motion keeps its smooth path (follow) or its branch (sign). "
     "error: how far off the value may be, besides the rounding of its last digit; of a vector, its Euclidean norm."
 )
 DESCRIBED = (Gravity, Springs, Viscous, Friction)
