@@ -21,7 +21,7 @@ ROUNDS = 5
 MOST_PEAKS = 6
 """Of one quantity, the highest."""
 GROWING = 1e-3
-"""Part of itself by which what has a largest value grows no more in the last call; towards a pole it grows on."""
+"""Part of itself by which what has a largest value grows no more in the last two calls; towards a pole it grows on."""
 AT_REST = 1e-12
 """Part of its largest slip below which a pin is at rest at a position."""
 Branch = NDArray[np.int8]
@@ -122,17 +122,22 @@ def _find_largest(at: At, solution: Solution) -> tuple[Array, Branch, set[str]]:
             left = i - (before[i] >= 0.0 and branch[i - 1] == branch[i])
             right = i + (after[i] >= 0.0 and branch[min(i + 1, len(branch) - 1)] == branch[i])
             peaks.append((name, i, left, right))
+        for i, j in pairwise(range(len(branch))):  # towards a gap it may grow whatever it is beside it
+            if known[i + 1] * known[j + 1] < 0.0 and branch[i] == branch[j]:
+                peaks.append((name, i if known[j + 1] < 0.0 else j, i, j))
     rows, names = np.arange(len(peaks)), [name for name, *_ in peaks]
     at_grid, left, right = (np.array([peak[k] for peak in peaks], dtype=int) for k in (1, 2, 3))
+    opens = ~(solution.assembled[left] & solution.assembled[right])
     low, high, places = over[left], over[right], over[at_grid]
     reached = [np.array([list_sizes(solution)[name][i] for name, i, *_ in peaks])]
     for _ in range(ROUNDS if len(peaks) else 0):
         cut = _cut(low, high)
         found = list_sizes(at(cut.ravel(), np.repeat(branch[at_grid], CUTS + 1), "force"))
         values = np.array([np.nan_to_num(found[n].reshape(cut.shape)[k], nan=-1.0) for k, n in enumerate(names)])
-        best = np.argmax(values, axis=1)
+        inwards = np.abs(np.arange(CUTS + 1) - np.where(solution.assembled[left], 0, CUTS)[:, None])
+        best = np.argmax(np.where(opens[:, None] & (values >= 0.0), inwards, values), axis=1)
         places, low, high = (cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1))
         reached.append(values[rows, best])
-    growing = reached[-1] > (1.0 + GROWING) * reached[-2] if len(peaks) else rows > 0
-    kept = ~growing & (reached[-1] > reached[0])
+    growing = reached[-1] > (1.0 + GROWING) * reached[-3] if len(peaks) else rows > 0
+    kept = ~growing & (reached[-1] > reached[0]) & ~opens  # beside a gap others grow
     return places[kept], branch[at_grid][kept], {name for name, grows in zip(names, growing, strict=True) if grows}

@@ -230,11 +230,10 @@ def _integrate_power(solution: Solution, power: Array) -> tuple[float | None, fl
     omega = getattr(solution, f"omega_{bar}") if stroke is None else solution.stroke_speed
     if solution.time is not None:
         spans = np.diff(solution.time)
-    elif omega is not None and np.all(omega != 0.0):
-        angle = solution.at.angle if stroke is None else stroke
-        spans = np.abs(np.diff(angle) / np.broadcast_to(omega, power.shape)[..., :-1])
     else:
-        return None, None
+        angle = solution.at.angle if stroke is None else stroke
+        steps, omega = np.diff(angle), np.broadcast_to(np.asarray(omega), power.shape)[..., :-1]
+        spans = np.abs(np.divide(steps, omega, out=np.full(omega.shape, np.nan), where=omega != 0.0))
     parts = [
         0.5 * spans * (part[..., :-1] + part[..., 1:]) for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0))
     ]

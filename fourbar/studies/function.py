@@ -107,7 +107,9 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
                 name: (found[name] + zero,) if name in SCALARS else (found[name].real + zero, found[name].imag + zero)
                 for name in wanted
             }
-        kept = {name: [xp.where(ok & xp.isfinite(sum(of)), part, xp.nan) for part in of] for name, of in parts.items()}
+            kept = {
+                name: [xp.where(ok & xp.isfinite(sum(of)), part, xp.nan) for part in of] for name, of in parts.items()
+            }
         return {name: of[0] if name in SCALARS else xp.stack(of, axis=-1) for name, of in kept.items()}
 
     return of_numbers
@@ -146,8 +148,10 @@ def _evaluate(
     if "force" in stages:
         done = case.dynamics(state, acceleration)
         power = xp.where(xp.isfinite(done.drive), done.work * speed, xp.nan)
-        found |= {**done.pins._asdict(), case.names.value: done.drive, "power": power}
-        found["drive_condition"] = case.drive_condition(state)
+        forces = {**done.pins._asdict(), case.names.value: done.drive, "power": power}
+        lever = case.drive_condition(state)
+        held = lever > NO_DIGIT_LEFT * given.eps  # what is 0 for `solve` compilers and other libraries round
+        found |= {name: xp.where(held, of, xp.nan) for name, of in forces.items()} | {"drive_condition": lever}
         for term in case.terms:
             if (status := term.status(state, None)) is not None:
                 ok = ok & (status == OK)

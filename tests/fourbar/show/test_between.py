@@ -60,6 +60,16 @@ def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
     assert own.sum() == 25 and np.all(np.diff(found.solution.theta_2) > 0.0)
 
 
+def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:
+    """A sweep that ends where the loop no longer closes: nothing beyond its last position was looked at."""
+    scene = crank_rocker()
+    for steps in (9, 20):
+        swept = replace(scene, motion=fourbar.Motion(theta_4=fourbar.Sweep(1.5, 3.5, steps), omega_4=2.0))
+        solution = fourbar.solve(swept)
+        assert 0 < solution.assembled.sum() < steps + 1
+        assert {"speed", "power", "F12", "F32", "F43"} <= locate_between(swept, solution).growing
+
+
 def test_towards_a_pole_no_largest_value_is_made_up() -> None:
     scene = swept(thesis(), 360)
     solution = fourbar.solve(scene)

@@ -106,3 +106,6 @@ def test_a_study_has_what_each_of_its_members_has() -> None:
     assert np.isnan(load.largest[3]) and np.isnan(duty.rms_power[3]) and np.isnan(moment[3]).all()  # type: ignore[index]
     assert np.isnan([duty.energy_in[3], duty.energy_out[3]]).all()  # type: ignore[index]
     assert duty.closed.tolist()[:3] == [True, True, False]  # type: ignore[attr-defined]
+    speeds = {"motion.omega_2": np.array([0.0, 3.0]), "motion.theta_2": turn}
+    rest = motor_duty(fourbar.solve(fourbar.vary(scene, speeds)))
+    assert rest is not None and np.isfinite(rest.energy_in).tolist() == [False, True]  # type: ignore[arg-type]

@@ -299,12 +299,23 @@ NO_VALUE = {
 
 @pytest.mark.parametrize("status", NO_VALUE)
 def test_where_solve_has_no_value_there_is_none(library: Library, status: str) -> None:
-    """The power alone is beyond the range of doubles in the second."""
+    """Of the second the power alone is beyond the range of doubles; of the first F32 is (inf, -inf): no warning."""
     scene = NO_VALUE[status]
     assert fourbar.solve(scene).status == [status]
     for make in (float, np.array, library.array):
-        found = function(scene, ["motion.theta_2"], ["power", "theta_4"])(make(0.5))
+        found = function(scene, ["motion.theta_2"], ["power", "theta_4", "F32"])(make(2.0))
         assert np.isnan(float(found["power"])) and np.isfinite(float(found["theta_4"]))
+
+
+def test_a_lever_that_only_rounding_leaves_holds_nothing(library: Library) -> None:
+    """A kite whose input lies on the ground's line at any theta_4: its couple has no lever, in any arithmetic."""
+    motion = Motion(theta_4=np.linspace(0.2, 2.9, 12), omega_4=2.0)
+    scene = replace(LOADED, linkage=uniform(0.24491877, 0.24491877, 0.10712378, 0.10712378), motion=motion)
+    assert set(fourbar.solve(scene).status) == {"no_torque"}
+    f = library.jit(function(scene, ["lengths.input"], ["F43", "torque", "theta_3"]))
+    found = f(library.array(0.24491877))
+    assert np.isnan(np.asarray(found["torque"])).all() and np.isnan(np.asarray(found["F43"])).all()
+    assert np.isfinite(np.asarray(found["theta_3"])).all()
 
 
 def test_single_precision_stays_single(library: Library) -> None:
