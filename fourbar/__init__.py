@@ -122,7 +122,8 @@ def _plot(
 
     Raises
     ------
-    InputError : unknown figure or choice of branches; a figure of forces without omega_2.
+    InputError : unknown figure or choice of branches; a figure of forces without omega_2; a position or dimensions
+        for a figure that shows none.
     NotAssembledError : there is no position to draw.
     DependencyError : matplotlib is missing.
     """

@@ -130,6 +130,23 @@ def test_the_name_of_a_file_asks_for_its_form(ending: str, tmp_path: Path, run: 
         assert named.read_bytes() == asked.read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("command", "name", "written"),
+    [
+        ("analyze", "a.xlsx", ".csv"),
+        ("equilibrium", "a.csv", ".json"),
+        ("usd", "a.usdc", ".usda"),
+        ("mjcf", "a.sdf", ".xml"),
+    ],
+)
+def test_text_is_not_written_under_a_name_whose_readers_refuse_it(
+    command: str, name: str, written: str, tmp_path: Path, run: Fourbar
+) -> None:
+    code, _, err = run(command, MODELS / "crank_rocker.toml", "-o", tmp_path / name)
+    assert code == BAD_INPUT and err.count("\n") == 1 and written in err and "no ending" in err
+    assert not (tmp_path / name).exists()
+
+
 def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     file = MODELS / "crank_rocker.toml"
     code, out, err = run("analyze", file, "--csv")
