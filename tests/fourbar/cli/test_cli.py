@@ -442,7 +442,7 @@ def test_a_full_disk_leaves_the_old_file(run: Fourbar, monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize(
-    ("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder"), ("a.toml", "is read here")]
+    ("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder"), ("a", "is read here")]
 )
 @pytest.mark.parametrize("command", ["analyze", "mjcf"])
 def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
@@ -450,10 +450,10 @@ def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
 ) -> None:
     monkeypatch.setattr(Case, "of", None)
     text = (MODELS / "thesis.toml").read_text()
-    (tmp_path / "a.toml").write_text(text)
-    code, _, err = run(command, tmp_path / "a.toml", "-o", tmp_path / out)
+    (tmp_path / "a").write_text(text)
+    code, _, err = run(command, tmp_path / "a", "-o", tmp_path / out)
     assert code == BAD_INPUT and why in err and err.count("\n") == 1
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.toml", text)]
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a", text)]
 
 
 @pytest.mark.posix

@@ -3,11 +3,13 @@
 import math
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.text import Text
@@ -344,6 +346,13 @@ def test_a_position_and_dimensions_show_where_they_are_taken() -> None:
             if figure not in ("stroke", "energy"):  # of other scenes
                 plain, changed = (draw_figure(crank_rocker(), figure, **of) for of in ({}, {option: value}))
                 assert plain._repr_svg_() != changed._repr_svg_(), (figure, option)
+
+
+def test_threads_draw_what_one_draws_and_leave_the_settings_as_they_were() -> None:
+    drawn, before = crank_rocker().plot("torque")._repr_svg_(), dict(matplotlib.rcParams)
+    with ThreadPoolExecutor(4) as pool:
+        assert set(pool.map(lambda _: crank_rocker().plot("torque")._repr_svg_(), range(8))) == {drawn}
+    assert dict(matplotlib.rcParams) == before
 
 
 def test_a_position_that_does_not_assemble_is_refused(tmp_path: Path) -> None:
