@@ -17,8 +17,8 @@ Everything that `dir(fourbar)` shows; SI and radians everywhere; a description t
 like `uniform("6 in", ...)`. `import fourbar` loads numpy alone: what needs
 more (files, effects, drawings) is loaded on first use.
 
-`scene.plot()` draws a figure that a notebook shows and `.save("a.pdf")` writes; a scene and every result as the last
-line of a cell show themselves.
+`scene.plot()` draws a figure that a notebook shows and `.save("a.pdf")` writes; a scene, a solution, sensitivities and
+tolerances as the last line of a cell show themselves. Threads may solve and draw at the same time.
 
 *Written by `python docs/api.py` from the docstrings.*
 """

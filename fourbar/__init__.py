@@ -44,12 +44,15 @@ if _TYPE_CHECKING:
     from fourbar.effects import Load as Load
     from fourbar.effects import PinFriction as PinFriction
     from fourbar.effects import Spring as Spring
+    from fourbar.effects import SpringEnd as SpringEnd
     from fourbar.effects import Springs as Springs
+    from fourbar.effects import Table as Table
     from fourbar.effects import Torsion as Torsion
     from fourbar.effects import Viscous as Viscous
     from fourbar.files import dump as dump
     from fourbar.files import load as load
     from fourbar.files import save as save
+    from fourbar.files.pictures import Picture as Picture
     from fourbar.show.duty import bearing_load as bearing_load
     from fourbar.show.duty import motor_duty as motor_duty
     from fourbar.show.duty import shaking_force as shaking_force
@@ -67,8 +70,8 @@ if _TYPE_CHECKING:
     from fourbar.studies.study import vary as vary
 
 _EFFECTS = (
-    *("Flywheel", "Friction", "Gravity", "LinearDrive", "Load", "PinFriction", "Spring", "Springs"),
-    *("Torsion", "Viscous"),
+    *("Flywheel", "Friction", "Gravity", "LinearDrive", "Load", "PinFriction", "Spring", "SpringEnd", "Springs"),
+    *("Table", "Torsion", "Viscous"),
 )
 _ON_FIRST_USE = {
     **{name: "fourbar.effects" for name in _EFFECTS},
@@ -76,6 +79,7 @@ _ON_FIRST_USE = {
     **{name: "fourbar.show.duty" for name in ("bearing_load", "motor_duty", "shaking_force", "shaking_moment")},
     **{name: "fourbar.studies.derivatives" for name in ("Sensitivity", "sensitivity")},
     **{name: "fourbar.studies.study" for name in ("Study", "vary")},
+    "Picture": "fourbar.files.pictures",
     "extremes": "fourbar.studies.enclosure",
     "equilibrium": "fourbar.studies.equilibrium",
     "function": "fourbar.studies.function",
@@ -122,7 +126,8 @@ def _plot(
 
     Raises
     ------
-    InputError : unknown figure or choice of branches; a figure of forces without omega_2.
+    InputError : unknown figure or choice of branches; a figure of forces without omega_2; a position or dimensions
+        for a figure that shows none.
     NotAssembledError : there is no position to draw.
     DependencyError : matplotlib is missing.
     """

@@ -90,7 +90,7 @@ def make_data_frame(columns: Mapping[str, Any]) -> "DataFrame":
 def describe_extent(theta_2: Any) -> str:
     """Say how many positions there are, of how many linkages."""
     count = f"{theta_2.shape[-1]} position{'s' if theta_2.shape[-1] != 1 else ''}"
-    return count if theta_2.ndim == 1 else f"{len(theta_2)} linkages, {count} each"
+    return count if theta_2.ndim == 1 else f"{len(theta_2)} linkage{'s' if len(theta_2) != 1 else ''}, {count} each"
 
 
 def write_between(values: Any) -> str:

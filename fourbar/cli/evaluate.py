@@ -14,7 +14,7 @@ from fourbar.solution import DEGREES, Conversion
 @click.command()
 @click.argument("lengths", nargs=4, metavar="D A B C")
 @given.json_option
-@given.or_out_option
+@given.text_option(*given.TABLES)
 def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
     """Name a linkage by its bar lengths (ground, input, coupler, output), and say what turns and how far.
 
@@ -71,7 +71,7 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
 @click.option("--sensitivity", is_flag=True, help="What the quantities depend on: d(quantity)/d(number).")
 @click.option("--every", type=click.IntRange(min=1), metavar="N", help="Show every N-th position in the table.")
 @click.option("--all", "every", flag_value=1, help="Show every position; a terminal gets some forty at most.")
-@given.or_out_option
+@given.text_option(*given.TABLES, ".csv")
 def analyze(
     scene: Path,
     as_json: bool,
@@ -188,7 +188,7 @@ def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
 )
 @given.json_option
 @given.units_option
-@given.or_out_option
+@given.text_option(*given.TABLES)
 def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: Conversion, out: Path | None) -> None:
     """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
     from fourbar.show import extremes as shown
@@ -210,7 +210,7 @@ def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: Con
 @click.command()
 @given.scene_argument
 @given.json_option
-@given.or_out_option
+@given.text_option(*given.TABLES)
 def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
     """Find where a linkage stays by itself, stable or not, how fast it swings there, and what holds it elsewhere."""
     from fourbar.show import equilibrium as shown
@@ -228,7 +228,7 @@ def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
     "--degree", type=int, default=4, show_default=True, metavar="N", help="Of the highest polynomial, 1 to 4."
 )
 @given.json_option
-@given.or_out_option
+@given.text_option(*given.TABLES)
 def ratio(scene: Path, degree: int, as_json: bool, out: Path | None) -> None:
     """Show omega_4/omega_2, torque ratio and reflected inertia, and the polynomial of a mimic joint with its errors."""
     from fourbar.show import ratio as shown

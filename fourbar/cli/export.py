@@ -100,7 +100,7 @@ def animate(
     show_default=True,
     help="flywheel keeps omega_2; for a controller of your own: motor, whose ctrl is the couple or force, or none.",
 )
-@given.out_option
+@given.text_option(".xml", ".mjcf", required=True)
 def mjcf(
     scene: Path | None,
     lengths: tuple[str, ...] | None,
@@ -143,7 +143,7 @@ def mjcf(
 @given.scene_argument
 @click.option("--for", "reader", type=click.Choice(["gazebo", "drake"]), default="gazebo", show_default=True)
 @without_loads_option
-@given.out_option
+@given.text_option(".sdf", ".world", ".xml", required=True)
 def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
     """Write a scene as SDF, the loop closed by a fourth joint (Gazebo) or a ball constraint (Drake)."""
     from fourbar.mjcf.sdf import write_sdf as written
@@ -155,7 +155,7 @@ def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
 @click.command()
 @given.scene_argument
 @without_loads_option
-@given.out_option
+@given.text_option(".usda", ".usd", required=True)
 def usd(scene: Path, without_loads: bool, out: Path) -> None:
     """Write a scene as USD text (.usda) for Newton, the loop closed by a fourth revolute joint."""
     from fourbar.mjcf.usd import write_usd as written

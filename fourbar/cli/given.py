@@ -27,7 +27,7 @@ def _read_units(context: click.Context, parameter: click.Parameter, text: str) -
 
 scene_argument = click.argument("scene", type=FILE)
 out_option = click.option("-o", "--out", type=FILE, required=True, metavar="FILE")
-or_out_option = click.option("-o", "--out", type=FILE, metavar="FILE", help="Write it to FILE instead of printing it.")
+TABLES = (".txt", ".json")
 units_option = click.option(
     "--units",
     default="SI",
@@ -35,6 +35,18 @@ units_option = click.option(
     metavar="UNITS",
     help='"imperial", or a list like "mm N.mm deg"; left out: SI.',
 )
+
+
+def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
+    """Make -o of a command that writes text: no reader takes it under the ending of another form."""
+
+    def require_ending(context: click.Context, parameter: click.Parameter, out: Path | None) -> Path | None:
+        if out is not None and out.suffix and out.suffix.lower() not in endings:
+            raise InputError("path", str(out), f"what is written ends in {', '.join(endings)}, or has no ending")
+        return out
+
+    told = None if required else "Write it to FILE instead of printing it."
+    return click.option("-o", "--out", type=FILE, required=required, callback=require_ending, metavar="FILE", help=told)
 
 
 def json_option(command: Callable[..., None]) -> Callable[..., None]:

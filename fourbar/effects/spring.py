@@ -20,7 +20,13 @@ COINCIDE = 16.0 * 2.0**-52
 
 
 class SpringEnd(NamedTuple):
-    """A point of a bar: polar from the bar's first pin (O2 for the ground), the angle from the bar's line."""
+    """A point of a bar.
+
+    Parameters
+    ----------
+    bar : 1 (the ground), 2, 3 or 4.
+    distance, angle : from the bar's first pin (O2, O2, A, O4), m, the angle from its line, rad.
+    """
 
     bar: int
     distance: float
@@ -49,7 +55,7 @@ def require_ends(key: str, start: object, end: object) -> tuple[SpringEnd, Sprin
     ends = []
     for name, point in (("from", start), ("to", end)):
         if not isinstance(point, SpringEnd):
-            raise InputError(f"{key}.{name}", point, "must be a fourbar.effects.SpringEnd")
+            raise InputError(f"{key}.{name}", point, "must be a fourbar.SpringEnd")
         bar = require_whole(f"{key}.{name}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
         at = zip(point[1:], ("m", "rad"), strict=True)
         ends.append(SpringEnd(bar, *(require(f"{key}.{name}.at", number, unit) for number, unit in at)))

@@ -9,9 +9,9 @@ import os
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from fourbar.errors import InputError
+from fourbar.errors import InputError, expect
 from fourbar.files.reading import read_bytes
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.linkage import BAR_NAMES, require_bar
 
 LARGEST = 2_000_000
 """Bytes of one picture: a page with three of them still opens quickly."""
@@ -39,8 +39,8 @@ class Picture:
     folder: str = "."
 
     def __post_init__(self) -> None:
-        if self.bar not in MOVING_BARS:
-            raise InputError("picture", self.bar, "belongs to bar 2, 3 or 4")
+        object.__setattr__(self, "bar", require_bar("picture.bar", self.bar))
+        expect("picture.folder", self.folder, str, Path)
         parts = self.name.split("/") if isinstance(self.name, str) else []
         plain = all(part not in ("", ".", "..") and not set(part) & set('\\:*?"<>|') for part in parts)
         if not parts or not plain or not self.name.isprintable() or len(self.name) > LONGEST_NAME:

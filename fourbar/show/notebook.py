@@ -7,6 +7,7 @@ from fourbar.linkage import BAR_NAMES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.solution import DEGREES, SI, Conversion, Solution
+from fourbar.writing import describe_extent
 
 SHOWN = 5
 """Positions shown at either end of a long sweep."""
@@ -60,8 +61,7 @@ def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
     from fourbar.show.tables import list_columns
 
     if solution.theta_2.ndim == 2:
-        members, count = solution.theta_2.shape
-        return f"<div><b>{escape(solution.title or 'Study')}</b>: {members} linkages, {count} positions each</div>"
+        return f"<div><b>{escape(solution.title or 'Study')}</b>: {describe_extent(solution.theta_2)}</div>"
     cells = list_columns(solution, units)
     if (solution.status_code != 0).any():
         cells = {"status": [status.replace("_", " ") for status in solution.status], **cells}

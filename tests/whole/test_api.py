@@ -18,7 +18,6 @@ import pytest
 
 import fourbar
 from fourbar.cli import status
-from fourbar.effects import SpringEnd, Table
 from fourbar.files import save
 from tests.support.scenes import crank_rocker
 
@@ -59,7 +58,11 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     scene, rows = fourbar.Scene(link, fourbar.Motion(1.0, 10.0)), (("O2", 0.1), ("B", 0.2))
     solution, study = fourbar.solve(scene), fourbar.vary(scene, {"lengths.input": [0.1, 0.11]})
-    out, at, ends = {"torque": np.empty(1)}, fourbar.command(scene), (SpringEnd(2, 0.1, 0.2), SpringEnd(4, 0.1, 0.2))
+    out, at, ends = (
+        {"torque": np.empty(1)},
+        fourbar.command(scene),
+        (fourbar.SpringEnd(2, 0.1, 0.2), fourbar.SpringEnd(4, 0.1, 0.2)),
+    )
     times, angles = (0.0, 1.0, 2.0, 3.0), (0.0, 0.1, 0.2, 0.1)
 
     def moving(motion: fourbar.Motion) -> object:
@@ -132,10 +135,15 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         "Tolerance": (fourbar.Tolerance, ("lengths.input", 0.1, False)),
         "Load": (
             lambda *x: fourbar.solve(fourbar.Scene(link, scene.motion, loads=(fourbar.Load(*x),))),
-            (2, (1.0, 0.0), (0.1, 0.1), 1.0, "world", Table((0.0, 2.0), (1.0, 1.0))),
+            (2, (1.0, 0.0), (0.1, 0.1), 1.0, "world", fourbar.Table((0.0, 2.0), (1.0, 1.0))),
         ),
-        "Load, its table": (Table, ((0.0, 2.0), (1.0, 1.0))),
+        "Table": (fourbar.Table, ((0.0, 2.0), (1.0, 1.0))),
+        "Picture": (fourbar.Picture, (3, "a.png", ".")),
         "Spring": (lambda *x: acting(fourbar.Springs((fourbar.Spring(*x),))), (*ends, 1.0, 0.1, 0.1)),
+        "SpringEnd": (
+            lambda *x: acting(fourbar.Springs((fourbar.Spring(fourbar.SpringEnd(*x), ends[1], 1.0),))),
+            (2, 0.1, 0.2),
+        ),
         "LinearDrive": (lambda *x: fourbar.solve(fourbar.Scene(link, drive=fourbar.LinearDrive(*x))), ends),
         "Springs": (lambda x: acting(fourbar.Springs(x)), ((fourbar.Spring(*ends, 1.0),),)),
         "Gravity": (lambda *x: acting(fourbar.Gravity(*x)), (9.81, 1.0)),

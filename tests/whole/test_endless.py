@@ -88,8 +88,8 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
 ) -> None:
     (tmp_path / "released.toml").write_text(RELEASED)
     monkeypatch.setattr(free_motion, "STEPS", 500)
-    for command in ("analyze", "plot", "animate"):
-        out = tmp_path / ("out.html" if command == "animate" else "out.svg")
+    for command, ending in (("analyze", "csv"), ("plot", "svg"), ("animate", "html")):
+        out = tmp_path / f"out.{ending}"
         assert fourbar.cli.status([command, str(tmp_path / "released.toml"), "-o", str(out)]) == BAD_INPUT
         printed = capsys.readouterr().err
         assert printed.count("\n") == 1 and "released.toml: motion.free.duration = 1000000000.0" in printed

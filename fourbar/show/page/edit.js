@@ -99,7 +99,12 @@ function show(about, own) {
   byId("reference").replaceChildren(...about.kept.map(name => new Option(name, name, false, name === about.reference)));
   document.querySelector("h1").textContent = document.title = about.plain.title || "Four-bar linkage";
   document.querySelector(".source").textContent = about.plain.source ?? "";
-  if (about.data.summary) byId("summary").textContent = about.data.summary.join("\n");
+  if (about.data.summary) byId("summary").replaceChildren(...about.data.summary.map(line => {
+    const shown = document.createElement("div");
+    shown.textContent = line;
+    if (line.includes("  ")) shown.className = "columns";
+    return shown;
+  }));
   byId("keys")?.replaceChildren(...Object.keys(about.keys).map(key => new Option(key)));
   if (about.saved !== undefined) say(about.saved ? `${fileName} is saved` : `${fileName}: not saved yet; kept in ${fileName}.edit`);
   else if (own && own.request.do !== "hello") say(`${fileName}: changed`);

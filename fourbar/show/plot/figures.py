@@ -97,6 +97,11 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "sensitivity": (studies.draw_influences, (9.6, 3.6), True),
 }
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
+TAKERS = {
+    "position": tuple(name for name in FIGURES if name not in ("hodograph", "sensitivity")),
+    "dimensions": ("overview", "linkage", "points"),
+}
+"""Figures in which one position is marked, and in which bars are numbered."""
 
 
 def _choose_painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, tuple[float, float]]:
@@ -147,6 +152,9 @@ def draw_figure(
     """Draw a figure of a scene for a notebook: `Scene.plot`, which says the parameters."""
     painter, size = _choose_painter(scene, figure, branches)
     require_units(units)
+    for key, value in (("position", position), ("dimensions", dimensions or None)):
+        if value is not None and figure not in TAKERS[key]:
+            raise InputError(key, value, f"must be left out of {figure}; it shows in {', '.join(TAKERS[key])}")
     position = None if position is None else require("position", position)
     with apply_style():
         scenes = [set_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]

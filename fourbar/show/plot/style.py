@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,6 +56,10 @@ DPI = 200
 FORMATS = ("svg", "png", "pdf")
 
 
+_ONE_AT_A_TIME = RLock()
+"""Of the threads that draw: matplotlib's settings are those of the whole program."""
+
+
 @contextmanager
 def apply_style() -> Iterator[None]:
     """Apply the settings of `STYLE` for the time of one drawing.
@@ -65,7 +70,7 @@ def apply_style() -> Iterator[None]:
         import matplotlib as mpl
     except ImportError:
         raise DependencyError(f"drawing needs matplotlib: {say_install('plot')}") from None
-    with mpl.rc_context():
+    with _ONE_AT_A_TIME, mpl.rc_context():
         mpl.rcdefaults()  # a user's matplotlibrc does not change a published figure
         mpl.rcParams.update(mpl.rc_params_from_file(STYLE, use_default_template=False))
         yield

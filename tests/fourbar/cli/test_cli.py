@@ -130,6 +130,23 @@ def test_the_name_of_a_file_asks_for_its_form(ending: str, tmp_path: Path, run: 
         assert named.read_bytes() == asked.read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("command", "name", "written"),
+    [
+        ("analyze", "a.xlsx", ".csv"),
+        ("equilibrium", "a.csv", ".json"),
+        ("usd", "a.usdc", ".usda"),
+        ("mjcf", "a.sdf", ".xml"),
+    ],
+)
+def test_text_is_not_written_under_a_name_whose_readers_refuse_it(
+    command: str, name: str, written: str, tmp_path: Path, run: Fourbar
+) -> None:
+    code, _, err = run(command, MODELS / "crank_rocker.toml", "-o", tmp_path / name)
+    assert code == BAD_INPUT and err.count("\n") == 1 and written in err and "no ending" in err
+    assert not (tmp_path / name).exists()
+
+
 def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     file = MODELS / "crank_rocker.toml"
     code, out, err = run("analyze", file, "--csv")
@@ -425,7 +442,7 @@ def test_a_full_disk_leaves_the_old_file(run: Fourbar, monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize(
-    ("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder"), ("a.toml", "is read here")]
+    ("out", "why"), [("no/out", "no such folder"), (".", "a file, not a folder"), ("a", "is read here")]
 )
 @pytest.mark.parametrize("command", ["analyze", "mjcf"])
 def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
@@ -433,10 +450,10 @@ def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
 ) -> None:
     monkeypatch.setattr(Case, "of", None)
     text = (MODELS / "thesis.toml").read_text()
-    (tmp_path / "a.toml").write_text(text)
-    code, _, err = run(command, tmp_path / "a.toml", "-o", tmp_path / out)
+    (tmp_path / "a").write_text(text)
+    code, _, err = run(command, tmp_path / "a", "-o", tmp_path / out)
     assert code == BAD_INPUT and why in err and err.count("\n") == 1
-    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.toml", text)]
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a", text)]
 
 
 @pytest.mark.posix

@@ -90,6 +90,22 @@ def opened(chromium, tmp_path: Path):
     chromium.get_log("browser")  # of lines that were cut on purpose
 
 
+def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(chromium, opened, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(fourbar.dump(fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22))))
+    chromium.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride", {"width": 400, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    )
+    chromium.get(opened(tmp_path / "a.toml").address)
+    lines = "[...document.querySelectorAll('#summary .columns')]"
+    wait_for(chromium, f"{lines}.length")
+    told, heights = zip(
+        *chromium.execute_script(f"return {lines}.map(e => [e.textContent, e.offsetHeight])"), strict=True
+    )
+    assert any("limit positions" in line for line in told) and len(told) > 2
+    assert len(set(heights)) == 1  # of one line each
+    assert chromium.execute_script("return document.documentElement.scrollWidth") <= 400
+
+
 def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, tmp_path: Path) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     server = opened(path)

@@ -144,6 +144,8 @@ def test_results_say_in_ten_lines_what_they_hold() -> None:
         assert scene.title in text and "61" in text
     assert f"torque: {solution.torque.min():.6g} to {solution.torque.max():.6g} N m" in repr(solution)
     assert "status: 122 ok, 61 not_assembled" in repr(fourbar.solve(study))
+    one = fourbar.solve(fourbar.vary(fourbar.Scene(scene.linkage, fourbar.Motion(1.0)), {"lengths.input": 0.1}))
+    assert "1 linkage, 1 position each" in repr(one) and "1 linkage, 1 position each" in one._repr_html_()
     lengths = {key: number for key, number in zip(found.keys, found.numbers, strict=True) if key.startswith("lengths")}
     own = {key: np.abs(found.of("torque", key)).max() * 0.01 * number for key, number in lengths.items()}
     own["lengths.ground_angle"] *= math.radians(1.0) / (0.01 * lengths["lengths.ground_angle"])

@@ -230,11 +230,16 @@ def test_another_command_is_the_axis_and_the_linkage_follows(browse, motion, nam
 
 
 @pytest.mark.parametrize("width", [360, 400, 480, 1280])
-def test_the_numbers_of_an_axis_stand_clear_of_each_other(browse, width: int) -> None:
+def test_the_numbers_of_an_axis_stand_clear_of_each_other_and_a_stroke_stays_in_its_column(browse, width: int) -> None:
     drive = fourbar.LinearDrive(SpringEnd(1, 1.45, math.radians(-160.0)), SpringEnd(2, 0.29, 0.17))
     motion = fourbar.Motion(stroke=fourbar.Sweep(1.2, 1.7, 40), stroke_speed=0.2, side="left")
     scene = fourbar.Scene(fourbar.uniform(0.9, 0.3, 0.75, 0.66), motion, drive=drive)
-    boxes = browse(animate.write_page(scene), width).execute_script(
+    driver = browse(animate.write_page(scene), width)
+    wide, room = driver.execute_script(
+        "const box = document.querySelector('.slider output'); return [box.scrollWidth, box.clientWidth]"
+    )
+    assert wide <= room
+    boxes = driver.execute_script(
         "return [...chart.querySelectorAll('text')].filter(t => t.textContent.endsWith('mm'))"
         ".map(t => t.getBoundingClientRect()).map(box => [box.left, box.right])"
     )

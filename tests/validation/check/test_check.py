@@ -162,6 +162,10 @@ def reversed_load(load: fourbar.Load) -> fourbar.Load:
     return replace(load, force=load.force and (-load.force[0], load.force[1]), moment=-load.moment)
 
 
+def tenth(load: fourbar.Load) -> fourbar.Load:
+    return replace(load, force=load.force and (0.1 * load.force[0], load.force[1]), moment=0.1 * load.moment)
+
+
 def exchanged(scene: Scene) -> Numbers:
     numbers = right(scene)
     return numbers | {"F32": numbers["F32"][:, ::-1]}
@@ -232,7 +236,40 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
      | {"theta_2": right(s)["theta_2"]}, "the rows are shifted by -1"),
     ("theta_2 as degrees", "crank_rocker", ALL,
      lambda s: right(s, theta_2=np.radians(right(s)["theta_2"])) | {"theta_2": right(s)["theta_2"]}, "read as degrees"),
+    ("theta_2 as radians", "crank_rocker", ALL,
+     lambda s: right(s) | {"theta_2": np.radians(right(s)["theta_2"])}, "in radians where degrees"),
+    ("omega_2 in rad/s", "crank_rocker", ALL, solved(same, omega_2=10.0 * math.pi / 30), "rad/s taken for rev/min"),
+    ("columns exchanged", "thesis", ALL,
+     lambda s: right(s) | {"F32": right(s)["F43"], "F43": right(s)["F32"]}, "columns F32 and F43 are exchanged"),
+    ("mass for weight", "crank_rocker", FORCES,
+     solved(lambda s: replace(s, effects=(fourbar.Gravity(1.0),))), "gravity 0.101937 times ours"),
+    ("a tenth of a load", "thesis", FORCES,
+     solved(lambda s: replace(s, loads=(tenth(s.loads[0]), *s.loads[1:]))), "load 1 (bar 2) 0.1 times ours"),
 ]  # fmt: skip
+
+
+@pytest.mark.parametrize("digits", [4, 5])
+def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(digits: int, tmp_path: Path) -> None:
+    scene = SCENES["crank_rocker"]
+    numbers = right(scene)
+    for name in ("torque", "F12"):
+        numbers[name] = numbers[name] / 9.81
+    found = judged(scene, write(tmp_path / "theirs.csv", numbers, ("torque", "F12"), digits=digits)).explanations
+    assert [each.quantities for each in found] == [("torque", "F12")]
+    path = tmp_path / "angles.csv"
+    rows = zip(numbers["theta_2"].tolist(), numbers["theta_4"].tolist(), strict=True)
+    path.write_text("\n".join(["theta_2,theta_4 [deg]", *(f"{x!r},{y:.{digits}f}" for x, y in rows), ""]))
+    assert judged(scene, path).explanations[0].text.startswith("units: numbers in rad where deg was announced")
+
+
+def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(tmp_path: Path) -> None:
+    scene = SCENES["crank_rocker"]
+    numbers = right(scene)
+    slip = numbers | {"torque": numbers["torque"] * np.where(np.arange(12) == 5, -1.0, 1.0)}
+    assert not judged(scene, write(tmp_path / "slip.csv", slip, ("torque",))).explanations
+    numbers["theta_2"] = np.array([float(f"{x:.5f}") for x in np.radians(numbers["theta_2"])])
+    found = judged(scene, write(tmp_path / "theirs.csv", numbers, ("torque",))).explanations
+    assert numbers["theta_2"][0] == 0.0 and "in radians where degrees" in found[0].text
 
 
 @pytest.mark.parametrize(("what", "scene", "columns", "planted", "words"), MISTAKES, ids=[m[0] for m in MISTAKES])
@@ -373,7 +410,7 @@ BAD_TABLES = [
     ("error bars alone", "theta_2,torque_error\n1,0\n", "needs a result"),
     ("a row without its angle", "theta_2,torque\n,2\n", "line 2 = ['', '2']: needs a theta_2"),
     ("blank column alone", "theta_2,torque\n1,\n", "needs a result"),
-    ("one cell more", "theta_2,torque\n1,2,3\n", "needs 2 cells"),
+    ("one cell more", "theta_2,torque\n1,2,3\n", "needs 2 cells; with decimal commas, semicolons"),
     ("unit of another kind in a line of its own", "theta_2,torque\nrad,kg\n1,2\n", "kg"),
     ("of dry friction", "theta_2,torque_low\n1,2\n", "no dry friction"),
     ("unknown column", "theta_2,wheel\n1,2\n", "known are theta_2"),

@@ -3,14 +3,17 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fourbar.effects import Gravity, Load
 from fourbar.errors import FourBarError
 from fourbar.linkage import Bar
-from fourbar.quantities import FORCES, UNITS
+from fourbar.quantities import FORCES, UNITS, VECTORS
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Scene
 from fourbar.solution import Solution
@@ -21,15 +24,15 @@ from fourbar_validation.compare.tolerance import compute_difference, replace_zer
 from fourbar_validation.scenes.hard_linkages import replace_bars
 
 OTHER_UNITS = {
-    "rad": ("deg",),
-    "rad/s": ("deg/s", "rpm", "rev/s"),
-    "rad/s^2": ("deg/s^2", "rpm/s"),
-    "m": ("mm", "cm", "in", "ft"),
-    "m/s^2": ("mm/s^2", "cm/s^2", "in/s^2", "ft/s^2", "g0"),
-    "N": ("kN", "mN", "lbf", "kgf"),
-    "N m": ("N mm", "N cm", "kN m", "mN m", "lbf ft", "lbf in", "kgf m", "kgf cm", "kgf mm"),
+    "rad": ("rad", "deg"),
+    "rad/s": ("rad/s", "deg/s", "rpm", "rev/s"),
+    "rad/s^2": ("rad/s^2", "deg/s^2", "rpm/s"),
+    "m": ("m", "mm", "cm", "in", "ft"),
+    "m/s^2": ("m/s^2", "mm/s^2", "cm/s^2", "in/s^2", "ft/s^2", "g0"),
+    "N": ("N", "kN", "mN", "lbf", "kgf"),
+    "N m": ("N m", "N mm", "N cm", "kN m", "mN m", "lbf ft", "lbf in", "kgf m", "kgf cm", "kgf mm"),
 }
-"""What each SI unit is taken for."""
+"""What each SI unit is taken for; itself where another was announced."""
 ENOUGH = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
 CARRIED = 2.0
@@ -53,6 +56,7 @@ MOST_ROWS = 1000
 def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     """Every mistake whose number the table gives, the simplest first."""
     yield from _find_ratios(judge, differing)
+    yield from _try_exchanged(differing)
     yield from _try_order(judge)
     if any(name_quantity(key) in FORCES for key in differing):
         yield from _try_factors(judge, differing)
@@ -107,7 +111,20 @@ def _round_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | Non
     ten = math.copysign(10.0**power, near)
     if power and judge.explained(key, ten * judge.ours(key)):
         return f"every number is {'-' if near < 0.0 else ''}10^{power} times ours", ten
-    return (f"every number is {near:.6g} times ours", near) if judge.explained(key, near * judge.ours(key)) else None
+    fits = judge.explained(key, near * judge.ours(key), CARRIED)
+    return (f"every number is {near:.5g} times ours", near) if fits else None
+
+
+def _try_exchanged(differing: list[str]) -> Iterator[Mistake]:
+    """Two columns of one unit, each under the name of the other."""
+    for one, other in combinations(dict.fromkeys(map(name_quantity, differing)), 2):
+        if UNITS[one] == UNITS[other] and (one in VECTORS) == (other in VECTORS):
+            taken = {one: other, other: one}
+            yield Mistake(
+                f"the columns {one} and {other} are exchanged",
+                lambda quantity, right, taken=taken: getattr(right, taken.get(quantity, ""), None),  # type: ignore[misc]
+                whole=False,
+            )
 
 
 def _compute_residual(judge: Judge, key: str, one: Array, other: Array) -> Array:
@@ -119,20 +136,25 @@ def _compute_residual(judge: Judge, key: str, one: Array, other: Array) -> Array
 
 
 def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
-    """Try a moment of inertia or a mass times a factor: forces and torque are linear in each."""
+    """Try a moment of inertia, a mass, gravity or a load times a factor: forces and torque are linear in each."""
     scene = judge.scene
     keys = [key for key in differing if name_quantity(key) in FORCES]
+    keys = [key for key in keys if not key.startswith("|")] or keys  # a magnitude is linear in none of them
     theirs = np.concatenate([_compute_residual(judge, key, judge.table.values[key], judge.ours(key)) for key in keys])
     if np.count_nonzero(theirs) < ENOUGH:
         return
     bars = ("input", "coupler", "output")
     inertia = ("moment of inertia", lambda bar, f: replace(bar, inertia=f * bar.moment_of_inertia))
     mass = ("mass", lambda bar, f: replace(bar, mass=f * bar.mass))
-    for which, (word, change) in (*(((bar,), each) for bar in bars for each in (inertia, mass)), (bars, inertia)):
-
-        def scaled(f: float, which: Sequence[str] = which, change: Callable[[Bar, float], Bar] = change) -> Scene:
-            return replace_bars(scene, **{bar: change(getattr(scene.linkage, bar), f) for bar in which})
-
+    of_bars = [
+        (f"{which[0] if len(which) == 1 else 'every bar'}: {word}", word, partial(_scale_bars, scene, which, change))
+        for which, (word, change) in (*(((bar,), each) for bar in bars for each in (inertia, mass)), (bars, inertia))
+    ]
+    of_loads = [
+        (f"load {number} (bar {load.bar})", "load", partial(_scale_load, scene, load))
+        for number, load in enumerate(scene.loads, 1)
+    ]
+    for name, word, scaled in (*of_bars, ("gravity", "gravity", partial(_scale_gravity, scene)), *of_loads):
         try:
             twice = solve(scaled(2.0), "force", at=judge.at)
             moves = np.concatenate([_compute_residual(judge, k, judge.ours(k, twice), judge.ours(k)) for k in keys])
@@ -140,12 +162,12 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
             factor = 1.0 + float(moves @ theirs) / slope if slope else math.nan
             if not 0.0 < factor < math.inf or factor == 1.0:
                 continue
-            plain = next((f for f in FACTORS if abs(factor / f - 1.0) < PLAIN), None) if word != "mass" else None
+            plain = next((f for f in FACTORS if abs(factor / f - 1.0) < PLAIN), None) if word == inertia[0] else None
             for f in (factor,) if plain is None else (plain, factor):
                 wrong = solve(scaled(f), "force", at=judge.at)
                 what = f"{FACTORS[f]}" if f == plain else f"{f:.6g} times ours (fitted)"
                 yield Mistake(
-                    f"{which[0] if len(which) == 1 else 'every bar'}: {word} {what}",
+                    f"{name} {what}",
                     lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None),  # type: ignore[misc]
                     times=1.0 if f == plain else CARRIED,
                 )
@@ -153,6 +175,23 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
                     break
         except FourBarError:  # what the factor makes of this scene is none
             continue
+
+
+def _scale_bars(scene: Scene, which: Sequence[str], change: Callable[[Bar, float], Bar], f: float) -> Scene:
+    return replace_bars(scene, **{bar: change(getattr(scene.linkage, bar), f) for bar in which})
+
+
+def _scale_gravity(scene: Scene, f: float) -> Scene:
+    scaled = (
+        replace(each, magnitude=f * each.magnitude) if isinstance(each, Gravity) else each for each in scene.effects
+    )
+    return replace(scene, effects=tuple(scaled))
+
+
+def _scale_load(scene: Scene, load: Load, f: float) -> Scene:
+    force = None if load.force is None else (f * load.force[0], load.force[1])
+    scaled = replace(load, force=force, moment=f * load.moment)
+    return replace(scene, loads=tuple(scaled if each is load else each for each in scene.loads))
 
 
 def _try_offset(judge: Judge) -> Iterator[Mistake]:

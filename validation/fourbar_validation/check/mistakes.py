@@ -8,12 +8,13 @@ import numpy as np
 
 from fourbar.effects import Gravity, Load
 from fourbar.errors import FourBarError
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import Bar
 from fourbar.quantities import FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.check.fitted import find_fitted
+from fourbar_validation.check.fitted import ENOUGH, find_fitted
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import Array
 from fourbar_validation.scenes.hard_linkages import list_moving, replace_bars
@@ -21,7 +22,7 @@ from fourbar_validation.scenes.hard_linkages import list_moving, replace_bars
 SHOWN = 5
 """Explanations that are printed."""
 NEARER = 10.0
-"""A mistake that brings every row of a quantity this much nearer is named, though it does not explain it wholly."""
+"""A mistake that brings every row that differs this much nearer is named, though it does not explain it wholly."""
 
 
 def list_hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
@@ -82,6 +83,8 @@ def _list_other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene
     """Evaluate the same formulas on the scene that the mistake amounts to."""
     yield "the other branch", scene, at._replace(branch=-at.branch)
     yield "theta_2 read as degrees", scene, at._replace(angle=np.radians(at.theta_2))
+    in_degrees = np.degrees(np.fmod(at.theta_2, TURN))  # a whole turn is 6.28 of these degrees
+    yield "theta_2 in radians where degrees were announced", scene, at._replace(angle=in_degrees)
     gravity = [effect for effect in scene.effects if isinstance(effect, Gravity)]
     if gravity:
         others = tuple(effect for effect in scene.effects if not isinstance(effect, Gravity))
@@ -107,6 +110,7 @@ def _list_other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene
             yield "alpha_2 is left out", scene, at._replace(acceleration=0.0)
         rpm = np.pi / 30.0
         yield "omega_2 in rev/min taken for rad/s", scene, at._replace(speed=at.omega_2 / rpm)
+        yield "omega_2 in rad/s taken for rev/min", scene, at._replace(speed=at.omega_2 * rpm)
     for name, bar in list_moving(scene):
         for text, change in BAR_MISTAKES:
             if (changed := change(bar)) is not None:
@@ -212,9 +216,11 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
             elif key not in differing:
                 broken = mistake.whole
             else:
+                before, allowed, _ = judge.judged(key, judge.ours(key))
+                after = judge.judged(key, predicted)[0]
                 where = judge.where(key)
-                before, after = (judge.judged(key, values)[0][where] for values in (judge.ours(key), predicted))
-                if np.all(after <= before / NEARER):
+                enough = int((before > allowed)[where].sum()) >= min(ENOUGH, int(where.sum()))
+                if enough and np.all((after <= np.maximum(before / NEARER, allowed))[where]):
                     nearer.append(table.label(key))
         if (explained or nearer) and not broken:
             complete = len(explained) == len(differing)

@@ -107,7 +107,8 @@ def read_table(path: Path) -> TheirTable:
     halves = {name: np.empty(len(rows)) for name in names}
     for row, (line, cells) in enumerate(rows):
         if len(cells) < len(headings) or any(cell.strip() for cell in cells[len(headings) :]):
-            raise InputError(f"line {line}", cells, f"needs {len(headings)} cells", str(path))
+            beside = "; with decimal commas, semicolons between them" if len(cells) > len(headings) else ""
+            raise InputError(f"line {line}", cells, f"needs {len(headings)} cells{beside}", str(path))
         for index, (name, unit) in columns.items():
             value, half = _read_number(path, f"line {line}, {headings[index].strip()}", cells[index])
             numbers[name][row], halves[name][row] = value * unit.factor, half * unit.factor

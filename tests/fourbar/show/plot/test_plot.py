@@ -3,10 +3,13 @@
 import math
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.text import Text
@@ -23,7 +26,7 @@ from fourbar.show import plot
 from fourbar.show.between import locate_between
 from fourbar.show.duty import compute_energies
 from fourbar.show.plot.curves import break_at_poles, choose_limit, find_poles
-from fourbar.show.plot.figures import FIGURES, draw_figure
+from fourbar.show.plot.figures import FIGURES, TAKERS, draw_figure
 from fourbar.show.plot.film import choose_frames
 from fourbar.show.plot.freebody import list_actions
 from fourbar.show.plot.labels import Labels
@@ -323,12 +326,33 @@ def test_hostile_titles_are_text(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "options"),
-    [("a.bmp", {}), ("a.png", {"figure": "pie"}), ("a.png", {"branches": "all"})],
+    [
+        ("a.bmp", {}),
+        ("a.png", {"figure": "pie"}),
+        ("a.png", {"branches": "all"}),
+        *(("a.png", {"figure": figure, "position": 1.0}) for figure in ("hodograph", "sensitivity")),
+        *(("a.png", {"figure": figure, "dimensions": True}) for figure in ("torque", "coupler", "freebody")),
+    ],
 )
-def test_what_is_not_allowed_is_named(tmp_path: Path, name: str, options: dict[str, str]) -> None:
+def test_what_is_not_allowed_is_named(tmp_path: Path, name: str, options: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="must"):
         plot.draw(crank_rocker(), tmp_path / name, **options)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_position_and_dimensions_show_where_they_are_taken() -> None:
+    for option, value in {"position": 1.0, "dimensions": True}.items():
+        for figure in TAKERS[option]:
+            if figure not in ("stroke", "energy"):  # of other scenes
+                plain, changed = (draw_figure(crank_rocker(), figure, **of) for of in ({}, {option: value}))
+                assert plain._repr_svg_() != changed._repr_svg_(), (figure, option)
+
+
+def test_threads_draw_what_one_draws_and_leave_the_settings_as_they_were() -> None:
+    drawn, before = crank_rocker().plot("torque")._repr_svg_(), dict(matplotlib.rcParams)
+    with ThreadPoolExecutor(4) as pool:
+        assert set(pool.map(lambda _: crank_rocker().plot("torque")._repr_svg_(), range(8))) == {drawn}
+    assert dict(matplotlib.rcParams) == before
 
 
 def test_a_position_that_does_not_assemble_is_refused(tmp_path: Path) -> None:
