@@ -189,7 +189,7 @@ def test_derivatives_are_those_of_sensitivity(library: Library, family: str) -> 
     scene = FAMILIES[family](np.random.default_rng([3, list(FAMILIES).index(family)]))
     wanted = fourbar.sensitivity(scene)
     numbers = numbers_of(scene)
-    quantities = ["torque", "F12", "F43", "theta_4", "alpha_3"]
+    quantities = ["drive_force" if scene.drive else "torque", "F12", "F43", "theta_4", "alpha_3"]
     f = function(scene, list(numbers), quantities)
     values = library.array(list(numbers.values()))
     slopes = (library.jacrev if library.xp.__name__ == "torch" else library.jacfwd)(lambda x: f(*x))(values)
