@@ -105,13 +105,17 @@ def solve(
     return solution
 
 
+RATES = ("acceleration", "speed", "stroke_speed")
+"""Of a command: a number for all positions, or an array."""
+
+
 def _refuse(at: Command) -> None:
     """Raise an InputError where a command is none."""
     expect("at", at, Command)
     require_bar("at.bar", at.bar)
     named = dict(zip(("angle", "speed", "acceleration", "branch"), (*COMMANDS[at.bar], "branch"), strict=True))
-    named |= {name: name for name in ("stroke", "lever") if getattr(at, name) is not None}
-    for name in (name for name in named if name not in ("speed", "acceleration")):
+    named |= {name: name for name in ("stroke", "lever", "stroke_speed") if getattr(at, name) is not None}
+    for name in (name for name in named if name not in RATES):
         value = getattr(at, name)
         expect(f"at.{named[name]}", value, np.ndarray)
         if value.ndim != 1 or value.shape != at.angle.shape or value.dtype.kind not in "iuf":
@@ -120,7 +124,7 @@ def _refuse(at: Command) -> None:
     branch = at.branch
     if not (branch.item() in (1, -1) if branch.size == 1 else (np.abs(branch) == 1).all()):
         raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
-    for name in ("acceleration",) if at.speed is None else ("speed", "acceleration"):
+    for name in RATES[:1] if at.speed is None else (name for name in RATES if name in named):
         value, key = getattr(at, name), f"at.{named[name]}"
         if isinstance(value, np.ndarray):
             if value.shape not in ((), at.angle.shape) or value.dtype.kind not in "iuf":
