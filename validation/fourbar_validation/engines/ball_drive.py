@@ -6,7 +6,6 @@ from flint import acb, arb
 
 from fourbar.effects import LinearDrive
 from fourbar.scene import Scene
-from fourbar.scene.stroke import SIDES
 from fourbar_validation.engines.ball_vectors import Ball, Complex, Values, dot, polar, wedge
 
 ENDS = ("from", "to")
@@ -34,7 +33,7 @@ def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     cosine = (length**2 + reach**2 - s**2) / (2 * length * reach)
     if abs(cosine) > 1:
         return None
-    beta, side = cosine.acos(), int(SIDES[motion.side])
+    beta, side = cosine.acos(), 1 if motion.side == "left" else -1  # to the left the stroke grows with the angle
     across, along = length * reach * beta.sin(), length * reach * cosine
     rate = s * speed / across
     growth = (speed**2 + s * x["stroke_acceleration"] - along * rate**2) / across

@@ -53,6 +53,7 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
     tally.samples += 1
     motion, angle = scene.motion, float(np.asarray(scene.motion.angle))
     drive = "torque" if scene.drive is None else "drive_force"
+    internal = scene.drive is not None and 1 not in (scene.drive.start.bar, scene.drive.end.bar)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         found = solve_position(scene, angle) if library == "numpy" else evaluate(scene, library)
@@ -73,7 +74,7 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
             if component not in values or name == motion.names[0] or name.endswith("_error"):
                 continue
             own, rate = np.ravel(found[name])[index], sensitivity[component]
-            if scene.drive and name in PIN_FORCES:  # a component that the drive has no part in is left of larger ones
+            if internal and name in PIN_FORCES:  # a component that the drive has no part in is left of larger ones
                 rate = max(sensitivity[other] for other, _ in list_components(name))
             if library != "numpy":  # whose lengths are no constants: no bar rests or stays parallel exactly
                 rate += max(compute_allowed(0.0, sensitivity[other]) for other, _ in list_components(name))
