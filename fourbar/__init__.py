@@ -64,7 +64,6 @@ if _TYPE_CHECKING:
     from fourbar.studies.enclosure import extremes as extremes
     from fourbar.studies.equilibrium import equilibrium as equilibrium
     from fourbar.studies.function import function as function
-    from fourbar.studies.ratio import ratio as ratio
     from fourbar.studies.spread import tolerances as tolerances
     from fourbar.studies.study import Study as Study
     from fourbar.studies.study import vary as vary
@@ -83,7 +82,6 @@ _ON_FIRST_USE = {
     "extremes": "fourbar.studies.enclosure",
     "equilibrium": "fourbar.studies.equilibrium",
     "function": "fourbar.studies.function",
-    "ratio": "fourbar.studies.ratio",
     "tolerances": "fourbar.studies.spread",
     "in_units": "fourbar.show.notebook",
     "units": "fourbar.show.units",

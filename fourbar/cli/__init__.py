@@ -6,7 +6,7 @@ import click
 
 from fourbar import __version__
 from fourbar.cli.edit import edit
-from fourbar.cli.evaluate import analyze, classify, equilibrium, extremes, new, ratio, tolerance
+from fourbar.cli.evaluate import analyze, classify, equilibrium, extremes, new, tolerance
 from fourbar.cli.export import animate, mjcf, plot, sdf, usd
 from fourbar.errors import run
 
@@ -32,7 +32,7 @@ def group(context: click.Context, traceback: bool) -> None:
         click.echo(context.get_help())
 
 
-for command in (classify, new, analyze, tolerance, extremes, equilibrium, ratio, mjcf, sdf, usd, plot, animate, edit):
+for command in (classify, new, analyze, tolerance, extremes, equilibrium, mjcf, sdf, usd, plot, animate, edit):
     group.add_command(command)
 
 

@@ -1,4 +1,4 @@
-"""The commands that evaluate a linkage, what may vary of it, at rest, and what can take the place of its loop."""
+"""The commands that evaluate a linkage, what may vary of it, and where it rests."""
 
 import shutil
 import sys
@@ -219,21 +219,4 @@ def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
 
     with given.open_scene(scene) as described, show_running("the boxes are halved"):
         result = found(described)
-    given.print_to((shown.write_json if as_json else shown.write_tables)(described.title, result), out)
-
-
-@click.command()
-@given.scene_argument
-@click.option(
-    "--degree", type=int, default=4, show_default=True, metavar="N", help="Of the highest polynomial, 1 to 4."
-)
-@given.json_option
-@given.text_option(*given.TABLES)
-def ratio(scene: Path, degree: int, as_json: bool, out: Path | None) -> None:
-    """Show omega_4/omega_2, torque ratio and reflected inertia, and the polynomial of a mimic joint with its errors."""
-    from fourbar.show import ratio as shown
-    from fourbar.studies.ratio import ratio as found
-
-    with given.open_scene(scene) as described:
-        result = found(described, degree)
     given.print_to((shown.write_json if as_json else shown.write_tables)(described.title, result), out)

@@ -92,7 +92,6 @@ def animate(
     show_default=True,
     help="What loads it: settings that suit it, and where its numbers stand.",
 )
-@click.option("--mimic", is_flag=True, help="Joints that follow the input in place of the loop (see `fourbar ratio`).")
 @click.option(
     "--drive",
     type=click.Choice(["flywheel", "motor", "none"]),
@@ -107,7 +106,6 @@ def mjcf(
     omega: str | None,
     simulator: str,
     drive: "Drive",
-    mimic: bool,
     out: Path,
 ) -> None:
     """Write a scene, or a linkage of uniform bars, as MJCF that runs on its own in MuJoCo and its kin."""
@@ -119,13 +117,7 @@ def mjcf(
         raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
 
     def put(described: Scene) -> None:
-        text = writer.write_mjcf_for(described, simulator, drive)
-        if mimic:
-            from fourbar.studies.ratio import ratio
-
-            best = ratio(described).fits[-1]  # the best polynomials that MuJoCo holds
-            text = writer.replace_loop(text, described, best.about, best.joint_A, best.theta_4)
-        given.print_to(text, out)
+        given.print_to(writer.write_mjcf_for(described, simulator, drive), out)
 
     if lengths is None:
         assert scene is not None

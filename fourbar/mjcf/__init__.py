@@ -5,7 +5,6 @@ from fourbar.mjcf.defaults import make_scene as make_scene
 from fourbar.mjcf.document import choose_run as choose_run
 from fourbar.mjcf.document import size_flywheel as size_flywheel
 from fourbar.mjcf.document import write_mjcf as write_mjcf
-from fourbar.mjcf.mimic import replace_loop as replace_loop
 from fourbar.mjcf.settings import RECIPE as RECIPE
 from fourbar.mjcf.settings import Settings as Settings
 from fourbar.mjcf.settings import WindowMotion as WindowMotion

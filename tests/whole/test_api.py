@@ -107,7 +107,6 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         "vary": (fourbar.vary, (scene, {"lengths.input": [0.1]})),
         "vary, a value": (lambda x: fourbar.solve(fourbar.vary(scene, {"lengths.input": x})), (0.1,)),
         "equilibrium": (fourbar.equilibrium, (scene,)),
-        "ratio": (fourbar.ratio, (scene, 1)),
         "extremes": (fourbar.extremes, (scene, ("torque",))),
         "function": (fourbar.function, (scene, ["lengths.input"], ["torque"])),
         "tolerances": (

@@ -286,8 +286,6 @@ PROCESSES = [
     ("fourbar", f"extremes {NO_FILE}", BAD_INPUT),
     ("validation", f"run {NO_FILE}", BAD_INPUT),
     ("fourbar", f"equilibrium {NO_FILE}", BAD_INPUT),
-    ("fourbar", f"ratio {NO_FILE}", BAD_INPUT),
-    ("validation", f"cost --mimic {NO_FILE}", BAD_INPUT),
     ("fourbar", "edit --port none", BAD_INPUT),
     ("fourbar", f"sdf {NO_FILE} -o a.sdf", BAD_INPUT),
     ("fourbar", f"usd {NO_FILE} -o a.usda", BAD_INPUT),

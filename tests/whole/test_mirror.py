@@ -29,8 +29,6 @@ JUDGED_BY = {
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve holding zeros; fourbar/show: equilibrium; "
     "fourbar/formulas: closed_curve",
-    "fourbar/studies/test_ratio.py": "fourbar/show: ratio; fourbar/mjcf: mimic",
-    "validation/lab/test_mimic.py": "validation/engines/mujoco: mimic",
     "fourbar/formulas/test_mobility.py": "fourbar/formulas: circuits linkage_type",
     "fourbar/test_solve.py": "fourbar: linkage solution; "
     "fourbar/scene: motion; fourbar/evaluation: blocks case stages withheld",

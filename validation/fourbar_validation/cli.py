@@ -19,7 +19,6 @@ COMMANDS = {
     "published": "fourbar_validation.lab.ladder:published",
     "cost": "fourbar_validation.lab.cost.cost:cost",
     "cost --effects": "fourbar_validation.lab.effects:cost_effects",
-    "cost --mimic": "fourbar_validation.lab.mimic:command",
     "advise": "fourbar_validation.advise.advise:command",
     "advise --study": "fourbar_validation.lab.cost.measure:study",
     "stability": "fourbar_validation.lab.stress.forward_error.stability:stability",

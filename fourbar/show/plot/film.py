@@ -60,7 +60,7 @@ def write_film(
         raise InputError("seconds", seconds, f"must be more than 0 and at most {MAX_FRAMES // FRAMES_PER_SECOND}")
     with apply_style():
         import matplotlib as mpl
-        from matplotlib.animation import FFMpegWriter, PillowWriter
+        from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 
         if kind == "mp4":
             mpl.rcParams["animation.ffmpeg_path"] = _find_ffmpeg()
@@ -80,12 +80,10 @@ def write_film(
         with tempfile.TemporaryDirectory() as folder:
             draft = Path(folder) / f"film.{kind}"
             try:
-                with writer.saving(figure, str(draft), DPI), show_running(f"{len(order)} frames are drawn") as progress:
-                    for done, index in enumerate(order):
-                        move(index)
-                        writer.grab_frame()
-                        if progress is not None:
-                            progress(done / len(order))
+                with show_running(f"{len(order)} frames are drawn") as progress:
+                    told = None if progress is None else lambda done, count: progress(done / count)
+                    film = FuncAnimation(figure, move, frames=order, cache_frame_data=False)
+                    film.save(str(draft), writer=writer, dpi=DPI, progress_callback=told)
             except (subprocess.CalledProcessError, BrokenPipeError):
                 raise DependencyError("this ffmpeg cannot encode H.264 (libx264); .gif and .html need none") from None
             write_bytes(path, draft.read_bytes())
