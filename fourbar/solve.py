@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
-from fourbar.evaluation.blocks import choose_block_size, choose_evaluation, evaluate_parts, is_compiled, keep
-from fourbar.evaluation.case import BLOCK, Case
+from fourbar.evaluation.blocks import choose_block_size, keep
+from fourbar.evaluation.case import Case
 from fourbar.evaluation.stages import FORCE, Part, evaluate_command, evaluate_freely
 from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
 from fourbar.quantities import (
@@ -36,9 +36,7 @@ if TYPE_CHECKING:
 class Members(Protocol):
     """What else can be solved: many linkages, which evaluate themselves block by block (`fourbar.vary`)."""
 
-    def solved(
-        self, stage: str | None, *, out: Mapping[str, Array] | None, side: int, compiled: bool | None
-    ) -> Solution:
+    def solved(self, stage: str | None, *, out: Mapping[str, Array] | None, side: int) -> Solution:
         """Every quantity as (m, n) or (m, n, 2)."""
 
 
@@ -49,7 +47,6 @@ def solve(
     at: Command | None = None,
     out: Mapping[str, Array] | None = None,
     side: int = 0,
-    compiled: bool | None = None,
 ) -> Solution:
     """Evaluate a scene, or a study of m linkages, with the closed formulas as far as a stage.
 
@@ -62,23 +59,19 @@ def solve(
         quantities named are evaluated, with the stages they need, and the others are None in the result.
     side : in which sense pins at rest are about to turn where dry friction acts: +1 as the commanded angle grows, -1 as
         it falls, 0 neither.
-    compiled : False: by NumPy. True: by the compiled formulas (numba, extra "fast"), as far as they carry the scene;
-        left out: likewise, where numba is installed and the work is at least WORTH_COMPILING.
 
     Raises
     ------
-    DependencyError : compiled is True and numba is not installed.
     InputError : the stage or a name in `out` is unknown, its array has the wrong shape, the scene does not state
         the omega_2 that is needed, or a study, which states its own positions, is given others.
     """
     require_whole("side", side, (-1, 0, 1), "must be -1, 0 or 1")
-    expect("compiled", compiled, bool, type(None))
     if not isinstance(scene, Scene):
         if not hasattr(scene, "solved"):
             raise InputError("scene", scene, "must be a Scene, or a Study of `vary`")
         if at is not None:
             raise InputError("at", "a command", "a study states its own positions: vary the commanded angle")
-        return scene.solved(stage, out=out, side=side, compiled=compiled)
+        return scene.solved(stage, out=out, side=side)
     if at is not None:
         _refuse(at)
     moved = _solve_released(scene) if scene.motion.free is not None and at is None else None
@@ -90,14 +83,12 @@ def solve(
         case = Case.of(scene, where.bar)._replace(side=side)
         if wanted >= FORCE and scene.counts_turns:
             case = case.with_start(_find_beginning(scene, where, moved))
-        plain = moved is None and where.remainder is None and where.lever is None
-        quick = plain and is_compiled(case, wanted, n, compiled)
         result = None
-        if n == 1 and moved is None and out is None and not quick:
+        if n == 1 and moved is None and out is None:
             result = _solve_alone(case, where, wanted, names, code)
     if result is None:
         result = make_arrays(names, (n,), out)
-        _solve_by_parts(case, where, moved, wanted, names, result, code, quick)
+        _solve_by_parts(case, where, moved, wanted, names, result, code)
 
     unwrap_angles(result, where.bar)
     solution = make_solution(scene, where, code, result)
@@ -235,23 +226,20 @@ def _solve_by_parts(
     names: KeysView[str],
     result: Mapping[str, Array],
     code: NDArray[np.uint8],
-    quick: bool,
 ) -> None:
     """Evaluate all positions block by block, those of a free motion by their independent angle."""
-    size = BLOCK if quick else choose_block_size(wanted)
+    size = choose_block_size(wanted)
     parts: list[Part] = [(slice(start, start + size),) for start in range(0, len(code), size)]
     if moved is not None:
         parts = [(np.flatnonzero(moved.bar == bar),) for bar in (2, 4)]
-
-    def evaluate(part: Part) -> Mapping[str, Any]:
-        if moved is not None:
-            found = evaluate_freely(case, moved, part, wanted, names)
-        else:
-            found = choose_evaluation(quick)(case, where, part, wanted, names)
-        keep(case, found, result, code, part, seen=quick)
-        return found[1]
-
-    evaluate_parts(evaluate, parts, at_once=quick)
+    found = None  # freed when the next part has its own: else the memory of each goes back to the system
+    with np.errstate(all="ignore"):
+        for part in parts:
+            if moved is not None:
+                found = evaluate_freely(case, moved, part, wanted, names)
+            else:
+                found = evaluate_command(case, where, part, wanted, names)
+            keep(case, found, result, code, part)
 
 
 def _solve_alone(

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from fourbar.effects.effect import Effect
 from fourbar.effects.numbers import find_unit
 from fourbar.errors import InputError, expect
-from fourbar.evaluation.blocks import choose_block_size, choose_evaluation, evaluate_parts, is_compiled, keep
+from fourbar.evaluation.blocks import choose_block_size, keep
 from fourbar.evaluation.case import BLOCK, Case
-from fourbar.evaluation.stages import FORCE
+from fourbar.evaluation.stages import FORCE, evaluate_command
 from fourbar.formulas.mobility import follow_smooth_path
 from fourbar.formulas.position import loop, reorder_lengths
 from fourbar.linkage import convert_to_unit
@@ -50,18 +50,13 @@ class Study:
         """Say what varies."""
         return f"Study {self.scene.title!r}: {describe_extent(self.at.angle)}\n" + list_names("varied", self.values)
 
-    def solved(
-        self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0, compiled: bool | None = None
-    ) -> Solution:
+    def solved(self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0) -> Solution:
         """Return what `fourbar.solve` does for a study: every quantity as (m, n) or (m, n, 2)."""
         at, shape = self.at, self.at.angle.shape
         wanted, names = find_requested(self.scene, shape, at, stage, out)
         result = make_arrays(names, shape, out)
         code = np.zeros(shape, dtype=np.uint8)
-        with np.errstate(all="ignore"):
-            whole = Case.of(self._make_members(slice(0, 1), 1, self.scene), at.bar)
-        quick = is_compiled(whole, wanted, code.size, compiled)
-        size = BLOCK if quick else choose_block_size(wanted)
+        size = choose_block_size(wanted)
 
         def evaluate(rows: slice) -> None:
             begins = self._make_started(rows) if wanted >= FORCE else self.scene
@@ -69,12 +64,13 @@ class Study:
                 block = (rows.stop - rows.start, columns.stop - columns.start)
                 case = Case.of(self._make_members(rows, block[1], begins), at.bar)._replace(side=side)
                 where = self._list_command(rows, columns)
-                run = choose_evaluation(quick and not case.path.may_stay_parallel)
-                found = run(case, where, (...,), wanted, names)
+                found = evaluate_command(case, where, (...,), wanted, names)
                 keep(case, found, result, code, (rows, columns), block)
             unwrap_angles({name: result[name][rows] for name in ("theta_2", *ANGLES) if name in result}, at.bar)
 
-        evaluate_parts(evaluate, list(_split(len(self), max(1, size // shape[1]))), at_once=quick)
+        with np.errstate(all="ignore"):
+            for rows in _split(len(self), max(1, size // shape[1])):
+                evaluate(rows)
         code[np.isnan(at.angle)] = NOT_ASSEMBLED  # the cylinder cannot have the stroke
         code[self.invalid] = INVALID
         for array in result.values():

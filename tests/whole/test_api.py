@@ -81,7 +81,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         return fourbar.solve(fourbar.Scene(fourbar.FourBar(0.3, fourbar.Bar(*given), link.coupler, link.output)))
 
     def solved(*given: Any) -> object:
-        return fourbar.solve(given[0], given[1], at=given[2], side=given[3], compiled=given[4])
+        return fourbar.solve(given[0], given[1], at=given[2], side=given[3])
 
     only_linkage = ("change_points", "circuits", "classify", "time_ratio", "transmission_extremes")
     of_solution = ("motor_duty", "shaking_force", "shaking_moment")
@@ -113,8 +113,8 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
             lambda *x: fourbar.tolerances(fourbar.Scene(link, scene.motion, tolerances=x[0]), samples=x[1], seed=x[2]),
             ((fourbar.Tolerance("lengths.input", 1e-4),), 2, 0),
         ),
-        "solve": (solved, (scene, "force", at, 0, False)),
-        "solve, a study": (solved, (study, "force", None, 0, False)),
+        "solve": (solved, (scene, "force", at, 0)),
+        "solve, a study": (solved, (study, "force", None, 0)),
         "solve, out": (lambda x: fourbar.solve(scene, out=x), (out,)),
         "solve, out torque": (lambda x: fourbar.solve(scene, out={"torque": x}), (out["torque"],)),
         "Bar": (bars, (0.1, 0.2, 0.1, (0.1, 0.1))),

@@ -32,7 +32,6 @@ JUDGED_BY = {
     "fourbar/formulas/test_mobility.py": "fourbar/formulas: circuits linkage_type",
     "fourbar/test_solve.py": "fourbar: linkage solution; "
     "fourbar/scene: motion; fourbar/evaluation: blocks case stages withheld",
-    "fourbar/evaluation/test_compiled.py": "fourbar/evaluation: compiled_case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion_law; fourbar/studies: keys",
     "fourbar/studies/test_spread.py": "fourbar/scene: tolerance; fourbar/files: tolerances",
     "fourbar/studies/test_derivatives.py": "fourbar/show: influence",

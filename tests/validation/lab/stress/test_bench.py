@@ -48,7 +48,7 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
 
 def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, at = make_example(), make_command(500)
-    own = solve(scene, at=at, compiled=False)
+    own = solve(scene, at=at)
     expected = np.concatenate([np.atleast_2d(getattr(own, name).T) for name in UNKNOWNS])
     peers = contenders.collect_loops()
     assert {"NumPy", "C"} <= set(peers.here) or "C" in peers.not_run
@@ -70,10 +70,10 @@ def test_more_positions_than_fit_are_evaluated_in_pieces(monkeypatch: pytest.Mon
 
 def test_what_is_missing_is_named_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
-    for library in ("numba", "jax", "torch"):
+    for library in ("jax", "torch"):
         monkeypatch.setitem(sys.modules, library, None)
     peers = contenders.collect_loops()
-    assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"compiled", "C", "JAX", "PyTorch"}
+    assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"C", "JAX", "PyTorch"}
     rows = {"growth from 1000 positions on": 1.0}
     monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, peers.not_run))
     for variable in bench.ONE_THREAD:

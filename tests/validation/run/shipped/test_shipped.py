@@ -15,13 +15,13 @@ from fourbar_validation.compare.rows import FAILS, REFUSES, Row
 from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from fourbar_validation.run import judge
 from fourbar_validation.run.question import Question
-from fourbar_validation.run.shipped import calls, files
+from fourbar_validation.run.shipped import files
 from fourbar_validation.run.shipped.variants import find_stated, move_numbers
 from tests.support.scenes import crank_rocker
 
 SHIPPED = FAULT_SCENES["shipped"]
 CHECKS = [check.rows for check in judge.CHECKS if check.shipped]
-ENGINES = {"compiled", "study", "sensitivity", "extremes", "tolerances", "equilibria", "sdf", "usd"}
+ENGINES = {"study", "sensitivity", "extremes", "tolerances", "equilibria", "sdf", "usd"}
 
 
 def rows_of(scene: Scene, engine: str = "") -> list[Row]:
@@ -49,10 +49,6 @@ def altered(call: Callable[..., Any], change: Callable[[Any], None]) -> Callable
     return wrong
 
 
-def scaled_force(solution: Any) -> None:
-    solution.F43 *= 1.000001
-
-
 def swapped(solution: Any) -> None:
     solution.torque[[1, 2]] = solution.torque[[2, 1]]
 
@@ -68,7 +64,6 @@ def narrower(found: Any) -> None:
 @pytest.mark.parametrize(
     ("engine", "call", "change", "quantity"),
     [
-        ("compiled", "solve", scaled_force, "F43"),
         ("study", "solve", swapped, "torque"),
         ("sensitivity", "sensitivity", steeper, "torque"),
         ("tolerances", "tolerances", narrower, "torque"),
@@ -191,12 +186,10 @@ def test_what_breaks_down_costs_its_own_rows_and_what_is_missing_is_named(monkey
         raise RuntimeError("lost")
 
     monkeypatch.setattr(fourbar, "vary", broken)
-    monkeypatch.setattr(calls, "find_spec", lambda _: None)
     record = judge.judge("", SHIPPED, (), shipped=True)
-    (row,) = (row for row in record.rows if row.engine in ("compiled", "study"))
-    assert (row.engine, row.quantity, row.verdict) == ("study", "all", FAILS)
-    assert any(line.startswith("compiled: numba is not installed") for line in record.left_out)
-    assert {row.engine for row in record.rows if row.passed} >= ENGINES - {"compiled", "study"}
+    (row,) = (row for row in record.rows if row.engine == "study")
+    assert (row.quantity, row.verdict) == ("all", FAILS)
+    assert {row.engine for row in record.rows if row.passed} >= ENGINES - {"study"}
 
 
 def test_what_a_file_cannot_hold_is_refused() -> None:

@@ -57,7 +57,7 @@ ALONE = 20
 """Calls of one position each."""
 PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
-ALL, COMPILED, ANGLES_ALONE = "formulas, all 11 unknowns", "the same compiled", "positions only"
+ALL, ANGLES_ALONE = "formulas, all 11 unknowns", "positions only"
 SYSTEM, FLOOR = "13x13 assembled and solved", "floor: tangent, root, two arctan"
 FORCES, BARS, ONE = "solve to forces, points too", "solve with error bars", "one position to forces"
 JUDGED = "a scene judged by the exact engines"
@@ -104,17 +104,6 @@ LIMITS = {
     "one position with error bars / to forces": SpeedLimit(
         "<=", 4.5, "the evaluations run as one batch of short arrays", "one position with error bars", ONE
     ),
-    "numpy / compiled": SpeedLimit(">=", 1.2, "who installs numba gains by it on one core", ALL, COMPILED),
-    "compiled / C": SpeedLimit(
-        "<=", 1.5, "the blocks, statuses and copies around the compiled loop stay small", COMPILED, "C, all"
-    ),
-    "compiled error bars / forces": SpeedLimit(
-        "<=",
-        6.0,
-        "fourteen more evaluations, which share the tangent and the writing",
-        "compiled with error bars",
-        "compiled to forces, points too",
-    ),
     "study of linkages / positions": SpeedLimit("<=", 2.0, "a member is a column of the same arrays as a position"),
     "growth from 1000 positions on": SpeedLimit("<=", 1.3, "the work is linear in the positions: blocks fit the cache"),
     "memory beyond the result, MB": SpeedLimit("<=", 50.0, "work space is that of a block, not of the sweep"),
@@ -151,7 +140,7 @@ def measure_memory(n: int) -> float:
     at = make_command(n)
     out = allocate(UNKNOWNS, at)
     tracemalloc.start()
-    solve(make_example(), at=at, out=out, compiled=False)
+    solve(make_example(), at=at, out=out)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return peak / 1e6
@@ -180,7 +169,7 @@ def make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
 @click.option("--picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw the growth: svg, png or pdf.")
 @click.option("--against", metavar="REVISION", help="This tree's times over those of a git revision, instead.")
 def bench(positions: int, rounds: int, largest: int, picture: Path | None, against: str | None) -> int:
-    """Time NumPy, compiled formulas, C and the 13x13 system side by side; ratios that must hold."""
+    """Time NumPy, C and the 13x13 system side by side; ratios that must hold."""
     if picture is not None:
         format_of(picture)
     if against is not None:
@@ -248,30 +237,24 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     alone, lone = make_example(theta_2=1.0), make_bodies(scene, make_command(1))
     peers = collect_loops()
     actions: dict[str, tuple[int, Callable[[], object]]] = {
-        ALL: (positions, lambda: solve(scene, at=at, out=everything, compiled=False)),
+        ALL: (positions, lambda: solve(scene, at=at, out=everything)),
         ANGLES_ALONE: (positions, lambda: solve(scene, at=at, out=angles)),
         SYSTEM: (batch, lambda: solve_thirteen(bodies, 2)),
         FLOOR: (positions, make_floor(at.theta_2, angles)),
-        "input between limits: all": (positions, lambda: solve(limits, at=swing, out=everything, compiled=False)),
+        "input between limits: all": (positions, lambda: solve(limits, at=swing, out=everything)),
         "input between limits: positions only": (positions, lambda: solve(limits, at=swing, out=angles)),
-        FORCES: (many, lambda: solve(scene, "force", at=solved, compiled=False)),
-        BARS: (many, lambda: solve(scene, "error", at=solved, compiled=False)),
+        FORCES: (many, lambda: solve(scene, "force", at=solved)),
+        BARS: (many, lambda: solve(scene, "error", at=solved)),
         "13x13 of one position": (ALONE, lambda: [solve_thirteen(lone, 2) for _ in range(ALONE)]),
         ONE: (ALONE, lambda: [solve(alone) for _ in range(ALONE)]),
         "one position with error bars": (ALONE, lambda: [solve(alone, "error") for _ in range(ALONE)]),
     }
-    if "compiled" in peers.here:
-        actions |= {
-            COMPILED: (positions, lambda: solve(scene, at=at, out=everything, compiled=True)),
-            "compiled to forces, points too": (many, lambda: solve(scene, "force", at=solved, compiled=True)),
-            "compiled with error bars": (many, lambda: solve(scene, "error", at=solved, compiled=True)),
-        }
     if "C" in peers.here:
         actions["C, all"] = (positions, partial(peers.here["C"], at.theta_2, np.zeros((15, positions))))
     times = time_interleaved({name: action for name, (_, action) in actions.items()}, rounds)
     rows = {name: 1e9 * times[name] / count for name, (count, _) in actions.items()}
     by_positions = time_positions(peers.here, largest, rounds)
-    by_linkages = time_linkages(positions, rounds, compiled="compiled" in peers.here)
+    by_linkages = time_linkages(positions, rounds)
     cost, most = by_positions["NumPy"], max(by_linkages[STUDY])
     exact = [witness for witness in WITNESSES if not witness.through_time]
     if not any(witness.missing() for witness in exact):

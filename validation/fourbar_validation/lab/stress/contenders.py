@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar import vary
-from fourbar.errors import DependencyError, say_install
+from fourbar.errors import say_install
 from fourbar.quantities import UNKNOWNS, VECTORS
 from fourbar.show.plot.style import apply_style, format_of, save
 from fourbar.solve import solve
@@ -61,20 +61,13 @@ def time_interleaved(actions: Mapping[str, Callable[[], object]], rounds: int, c
 
 def collect_loops() -> Peers:
     """Collect the closed formulas by several hands: each writes into arrays that are there."""
-    scene = make_example()
-    result: dict[str, Loop | str] = {"NumPy": _make_solve_loop(False)}
-    try:
-        solve(scene, at=make_command(2), compiled=True)
-        result["compiled"] = _make_solve_loop(True)
-    except DependencyError as error:
-        result["compiled"] = str(error)
-    result["C"] = compile_loop()
+    result: dict[str, Loop | str] = {"NumPy": _make_solve_loop(), "C": compile_loop()}
     result |= {name: _make_library_loop(name) for name in ("JAX", "PyTorch")}
     reasons = {name: each for name, each in result.items() if isinstance(each, str)}
     return Peers({name: each for name, each in result.items() if not isinstance(each, str)}, reasons)
 
 
-def _make_solve_loop(compiled: bool) -> Loop:
+def _make_solve_loop() -> Loop:
     scene = make_example()
 
     def call(theta_2: Any, out: Any) -> None:
@@ -82,7 +75,7 @@ def _make_solve_loop(compiled: bool) -> Loop:
         for name in UNKNOWNS:
             row = next(rows)
             into[name] = out[row : next(rows) + 1].T if name in VECTORS else out[row]
-        solve(scene, at=make_command(len(theta_2))._replace(angle=theta_2), out=into, compiled=compiled)
+        solve(scene, at=make_command(len(theta_2))._replace(angle=theta_2), out=into)
 
     return call
 
@@ -148,14 +141,13 @@ def time_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
     return times
 
 
-def time_linkages(largest: int, rounds: int, *, compiled: bool) -> Times:
+def time_linkages(largest: int, rounds: int) -> Times:
     """Time a linkage at one position, in ns, for 1, 10, ... of them: solved as a study, and one after the other."""
     scene = make_example(theta_2=1.0)
     times: Times = {STUDY: {}, POSITIONS: {}, LOOPED: {}}
-    times |= {"study, compiled": {}} if compiled else {}
 
-    def study(lengths: Any, compiled: bool) -> None:
-        solve(vary(scene, {"lengths.coupler": lengths}), compiled=compiled)
+    def study(lengths: Any) -> None:
+        solve(vary(scene, {"lengths.coupler": lengths}))
 
     def looped(lengths: Any) -> None:
         for length in lengths.tolist():
@@ -165,11 +157,9 @@ def time_linkages(largest: int, rounds: int, *, compiled: bool) -> Times:
     for m in [10**k for k in range(6) if 10**k <= min(largest, MOST_LINKAGES)]:
         lengths = np.linspace(0.24, 0.26, m)
         actions: dict[str, Callable[[], object]] = {
-            STUDY: partial(study, lengths, False),
-            POSITIONS: partial(solve, scene, at=make_command(m), compiled=False),
+            STUDY: partial(study, lengths),
+            POSITIONS: partial(solve, scene, at=make_command(m)),
         }
-        if compiled:
-            actions["study, compiled"] = partial(study, lengths, True)
         if m <= MOST_LOOPED:
             actions[LOOPED] = partial(looped, lengths)
         for name, value in time_interleaved(actions, rounds, max(1, MOST_LOOPED // m)).items():

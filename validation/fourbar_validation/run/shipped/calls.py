@@ -1,20 +1,18 @@
-"""The compiled formulas and studies of many linkages, by the free bodies of each linkage for itself."""
+"""Studies of many linkages, by the free bodies of each linkage for itself."""
 
 from dataclasses import replace
-from importlib.util import find_spec
 
 import numpy as np
 
 import fourbar
 from fourbar.effects import Load
 from fourbar.effects.load import Table
-from fourbar.errors import say_install
 from fourbar.scene import Scene
 from fourbar.scene.point import Point
 from fourbar.studies.keys import command_key
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import magnitude
-from fourbar_validation.run.question import NotAskedError, Question
+from fourbar_validation.run.question import Question
 from fourbar_validation.run.shipped.variants import (
     ask_free_bodies,
     at_places,
@@ -32,17 +30,6 @@ APART = 1e-2
 """By what part its numbers differ from member to member, of angles in rad."""
 CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
 """rad from the first position; where the table of a load that the run adds is bent."""
-
-
-def compiled(question: Question) -> list[Row]:
-    """Judge the compiled formulas at every position, with points and a load over a table if the scene has none."""
-    if not find_spec("numba"):
-        raise NotAskedError(f"numba is not installed: {say_install('fast')}")
-    scene = furnish(question.scene, question)
-    with np.errstate(all="ignore"):
-        result = fourbar.solve(scene, at=question.at, compiled=True)
-        answer = ask_free_bodies(scene, question.at)
-    return hold_to(question, "compiled", scene, result, answer)
 
 
 def furnish(scene: Scene, question: Question) -> Scene:
@@ -76,8 +63,7 @@ def study(question: Question) -> list[Row]:
     ]
     rows = []
     with np.errstate(all="ignore"):
-        for how in (False, True) if find_spec("numba") else (False,):
-            result = fourbar.solve(fourbar.vary(scene, values | {key: each}), compiled=how)
-            for number, one in enumerate(members):
-                rows += hold_to(question, "study", one, take_member(result, number), ask_free_bodies(one))
+        result = fourbar.solve(fourbar.vary(scene, values | {key: each}))
+        for number, one in enumerate(members):
+            rows += hold_to(question, "study", one, take_member(result, number), ask_free_bodies(one))
     return keep_worst(rows)
