@@ -1,10 +1,11 @@
-"""Files appear whole or not at all: written under a temporary name, then renamed; and what a result says of itself."""
+"""Files are written atomically, under a temporary name that is then renamed; and what a result says of itself."""
 
 import json
 import math
 import os
+import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
@@ -43,11 +44,15 @@ def require_file(target: Path, *read: Path) -> None:
 
 
 def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None:
-    """Write a file whole, `private`: readable by its owner alone; on any failure the old file, or none, stays.
+    """Write a file whole; on any failure the old file, or none, stays.
+
+    A symbolic link stays and the file that it names is written. An existing file keeps its mode; a new one is an
+    ordinary file, and with `private` it is readable by its owner alone in either case.
 
     Raises InputError as `require_file` does, OSError for what fails otherwise (full disk, read-only folder).
     """
-    target = Path(path)
+    require_file(Path(path))
+    target = Path(os.path.realpath(path))
     require_file(target)
     if target.exists() and not target.is_file():
         # a device or pipe is written to; renaming onto it would replace /dev/null itself
@@ -63,14 +68,21 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-            umask = os.umask(0)
-            os.umask(umask)
             if not private:
-                os.chmod(temporary, 0o666 & ~umask)  # mkstemp makes it private; a result is an ordinary file
+                os.chmod(temporary, _choose_mode(target))  # mkstemp makes it private
             os.replace(temporary, target)
         except BaseException:
             Path(temporary).unlink(missing_ok=True)
             raise
+
+
+def _choose_mode(target: Path) -> int:
+    """Return the mode of the file that is there, or that of a new file."""
+    with suppress(FileNotFoundError):
+        return stat.S_IMODE(target.stat().st_mode)
+    umask = os.umask(0)
+    os.umask(umask)
+    return 0o666 & ~umask
 
 
 def write_text(path: str | Path, text: str) -> None:

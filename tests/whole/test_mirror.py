@@ -15,7 +15,7 @@ SOURCES = {"fourbar": ROOT / "fourbar", "validation": ROOT / "validation" / "fou
 JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
     "fourbar/cli/test_cli.py": "fourbar/cli: edit evaluate export given; fourbar/show: progress tables words",
-    "whole/test_exits.py": "fourbar: errors writing; validation: cli; validation/report: terminal; "
+    "whole/test_exits.py": "fourbar: errors; validation: cli; validation/report: terminal; "
     "validation/lab/stress: mutants",
     "whole/test_kills.py": "validation/run: pool run selection store; validation/scenes: suites",
     "whole/test_results_format.py": "validation/compare: columns",

@@ -1,0 +1,64 @@
+"""What becomes of the file that was there: its mode, the links that lead to it, and its bytes where writing fails."""
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+import fourbar
+from fourbar.cli import status
+from fourbar.writing import write_bytes
+
+CRANK_ROCKER = Path(__file__).parents[2] / "models" / "crank_rocker.toml"
+pytestmark = pytest.mark.posix
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+@pytest.mark.parametrize("before", [0o600, 0o640, 0o664, 0o755], ids=oct)
+def test_an_existing_file_keeps_its_mode_and_a_new_one_is_an_ordinary_file(tmp_path: Path, before: int) -> None:
+    path = tmp_path / "a"
+    write_bytes(path, b"new")
+    umask = os.umask(0)
+    os.umask(umask)
+    assert mode(path) == 0o666 & ~umask
+    path.chmod(before)
+    write_bytes(path, b"again")
+    assert (mode(path), path.read_bytes()) == (before, b"again")
+    write_bytes(path, b"private", private=True)
+    assert mode(path) == 0o600
+
+
+def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(tmp_path: Path) -> None:
+    (tmp_path / "far").mkdir()
+    real, link, chain = tmp_path / "far" / "real", tmp_path / "link", tmp_path / "chain"
+    link.symlink_to("far/real")
+    chain.symlink_to(link)
+    write_bytes(link, b"through a link that names no file yet")
+    real.chmod(0o600)
+    write_bytes(chain, b"through two")
+    assert chain.is_symlink() and link.is_symlink() and not real.is_symlink()
+    assert (real.read_bytes(), mode(real)) == (b"through two", 0o600)
+    assert [file.name for file in (tmp_path / "far").iterdir()] == ["real"]
+    (tmp_path / "round").symlink_to("round")
+    with pytest.raises((OSError, fourbar.InputError)):
+        write_bytes(tmp_path / "round", b"")
+    (tmp_path / "nowhere").symlink_to("no/such/folder")
+    with pytest.raises(fourbar.InputError, match="no such folder"):
+        write_bytes(tmp_path / "nowhere", b"")
+
+
+def test_save_and_analyze_write_through_links_and_keep_the_mode(tmp_path: Path) -> None:
+    for name, write in {
+        "scene.toml": lambda path: fourbar.save(fourbar.load(CRANK_ROCKER), path),
+        "table.csv": lambda path: status(["analyze", str(CRANK_ROCKER), "--csv", "-o", str(path)]),
+    }.items():
+        real, link = tmp_path / name, tmp_path / f"link_{name}"
+        real.write_text("old")
+        real.chmod(0o600)
+        link.symlink_to(real)
+        write(link)
+        assert link.is_symlink() and mode(real) == 0o600 and real.read_text() != "old", name
