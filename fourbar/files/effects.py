@@ -35,7 +35,7 @@ def _read_springs(value: object, read: Reader) -> "Springs":
             words = {"compressed_force": words.get("extended_force"), **words}
             stated = _read_numbers(read, f"{own}.gas", words, OF_GAS_SPRING)
         else:
-            stated = _read_numbers(read, own, {"preload": "0 N", **given}, numbers)
+            stated = _read_numbers(read, own, given, numbers, preload=0.0)
         try:
             springs.append(kinds.Spring.gas(start, end, *stated) if gas else kinds.Spring(start, end, *stated))
         except InputError as error:  # which knows of one spring alone
@@ -44,10 +44,13 @@ def _read_springs(value: object, read: Reader) -> "Springs":
 
 
 def _read_numbers(
-    read: Reader, key: str, given: Mapping[str, object], numbers: Mapping[str, tuple[str, str]]
+    read: Reader, key: str, given: Mapping[str, object], numbers: Mapping[str, tuple[str, str]], **defaults: float
 ) -> list[float]:
     """Read each of some numbers within its bound."""
-    return [read.quantity(f"{key}.{name}".rstrip("."), given.get(name), *of) for name, of in numbers.items()]
+    return [
+        read.quantity(f"{key}.{name}".rstrip("."), given.get(name), *of, defaults.get(name))
+        for name, of in numbers.items()
+    ]
 
 
 def read_ends(read: Reader, key: str, given: dict[str, Any]) -> "tuple[SpringEnd, SpringEnd]":
@@ -96,7 +99,7 @@ class EffectFormat(NamedTuple):
     """One line of a scene file."""
 
 
-def _describe_per_pin(key: str, kind: str, example: str, **left_out: str) -> EffectFormat:
+def _describe_per_pin(key: str, kind: str, example: str, **defaults: float) -> EffectFormat:
     """Describe an effect that holds rows (pin, number, ...); where a pin has one number, that stands without a list."""
     numbers = OF_EFFECT[key]
 
@@ -104,8 +107,8 @@ def _describe_per_pin(key: str, kind: str, example: str, **left_out: str) -> Eff
         rows = []
         for pin, entry in read.table(f"effects.{key}", value, PINS).items():
             own = f"effects.{key}.{pin}"
-            texts = {"": entry} if "" in numbers else {**left_out, **read.table(own, entry, numbers)}
-            rows.append((pin, *_read_numbers(read, own, texts, numbers)))
+            texts = {"": entry} if "" in numbers else read.table(own, entry, numbers)
+            rows.append((pin, *_read_numbers(read, own, texts, numbers, **defaults)))
         effect: Effect = getattr(kinds, kind)(tuple(rows))
         return effect
 
@@ -134,7 +137,7 @@ REGISTRY: dict[str, EffectFormat] = {
         "torsion",
         "Torsion",
         'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }',
-        preload="0 N m",
+        preload=0.0,
     ),
     "springs": EffectFormat(
         _read_springs,

@@ -17,6 +17,11 @@ LONGEST_SHOWN = 60
 class Reader:
     """Reads entries of one file; effects are read through it too."""
 
+    QUANTITY = 'with a unit, like "1 {}"'
+    """The form of a number of a unit, as errors say it; likewise of several, and of a polar pair."""
+    QUANTITIES = '["1 {0}", "2 {0}"]'
+    POLAR = '["1 {}", "0 deg"]'
+
     def __init__(self, file: str) -> None:
         self.file = file
 
@@ -62,37 +67,53 @@ class Reader:
             raise self.refuse(key, value, "must be a finite number without a unit, and without quotes")
         return float(value)
 
-    def quantity(self, key: str, value: object, unit: str, bound: str = ANY) -> float:
-        """Read a number with a unit, in `unit`; of unit "1" one without."""
+    def quantity(self, key: str, value: object, unit: str, bound: str = ANY, default: float | None = None) -> float:
+        """Read a number with a unit, in `unit`; of unit "1" one without. `default`: what a value of None stands for."""
+        if value is None and default is not None:
+            return default
         if unit == "1":
             return self.number(key, value)
-        wanted = f'must be {bound} with a unit, like "1 {unit}"'
-        if not isinstance(value, str):
-            raise self.refuse(key, value, wanted)
-        try:
-            number = to_si(value, unit)
-        except UnitError as error:
-            raise self.refuse(key, value, f"{error}; {wanted}") from None
+        wanted = f"must be {bound} {self.QUANTITY.format(unit)}"
+        number = self.in_si(key, value, unit, wanted)
         if not is_within(number, bound):
             raise self.refuse(key, value, wanted)
         return number
 
+    def in_si(self, key: str, value: object, unit: str, wanted: str) -> float:
+        """Convert a text with a unit to a number in `unit`."""
+        if not isinstance(value, str):
+            raise self.refuse(key, value, wanted)
+        try:
+            return to_si(value, unit)
+        except UnitError as error:
+            raise self.refuse(key, value, f"{error}; {wanted}") from None
+
     def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
         """Read a list of numbers with units, in `unit`."""
         if not isinstance(value, list):
-            raise self.refuse(key, value, f'must be a list like ["1 {unit}", "2 {unit}"]')
+            raise self.refuse(key, value, f"must be a list like {self.QUANTITIES.format(unit)}")
         return tuple(self.quantity(f"{key}[{index}]", entry, unit) for index, entry in enumerate(value))
 
     def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:
         """Read a pair [magnitude, angle], in `unit` and rad."""
         if not isinstance(value, list) or len(value) != 2:
-            raise self.refuse(key, value, f'must be a pair like ["1 {unit}", "0 deg"]')
+            raise self.refuse(key, value, f"must be a pair like {self.POLAR.format(unit)}")
         return (self.quantity(f"{key}[0]", value[0], unit), self.quantity(f"{key}[1]", value[1], "rad"))
 
 
+class Written(str):
+    """A number in SI with its unit, every digit kept."""
+
+    value: float
+
+
 def write_quantity(value: float, unit: str) -> Any:
-    """Write a number in SI with its unit, every digit kept."""
-    return value if unit == "1" else f"{float(value)!r} {unit}"
+    """Write a number in SI with its unit; of unit "1" it stays a number."""
+    if unit == "1":
+        return value
+    text = Written(f"{float(value)!r} {unit}")
+    text.value = float(value)
+    return text
 
 
 def write_polar(magnitude: float, angle: float, unit: str) -> list[str]:

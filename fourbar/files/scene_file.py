@@ -69,7 +69,7 @@ def loads(text: str, name: str = "scene") -> Scene:
     except ValueError as error:  # TOMLDecodeError, and numbers that Python refuses
         raise _explain_unreadable(text, str(error), shown) from None
     try:
-        return _read_scene(Reader(shown), document, str(Path(name).parent))
+        return read_scene(Reader(shown), document, str(Path(name).parent))
     except InputError as error:
         raise (error if error.file else error.in_file(shown)) from None
 
@@ -95,7 +95,8 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     return InputError(f"line {line}, column {column}", value, f"cannot be read as TOML: {why}", shown)
 
 
-def _read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
+def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
+    """Read the scene of a file's tables; `folder`: of its pictures."""
     top = read.table("", document, TABLES)
     drive = read.table("drive", top.get("drive", {}), ("bar", "from", "to"))
     line = None
@@ -148,13 +149,13 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     length = {name: read.quantity(f"lengths.{name}", lengths.get(name), "m", POSITIVE) for name in BAR_NAMES.values()}
     tables = read.table("bars", top.get("bars", {}), BARS)
     bars = {name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name]) for name in BARS}
-    angle = read.quantity("lengths.ground_angle", lengths.get("ground_angle", "0 rad"), "rad")
+    angle = read.quantity("lengths.ground_angle", lengths.get("ground_angle"), "rad", default=0.0)
     return FourBar(length["ground"], bars["input"], bars["coupler"], bars["output"], angle)
 
 
 def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
     entry = read.table(key, value, ("mass", "inertia", "centre", "picture"))
-    mass = read.quantity(f"{key}.mass", entry.get("mass", "0 kg"), "kg", AT_LEAST_ZERO)
+    mass = read.quantity(f"{key}.mass", entry.get("mass"), "kg", AT_LEAST_ZERO, 0.0)
     inertia = centre = None
     if "inertia" in entry:
         inertia = read.quantity(f"{key}.inertia", entry["inertia"], "kg m^2", AT_LEAST_ZERO)
@@ -189,8 +190,7 @@ def _read_motion(read: Reader, value: object) -> Motion:
         given[place] = _read_places(read, f"motion.{place}", entry.get(place), unit)
     if speed in entry:
         given[speed] = read.quantity(f"motion.{speed}", entry[speed], f"{unit}/s")
-    none = f"0 {unit}/s^2"
-    given[acceleration] = read.quantity(f"motion.{acceleration}", entry.get(acceleration, none), f"{unit}/s^2")
+    given[acceleration] = read.quantity(f"motion.{acceleration}", entry.get(acceleration), f"{unit}/s^2", default=0.0)
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
         duration = read.quantity("motion.free.duration", released.get("duration"), "s", POSITIVE)
@@ -225,7 +225,7 @@ def _read_places(read: Reader, key: str, value: object, unit: str) -> float | Ar
         raise read.refuse(key, value, f'must be like "{like}", a list of such, {{ from, to, steps }}{from_limit}')
     if from_limit and value.keys() & {"limit", "offset"}:
         near = read.table(key, value, ("limit", "offset"))
-        offset = read.quantity(f"{key}.offset", near.get("offset", "0 rad"), "rad")
+        offset = read.quantity(f"{key}.offset", near.get("offset"), "rad", default=0.0)
         # four bars have at most four limit positions of a bar; how many these have is not known here
         return FromLimit(read.whole(f"{key}.limit", near.get("limit"), 1, 4), offset)
     sweep = read.table(key, value, ("from", "to", "steps"))
@@ -251,7 +251,7 @@ def _load(read: Reader, key: str, value: object) -> Load:
         read.whole(f"{key}.bar", entry.get("bar"), 2, 4),
         read.polar(f"{key}.force", entry["force"], "N") if "force" in entry else None,
         read.polar(f"{key}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0),
-        read.quantity(f"{key}.moment", entry.get("moment", "0 N m"), "N m"),
+        read.quantity(f"{key}.moment", entry.get("moment"), "N m", default=0.0),
         read.choice(f"{key}.frame", entry.get("frame", "world"), ("world", "bar")),
         table,
     )

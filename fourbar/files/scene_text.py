@@ -40,41 +40,57 @@ def dump(scene: Scene) -> str:
     no valid text.
     """
     expect("scene", scene, Scene)
-    top = {"title": scene.title, "source": scene.source}
-    lengths = {
-        name: write_quantity(length, "m")
-        for name, length in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
-    }
-    angle = write_quantity(scene.linkage.ground_angle, "rad")
+    top = {key: value for key, value in {"title": scene.title, "source": scene.source}.items() if value}
+    described, motion = describe(scene), _write_motion(scene.motion)
     points = {point.name: {"bar": point.bar, "from_pin": write_polar(*point.from_pin, "m")} for point in scene.points}
-    effects = {effect.key: write_effect(effect) for effect in scene.effects}
-    if len(effects) != len(scene.effects):
-        raise InputError("effects", [effect.key for effect in scene.effects], "a file holds one of each kind")
+    bars = described["bars"]
+    for picture in scene.pictures:
+        bars.setdefault(BAR_NAMES[picture.bar], {})["picture"] = picture.name
     tables: list[tuple[str, dict[str, Any]]] = [
-        ("", {key: value for key, value in top.items() if value}),
-        ("lengths", {**lengths, "ground_angle": angle}),
-        *((f"bars.{name}", _write_bar(scene, number)) for name, number in BARS.items()),
-        ("motion", _write_motion(scene.motion)),
-        ("drive", {"bar": scene.drive_bar} if scene.drive is None else write_ends(scene.drive)),
+        ("", top),
+        ("lengths", described["lengths"]),
+        *((f"bars.{name}", bars[name]) for name in BARS if name in bars),
+        ("motion", motion),
+        ("drive", described["drive"]),
         ("points", points),
-        *(("[loads]", _load_entry(load)) for load in scene.loads),
-        ("effects", effects),
+        *(("[loads]", load) for load in described["loads"]),
+        ("effects", described["effects"]),
         ("tolerances", write_tolerances(scene)),
     ]
     return "\n".join(_write_table(name, entries) for name, entries in tables if entries)
 
 
-def _write_bar(scene: Scene, number: int) -> dict[str, Any]:
-    bar, entry = scene.linkage.bar(number), dict[str, Any]()
-    if bar != Bar(bar.length):
-        entry = {"mass": write_quantity(bar.mass, "kg")}
-        if bar.inertia is not None:
-            entry["inertia"] = write_quantity(bar.inertia, "kg m^2")
-        if bar.centre is not None:
-            entry["centre"] = write_polar(*bar.centre, "m")
-    for picture in scene.pictures:
-        if picture.bar == number:
-            entry["picture"] = picture.name
+def describe(scene: Scene) -> dict[str, Any]:
+    """Write lengths, bars, drive, loads and effects as a file's tables; a bar that states nothing is left out.
+
+    Raises InputError where a file cannot hold the effects.
+    """
+    lengths = {
+        name: write_quantity(length, "m")
+        for name, length in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
+    }
+    lengths["ground_angle"] = write_quantity(scene.linkage.ground_angle, "rad")
+    effects = {effect.key: write_effect(effect) for effect in scene.effects}
+    if len(effects) != len(scene.effects):
+        raise InputError("effects", [effect.key for effect in scene.effects], "a file holds one of each kind")
+    bars = {name: _write_bar(scene.linkage.bar(number)) for name, number in BARS.items()}
+    return {
+        "lengths": lengths,
+        "bars": {name: entry for name, entry in bars.items() if entry},
+        "drive": {"bar": scene.drive_bar} if scene.drive is None else write_ends(scene.drive),
+        "loads": [_load_entry(load) for load in scene.loads],
+        "effects": effects,
+    }
+
+
+def _write_bar(bar: Bar) -> dict[str, Any]:
+    if bar == Bar(bar.length):
+        return {}
+    entry: dict[str, Any] = {"mass": write_quantity(bar.mass, "kg")}
+    if bar.inertia is not None:
+        entry["inertia"] = write_quantity(bar.inertia, "kg m^2")
+    if bar.centre is not None:
+        entry["centre"] = write_polar(*bar.centre, "m")
     return entry
 
 

@@ -1,0 +1,390 @@
+"""Scenes, commands and answers as JSON: what a judge sends to an engine outside, and what comes back.
+
+SI units and radians. A scene travels as it is stated, a command holds what is commanded and nothing that the formulas
+computed; null stands where there is no value. docs/protocol.md is the contract.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from fourbar.errors import InputError
+from fourbar.files.fields import Reader, Written
+from fourbar.files.scene_file import read_scene
+from fourbar.files.scene_text import describe
+from fourbar.formulas.many_digits import DIGITS
+from fourbar.quantities import VECTORS
+from fourbar.scene import Command, Scene
+from fourbar.scene.motion import OF_STROKE, Free, Motion
+from fourbar.scene.motion_law import COMMANDS
+from fourbar_validation.compare.answer import Answer, Array, Released, WitnessError
+from fourbar_validation.compare.rows import write_one_line
+
+PROTOCOL = 1
+"""Number of the contract; a change that an engine must know of raises it."""
+FURTHEST = 0.1
+"""rad, and part of the greatest speed and acceleration: a motion that ends further from the command than this answers
+another question."""
+TABLES = ("lengths", "bars", "drive", "loads", "effects")
+KINDS_OF_COMMAND = (*COMMANDS.values(), OF_STROKE)
+OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
+
+
+class _Numbers(Reader):
+    """Reads numbers in SI and radians where a scene file has texts with units."""
+
+    QUANTITY = "in {}"
+    QUANTITIES = "[1.0, 2.0], in {}"
+    POLAR = "[1.0, 0.0], in {} and rad"
+
+    def in_si(self, key: str, value: object, unit: str, wanted: str) -> float:
+        if type(value) is int and value.bit_length() < 1024:
+            return float(value)
+        if type(value) is not float or not math.isfinite(value):
+            raise self.refuse(key, value, wanted)
+        return value
+
+
+def scene_to_json(scene: Scene) -> dict[str, Any]:
+    """Write lengths, bars, drive, loads and effects of a scene; InputError for an effect that no scene file holds."""
+    tables: dict[str, Any] = _take_numbers(describe(scene))
+    return {name: table for name, table in tables.items() if table}
+
+
+def _take_numbers(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _take_numbers(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_take_numbers(entry) for entry in value]
+    return value.value if isinstance(value, Written) else value
+
+
+def scene_from_json(data: Any) -> Scene:
+    """Read a scene, whose motion is stated elsewhere; InputError names what is wrong."""
+    read = _Numbers("scene")
+    try:
+        return read_scene(read, read.table("", data, TABLES), ".")
+    except InputError as error:
+        raise (error if error.file else error.in_file("scene")) from None
+
+
+def command_to_json(scene: Scene, at: Command) -> dict[str, Any]:
+    """Write what is commanded: an angle or a stroke, its speed and acceleration, the branch."""
+    if at.stroke is None:
+        (place, speed, acceleration), values = COMMANDS[at.bar], (at.angle, at.speed, at.acceleration)
+    else:
+        (place, speed, acceleration), values = OF_STROKE, (at.stroke, at.stroke_speed, scene.motion.acceleration)
+    data = {place: _write_numbers(values[0])}
+    if values[1] is not None:
+        data |= {speed: _write_numbers(values[1]), acceleration: _write_numbers(values[2])}
+    if at.stroke is not None:
+        data["side"] = scene.motion.side
+    same = bool((at.branch == at.branch[0]).all())
+    data["branch"] = int(at.branch[0]) if same else at.branch.tolist()
+    if at.time is not None:
+        data["time"] = at.time.tolist()
+    if at.remainder is not None:
+        data["remainder"] = [_write_digits(at.remainder)] * len(at.angle)
+    return data
+
+
+def _write_numbers(value: Any) -> Any:
+    return float(value) if np.ndim(value) == 0 else np.asarray(value, dtype=float).tolist()
+
+
+def _write_digits(value: Any) -> str:
+    """Write a number of many digits so that it reads back as it was."""
+    from mpmath import mp, mpf
+
+    with mp.workdps(DIGITS):
+        return str(mp.nstr(mpf(value), DIGITS + 5))
+
+
+def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
+    """Read a command; the scene gets the motion that it states. InputError names what is wrong."""
+    names = _find_names(data)
+    place, speed, acceleration = names
+    _refuse_unknown(data, (*names, "branch", "time", "remainder", *(("side",) if place == "stroke" else ())))
+    places = _read_list(place, data[place])
+    n = len(places)
+    rates = {name: _read_rate(name, data[name], n) for name in names[1:] if data.get(name) is not None}
+    branch = _read_branch(data.get("branch", 1), n)
+    stated: dict[str, Any] = {name: rate for name, rate in rates.items() if isinstance(rate, float)}
+    if place == "stroke":
+        stated["side"] = data.get("side")
+    stated |= {place: places, "branch": int(branch[0]), "through": "sign" if (branch == branch[0]).all() else "follow"}
+    scene = replace(scene, motion=Motion(**stated))
+    omega, alpha = rates.get(speed), rates.get(acceleration, 0.0)
+    time = _read_list("time", data["time"], n) if data.get("time") is not None else None
+    command = Command(places, branch, omega, alpha, _read_digits(data.get("remainder"), n), time, scene.motion.bar)
+    if place == "stroke":
+        unknown: Array = np.full(n, np.nan)  # of the bar nothing is commanded
+        command = command._replace(angle=unknown, speed=None if omega is None else unknown, acceleration=unknown)
+        command = command._replace(stroke=places, stroke_speed=omega)
+    return scene, command
+
+
+def _find_names(data: Any) -> tuple[str, str, str]:
+    """Return the names of what is commanded, of its speed and of its acceleration."""
+    if not isinstance(data, dict):
+        raise InputError("command", data, "must be an object")
+    stated = [names for names in KINDS_OF_COMMAND if names[0] in data]
+    if len(stated) != 1:
+        one = ", ".join(names[0] for names in KINDS_OF_COMMAND)
+        raise InputError("command", sorted(map(str, data)), f"must have one of {one}")
+    return stated[0]
+
+
+def _refuse_unknown(data: dict[str, Any], allowed: tuple[str, ...]) -> None:
+    for name, value in data.items():
+        if name not in allowed:
+            raise InputError(f"command.{write_one_line(name)}", value, f"unknown key; allowed: {', '.join(allowed)}")
+
+
+def _read_list(name: str, value: Any, n: int | None = None) -> Array:
+    wanted = "must be a list of one finite number or more" if n is None else f"must be a list of {n} finite numbers"
+    if not isinstance(value, list) or not value or len(value) not in (n or len(value),):
+        raise InputError(f"command.{name}", value, wanted)
+    array = _make_array(value)
+    if array is None or not np.isfinite(array).all():
+        raise InputError(f"command.{name}", value, wanted)
+    return array
+
+
+def _read_rate(name: str, value: Any, n: int) -> float | Array:
+    if isinstance(value, list):
+        return _read_list(name, value, n)
+    array = _make_array([value])
+    if array is None or not np.isfinite(array).all():
+        raise InputError(f"command.{name}", value, f"must be a finite number, or a list of {n}")
+    return float(array[0])
+
+
+def _read_branch(value: Any, n: int) -> Any:
+    branches = value if isinstance(value, list) else [value] * n
+    if len(branches) != n or any(type(branch) is not int or branch not in (1, -1) for branch in branches):
+        raise InputError("command.branch", value, f"must be 1 (open) or -1 (crossed), or a list of {n}")
+    return np.array(branches, dtype=np.int8)
+
+
+def _read_digits(value: Any, n: int) -> Any:
+    """Read what the angle as a double leaves out; one number, as `Command.remainder` is."""
+    if value is None:
+        return None
+    from mpmath import mp, mpf
+
+    wanted = f"must be a list of {n} equal decimal texts"
+    if not isinstance(value, list) or len(value) != n or not isinstance(value[0], str) or value != value[:1] * n:
+        raise InputError("command.remainder", value, wanted)
+    try:
+        with mp.workdps(DIGITS):
+            number = mpf(value[0])
+    except ValueError:
+        raise InputError("command.remainder", value[0], wanted) from None
+    if not mp.isfinite(number):
+        raise InputError("command.remainder", value[0], wanted)
+    return number
+
+
+def _make_array(values: Iterable[Any]) -> Array | None:
+    """Make an array of numbers and None, which becomes NaN; None where there is anything else."""
+    values = list(values)
+    if not set(map(type, values)) <= {int, float, type(None)}:
+        return None
+    try:
+        array = np.array(values, dtype=float)
+    except OverflowError:  # an integer beyond the doubles
+        return None
+    # a number beyond the doubles reads as infinity, and NaN is no JSON: no value is null
+    return array if np.isfinite(array).sum() == len(values) - values.count(None) else None
+
+
+def answer_to_json(scene: Scene, command: Command, answer: Answer) -> dict[str, Any]:
+    """Write an answer, without the engine's name, which its hello states."""
+    if answer.refusal is not None:
+        return {"refusal": answer.refusal, "setting": answer.setting}
+    data: dict[str, Any] = {"answers": {name: _write_array(array) for name, array in answer.quantities.items()}}
+    if answer.at is not None and answer.at is not command and command.stroke is None:
+        data["at"] = command_to_json(scene, answer.at)
+    if answer.assembled is not None:
+        data["assembled"] = np.asarray(answer.assembled, dtype=bool).tolist()
+    data["setting"] = answer.setting
+    data["predicted"] = {name: _write_array(array) for name, array in answer.predicted.items()}
+    data["evidence"] = {name: float(x) if math.isfinite(x) else None for name, x in answer.evidence.items()}
+    data |= {name: getattr(answer, name) for name in ("alarms", "shared", "own", "seconds")}
+    return {name: value for name, value in data.items() if value or name == "answers"}
+
+
+def _write_array(array: Array) -> list[Any]:
+    """Write numbers or pairs of them; null where there is no finite number."""
+    array = np.asarray(array, dtype=float)
+    finite = np.isfinite(array)
+    values: Any = array if finite.all() else np.where(finite, array, np.full(array.shape, None))
+    return values.tolist()  # type: ignore[no-any-return]
+
+
+def answer_from_json(engine: str, command: Command, data: Any) -> Answer:
+    """Read and check what an engine answered to a command.
+
+    Raises InputError for what is no answer, and WitnessError with the engine's words where it broke down.
+    """
+    data = _read_reply(data)
+    setting = _read_text("setting", data.get("setting", "exact"))
+    if "refusal" in data:
+        return Answer(engine, setting, refusal=_read_reason(data["refusal"]))
+    n = len(command.angle)
+    quantities = {name: _read_values("answers", name, values, n) for name, values in _read_object("answers", data)}
+    alarms = data.get("alarms") or []
+    if not isinstance(alarms, list):
+        raise InputError("alarms", alarms, "must be a list of texts")
+    predicted, evidence = (_read_object(name, data) for name in ("predicted", "evidence"))
+    return Answer(
+        engine,
+        setting,
+        _read_motion(data.get("at"), command),
+        _read_assembled(data.get("assembled"), quantities, n),
+        quantities,
+        predicted={name: _read_values("predicted", name, values, n, ()) for name, values in predicted},
+        alarms=[_read_text("alarms", alarm) for alarm in alarms],
+        evidence={name: float(_read_values("evidence", name, [value], 1, ())[0]) for name, value in evidence},
+        shared=_read_text("shared", data.get("shared", "")) or "not stated",
+        own=_read_text("own", data.get("own", "")) or "not stated",
+        seconds=_read_seconds("seconds", data.get("seconds", 0.0)),
+    )
+
+
+def _read_reply(data: Any) -> dict[str, Any]:
+    """Return the object that an engine replied with; WitnessError with its own words where it broke down."""
+    if not isinstance(data, dict):
+        raise InputError("answer", data, "must be an object")
+    if "error" in data:
+        raise WitnessError(_read_text("error", data["error"]) or "it broke down without a word")
+    return data
+
+
+def _read_reason(value: Any) -> str:
+    if not (reason := _read_text("refusal", value)):
+        raise InputError("refusal", value, "must say why")
+    return reason
+
+
+def _read_text(name: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise InputError(name, value, "must be a text")
+    return write_one_line(value)
+
+
+def _read_seconds(name: str, value: Any) -> float:
+    seconds = _make_array([value])
+    if seconds is None or not seconds[0] >= 0.0:
+        raise InputError(name, value, "must be a number of 0 or more")
+    return float(seconds[0])
+
+
+def _read_object(name: str, data: dict[str, Any]) -> list[tuple[str, Any]]:
+    value = data.get(name)
+    if value is None and name != "answers":
+        return []
+    if not isinstance(value, dict):
+        raise InputError(name, value, "must be an object")
+    return [(write_one_line(key), entry) for key, entry in value.items()]
+
+
+def _read_values(table: str, name: str, value: Any, n: int, vectors: Iterable[str] = VECTORS) -> Array:
+    """Read n numbers, or n pairs of them; null becomes NaN."""
+    pairs = name in vectors
+    wanted = f"must be a list of {n} {'pairs [x, y]' if pairs else 'numbers'}, null where there is no value"
+    if not isinstance(value, list) or len(value) != n:
+        raise InputError(f"{table}.{name}", value, wanted)
+    if pairs:
+        value = [(None, None) if pair is None else pair for pair in value]
+        if any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in value):
+            raise InputError(f"{table}.{name}", value, wanted)
+    array = _make_array(chain.from_iterable(value) if pairs else value)
+    if array is None:
+        raise InputError(f"{table}.{name}", value, f"{wanted}; numbers are finite")
+    return array.reshape(n, 2) if pairs else array
+
+
+def _read_assembled(value: Any, quantities: dict[str, Array], n: int) -> Any:
+    """Read where the loop closes; left out: wherever there is a value."""
+    if value is None:
+        valued = [np.isfinite(array).reshape(n, -1).any(axis=1) for array in quantities.values()]
+        return np.any(valued, axis=0) if valued else np.zeros(n, dtype=bool)
+    if not isinstance(value, list) or len(value) != n or any(type(entry) is not bool for entry in value):
+        raise InputError("assembled", value, f"must be a list of {n} true or false")
+    return np.array(value, dtype=bool)
+
+
+def _read_motion(data: Any, command: Command) -> Command:
+    """Read the motion that an engine made, which must be near the one that was commanded; left out: the same."""
+    if data is None or command.stroke is not None:  # of a stroke nothing of the bar is commanded
+        return command
+    names = COMMANDS[command.bar]
+    if _find_names(data) != names:
+        raise InputError("at", sorted(data), f"must have {names[0]}, as the command has")
+    if ("branch" in data and not np.array_equal(_read_branch(data["branch"], len(command.angle)), command.branch)) or (
+        (data.get(names[1]) is None) != (command.speed is None)
+    ):
+        raise InputError("at", sorted(data), "must have the branch of the command, and speeds where that has")
+    n, made = len(command.angle), dict[str, Any]()
+    speed, acceleration = (0.0 if x is None else float(np.abs(x).max()) for x in (command.speed, command.acceleration))
+    for name, key, size in zip(
+        ("angle", "speed", "acceleration"), names, (1.0, speed, speed**2 + acceleration), strict=True
+    ):
+        commanded = getattr(command, name)
+        if commanded is None or data.get(key) is None:
+            continue
+        made[name] = _read_list(key, data[key], n) if name == "angle" else _read_rate(key, data[key], n)
+        if not np.abs(made[name] - commanded).max() <= FURTHEST * size:
+            allowed = f"is too far from the command: it must be within {FURTHEST * size:g} of it"
+            raise InputError(f"at.{key}", None, allowed)
+    same = all(np.array_equal(value, getattr(command, name)) for name, value in made.items())
+    return command if same else command._replace(**made, remainder=None)
+
+
+def release_to_json(scene: Scene) -> dict[str, Any]:
+    """Write the start and the times of a released motion."""
+    motion, free = scene.motion, scene.motion.free
+    assert free is not None
+    start = {"theta_2": float(motion.theta_2), "omega_2": motion.omega_2 or 0.0}  # type: ignore[arg-type]
+    command = {**start, "branch": motion.branch, "through": motion.through}
+    return {"command": command, "times": np.linspace(0.0, free.duration, free.steps + 1).tolist()}
+
+
+def release_from_json(scene: Scene, command: Any, times: Any) -> Scene:
+    """Read the start of a released motion into a scene; InputError names what is wrong."""
+    if not isinstance(command, dict) or "theta_2" not in command:
+        raise InputError("command", command, "must be an object with theta_2, omega_2, branch and through")
+    _refuse_unknown(command, ("theta_2", "omega_2", "branch", "through"))
+    at = _read_list("times", times)
+    theta, omega = (float(_read_list(name, [command.get(name, 0.0)])[0]) for name in ("theta_2", "omega_2"))
+    branch = int(_read_branch(command.get("branch", 1), 1)[0])
+    free = Free(float(at[-1]), len(at) - 1)
+    return replace(scene, motion=Motion(theta, omega, 0.0, branch, command.get("through", "sign"), free))
+
+
+def released_to_json(released: Released) -> dict[str, Any]:
+    """Write a released motion as an engine integrated it."""
+    if released.refusal is not None:
+        return {"refusal": released.refusal, "setting": released.setting}
+    answers = {name: _write_array(getattr(released, name)) for name in OF_RELEASED}
+    return {"answers": answers, "setting": released.setting, "stopped_at": released.stopped_at}
+
+
+def released_from_json(engine: str, n: int, data: Any) -> Released:
+    """Read and check a released motion at n times, as `answer_from_json` does."""
+    data = _read_reply(data)
+    setting = _read_text("setting", data.get("setting", "exact"))
+    if "refusal" in data:
+        return Released.refused(engine, setting, _read_reason(data["refusal"]))
+    answers = dict(_read_object("answers", data))
+    theta, omega, energy, terms = (_read_values("answers", name, answers.get(name), n) for name in OF_RELEASED)
+    stopped_at = data.get("stopped_at")
+    if stopped_at is not None:
+        stopped_at = _read_seconds("stopped_at", stopped_at)
+    return Released(engine, setting, theta, omega, energy, terms, stopped_at)
