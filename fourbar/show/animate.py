@@ -1,7 +1,7 @@
 """A scene that moves: one self-contained web page, or a film (GIF, MP4).
 
-The page needs nothing but a browser: no network, no library. Its numbers are those of `collect_page_data`; the position
-formula runs in the page as well, so that the picture follows when a length is changed.
+The page needs nothing but a browser: no network, no library. It replays the numbers of
+`collect_page_data` and computes none of its own; to change a length there is `fourbar edit`.
 """
 
 import base64
@@ -22,7 +22,7 @@ from fourbar.solution import SI, Conversion
 from fourbar.writing import write_text
 
 FORMATS = ("html", "gif", "mp4")
-SCRIPTS = ("linkage.js", "numbers.js", "picture.js", "acting.js", "chart.js", "tolerances.js", "page.js")
+SCRIPTS = ("numbers.js", "picture.js", "acting.js", "chart.js", "tolerances.js", "page.js")
 LIVE_SCRIPTS = ("fields.js", "drag.js", "edit.js")
 """Of the workbench besides."""
 

@@ -1,5 +1,6 @@
 """How a scene and a solution show themselves in a notebook, and a solution as a table of pandas."""
 
+from base64 import b64encode
 from html import escape
 
 from fourbar.errors import FourBarError, expect
@@ -14,12 +15,12 @@ SHOWN = 5
 
 
 def show_scene(scene: Scene, units: Conversion = SI) -> str:
-    """Draw the linkage, next to what the scene states."""
-    from fourbar.show.drawing import draw_scene
-    from fourbar.solve import solve
+    """Draw the linkage as `scene.plot("linkage")` does, next to what the scene states."""
+    from fourbar.show.plot import draw_figure
 
     try:
-        picture = draw_scene(scene, solve(scene, "position"))
+        drawn = b64encode(draw_figure(scene, "linkage", units=units)._repr_svg_().encode()).decode()
+        picture = f'<img alt="The linkage" style="width:100%" src="data:image/svg+xml;base64,{drawn}">'
     except FourBarError as error:  # a notebook shows the reason, not a traceback
         picture = f"<p>{escape(str(error))}</p>"
     rows = "".join(
@@ -29,7 +30,7 @@ def show_scene(scene: Scene, units: Conversion = SI) -> str:
     return (
         f"<div><b>{escape(scene.title or 'Four-bar linkage')}</b>"
         '<div style="display:flex;flex-wrap:wrap;align-items:center;gap:1em">'
-        f'<div style="width:18em">{picture}</div><table>{rows}</table></div></div>'
+        f'<div style="width:24em">{picture}</div><table>{rows}</table></div></div>'
     )
 
 

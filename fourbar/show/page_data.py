@@ -11,6 +11,7 @@ from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import dump
 from fourbar.files.pictures import encode_picture
 from fourbar.files.scene_text import BARS
+from fourbar.formulas.linkage_type import classify
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command, command_at
@@ -70,6 +71,7 @@ def collect_live_data(
     shown["start"] = int(closes.argmax()) if shown["start"] is None else shown["start"]
     factor, unit = choose_unit(max(linkage.lengths), "m", units)
     return {
+        "type": classify(linkage).name,
         "lengths": list(linkage.lengths),
         "theta_1": linkage.ground_angle,
         "unit": {"factor": factor, "name": unit},
@@ -125,8 +127,6 @@ def _collect_sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> d
     if name != "theta_2":
         branches[str(motion.branch)]["theta_2"] = theta_2
     return {
-        "omega_2": motion.omega_2,
-        "alpha_2": motion.alpha_2,
         "theta_2": null_nan(theta_2),
         "time": None,
         "over": _over(name, name, where.places, motion.speed),
@@ -160,8 +160,6 @@ def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
     duration = float(where.time[-1] - where.time[0])
     rate = _choose_rate(duration)
     return {
-        "omega_2": None,
-        "alpha_2": 0.0,
         "theta_2": null_nan(solution.theta_2),
         "time": where.time.tolist(),
         "over": _over("time", whole.commanded, where.time),

@@ -40,7 +40,7 @@ JUDGED_BY = {
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: defaults document effects model settings",
     "fourbar/mjcf/test_simulators.py": "fourbar/mjcf: assembly sdf usd",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
-    "fourbar/show/test_notebook.py": "fourbar/files: new; fourbar/show: drawing",
+    "fourbar/show/test_notebook.py": "fourbar/files: new",
     "fourbar/show/test_page.py": "fourbar/show: page_data tolerances",
     "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody hodograph labels linkage mechanism "
     "studies style symbols transmission view",

@@ -65,7 +65,7 @@ function drawActing(p, i) {
   if (!byId("show-acting").checked) return;
   const torque = valuesAt(i).torque;
   for (const one of data.acting) {
-    const factor = one.factor === null ? 1 : edited ? 0 : one.factor[i];
+    const factor = one.factor === null ? 1 : one.factor[i];
     if (factor === 0) continue;
     const S = one.pin ? smallAt(p, one.pin) : one.kind === "moment" ? smallAt(p, FIRST_PIN[one.bar]) : sizeOf();
     if (["force", "moment", "spring"].includes(one.kind)) drawPlate(p, one.bar, forceFoot(p, one));

@@ -21,7 +21,7 @@ function column(name) {
   const point = /^[va]_/.test(name) && POINTS.find(p => p[0] === name.slice(2));
   const values = grid.map((_, i) => {
     if (point) return Math.hypot(...pointMotion(i, point)[name[0] === "v" ? 0 : 1]) * factor;
-    const v = edited ? valuesAt(i)[name] : table()[name][i];
+    const v = table()[name][i];
     if (v === null || v === undefined) return NaN;
     return Array.isArray(v) ? (v[0] === null ? NaN : Math.hypot(v[0], v[1]) * factor) : v * factor;
   });
@@ -67,8 +67,7 @@ function comparison(name, values) {
 }
 
 function drawChart() {
-  const moves = edited ? data.omega_2 !== null : "omega_3" in table();
-  const available = QUANTITIES.filter(([name]) => /^[va]_/.test(name) ? moves : edited ? /^(theta|omega|alpha)_[34]$/.test(name) && (moves || name.startsWith("theta")) : name in table());
+  const available = QUANTITIES.filter(([name]) => (/^[va]_/.test(name) ? "omega_3" : name) in table());
   const select = byId("quantity"), wanted = available.some(q => q[0] === select.value) ? select.value : (available.find(q => ["torque", "drive_force"].includes(q[0])) ?? available[0])[0];
   select.replaceChildren(...available.map(([name, label]) => new Option(label, name, false, name === wanted)));
   const values = column(wanted);

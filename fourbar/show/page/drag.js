@@ -71,7 +71,7 @@ function handleOf() {
 }
 
 function dragged(place) {
-  const to = toPlane(place), asked = { do: "drag", what: holding.what, to, grain: 1 / view.k, theta_2: holding.theta ??= grid[row], branch: signAt(row), gesture: holding.gesture };
+  const to = toPlane(place), asked = { do: "drag", what: holding.what, to, grain: 1 / view.k, theta_2: holding.theta ??= grid[row], branch: table().sign[row], gesture: holding.gesture };
   if (holding.foot) asked.stretch = Math.max(0.02, Math.hypot(place[0] - holding.foot[0], place[1] - holding.foot[1]) / arrowLength());
   ask(asked, null, holding.what === "A" ? Math.atan2(to[1], to[0]) : null);
 }

@@ -1,3 +1,4 @@
+"use strict";
 let data = JSON.parse(document.getElementById("data").textContent);
 const lineAddress = data.live;   // of the workbench; a saved page has none
 const byId = id => document.getElementById(id);
@@ -12,25 +13,31 @@ const REASONS = {   // why a position has no forces, or more than one set of the
   overflow: "Numbers here are beyond the range of doubles: they have no value.",
 };
 const FORCE_PIN = { F12: "O2", F32: "A", F43: "B", F14: "O4" };
-const SWEEP_SECONDS = 6, ROWS = 360;   // one sweep at speed 1; positions of a sweep whose lengths were edited
+const SWEEP_SECONDS = 6;   // one sweep at speed 1
 const ORDINARY = 0.95, OUTLIER = 3, CLIPPED = 1.6;   // a scale ends at CLIPPED times the 95th percentile where values diverge
 const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-let unit, lengths, edited, branch, grid, throughTime, direction, POINTS, clock;   // of the data shown
+let unit, lengths, branch, grid, direction, POINTS, clock;   // of the data shown
 let row = data.start, phase = row, playing = false, lastTime = null, lastDraw = 0;
 let view = { width: 0, height: 0, k: 1, x: 0, y: 0 }, forceScale = { top: 0, cut: false };
 
-const timed = () => throughTime && !edited;   // edited lengths are swept over the angle
+const timed = () => data.time !== null;
 const single = () => data.over.name !== "theta_2";   // one motion, over time or what is commanded, of one branch
 const table = () => data.branches[single() ? data.branch : branch];
 const AXES = { theta_2: ["Input angle", "\u03b8\u2082"], theta_3: ["Coupler angle", "\u03b8\u2083"], theta_4: ["Output angle", "\u03b8\u2084"], stroke: ["Cylinder", "stroke"], time: ["Time", "t"] };
 const axis = () => {   // what curves and slider run over
-  const name = edited ? "theta_2" : data.over.name, [factor, sign] = { time: [1, " s"], stroke: [unit.factor, ` ${unit.name}`] }[name] ?? [DEG, "\u00b0"];
-  return { name, factor, sign, values: edited ? grid : data.over.values ?? grid };
+  const name = data.over.name, [factor, sign] = { time: [1, " s"], stroke: [unit.factor, ` ${unit.name}`] }[name] ?? [DEG, "\u00b0"];
+  return { name, factor, sign, values: data.over.values ?? grid };
 };
-const signAt = i => edited ? branch : table().sign[Math.min(i, grid.length - 1)];
-const at = i => grid[i] === null ? null : closeLoop(lengths, data.theta_1, grid[i], signAt(i));
-const shows = name => !edited && name in table(), dynamic = () => shows("F12");
+const shows = name => name in table(), dynamic = () => shows("F12");
+
+// The linkage at a position of the table, drawn by its angles: null where it does not assemble.
+const at = i => table().theta_3[i] === null ? null : posed(grid[i], table().theta_3[i], table().theta_4[i]);
+const tip = (from, length, angle) => [from[0] + length * Math.cos(angle), from[1] + length * Math.sin(angle)];
+function posed(theta2, theta3, theta4) {
+  const O2 = [0, 0], O4 = tip(O2, lengths[0], data.theta_1);
+  return { theta2, theta3, theta4, O2, A: tip(O2, lengths[1], theta2), B: tip(O4, lengths[3], theta4), O4 };
+}
 
 // ---- numbers -------------------------------------------------------------------------------
 function text(value, digits = 5) {
@@ -48,22 +55,7 @@ const inUnit = (si, value) => value === null || value === undefined ? value : va
 const typeset = name => /^(\|F\d\d\||F\d\d|G\d|theta_\d)$/.test(name) ? name.replace("theta_", "\u03b8").replace(/\d/g, d => "\u2080\u2081\u2082\u2083\u2084"[d]) : name;
 const nameOf = si => (data.units[si]?.[0] ?? si).replace("^2", "\u00b2");
 
-function valuesAt(i) {
-  const t = table(), out = {};
-  if (!edited) {
-    for (const [name, column] of Object.entries(t)) out[name] = column[i];
-    out.theta_2 = grid[i];
-    return out;
-  }
-  out.theta_2 = grid[i];
-  const p = at(i);
-  if (p) Object.assign(out, { theta_3: p.theta3, theta_4: p.theta4, condition: Math.abs(p.sinMu) });
-  if (p && data.omega_2 !== null) {
-    const r = rates(lengths, p, data.omega_2, data.alpha_2);
-    Object.assign(out, { omega_2: data.omega_2, omega_3: r.omega3, omega_4: r.omega4, alpha_2: data.alpha_2, alpha_3: r.alpha3, alpha_4: r.alpha4 });
-  }
-  return out;
-}
+const valuesAt = i => ({ ...Object.fromEntries(Object.entries(table()).map(([name, column]) => [name, column[i]])), theta_2: grid[i] });
 
 // Velocity and acceleration of a point: [name, its bar, from the bar's first pin in the bar's frame].
 const pointsOf = () => [["A", 2, () => [lengths[1], 0]], ["B", 4, () => [lengths[3], 0]],
@@ -82,9 +74,9 @@ function pointMotion(i, [, bar, from]) {
 
 // Show other data from now on.
 function adopt(next) {
-  data = next; unit = data.unit; lengths = data.lengths.slice(); edited = false; branch = data.branch; grid = data.theta_2;
-  throughTime = data.time !== null; direction = data.over.speed < 0 ? -1 : 1; POINTS = pointsOf();
-  clock = throughTime ? Math.max(2, 3 - Math.floor(Math.log10(data.time[data.time.length - 1] || 1))) : 0;   // decimals of a second
+  data = next; unit = data.unit; lengths = data.lengths; branch = data.branch; grid = data.theta_2;
+  direction = data.over.speed < 0 ? -1 : 1; POINTS = pointsOf();
+  clock = timed() ? Math.max(2, 3 - Math.floor(Math.log10(data.time[data.time.length - 1] || 1))) : 0;   // decimals of a second
 }
 adopt(data);
 
@@ -112,7 +104,7 @@ function showNumbers(i) {
       byId(`${name}_angle`).textContent = known ? (Math.atan2(f[1], f[0]) * DEG).toFixed(2).replace("-", "\u2212") : "\u2013";
     }
   }
-  const assembled = at(i) !== null, singular = assembled && (single() && !edited ? v.status === "singular" : Math.abs(at(i).sinMu) < 8 * Number.EPSILON);
+  const assembled = at(i) !== null, singular = v.status === "singular";
   const status = byId("status");
   status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? single() && !timed() ? "What is commanded decides no velocities here: they have no value." : "Coupler and output are in line: velocities have no value here." : REASONS[v.status] || "";
   status.hidden = status.textContent === "";

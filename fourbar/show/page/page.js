@@ -3,7 +3,8 @@ let draw = (position = row) => {
   const i = Math.round(position), low = Math.floor(position), share = position - low;
   let p = at(i);
   if (share > 0 && p && at(low) && at(low + 1)) {   // between two positions while it plays: the picture moves on, the numbers stay those of the nearest
-    p = closeLoop(lengths, data.theta_1, grid[low] + share * (grid[low + 1] - grid[low]), signAt(i)) ?? p;
+    const [one, next] = [at(low), at(low + 1)];
+    p = posed(...["theta2", "theta3", "theta4"].map(name => one[name] + share * (next[name] - one[name])));
   }
   drawLinkage(p, i);
   showNumbers(i);
@@ -74,17 +75,7 @@ function step(by) {
   go(next);
 }
 
-// ---- lengths, branch, reset ------------------------------------------------------------------
-function gridFor(theta) {   // the sweep of edited lengths: a full turn, or the interval that is at or next after theta
-  const intervals = closingIntervals(lengths);
-  if (!intervals.length) return null;
-  if (intervals[0][1] - intervals[0][0] >= TURN) return Array.from({ length: ROWS + 1 }, (_, i) => i * TURN / ROWS);
-  const offset = ([low]) => (((theta - data.theta_1 - low) % TURN) + TURN) % TURN;
-  const [low, high] = intervals.find(one => offset(one) <= one[1] - one[0]) ?? intervals[0];
-  const inset = Math.min(1 / DEG, 0.01 * (high - low));   // as fourbar does: 1 deg short of the limit positions
-  return Array.from({ length: ROWS + 1 }, (_, i) => data.theta_1 + low + inset + i * (high - low - 2 * inset) / ROWS);
-}
-
+// ---- branch, reset ---------------------------------------------------------------------------
 function nearest(theta) {
   let best = 0, distance = Infinity;
   grid.forEach((t, i) => {
@@ -101,41 +92,29 @@ function pace() {
   const { name, values } = axis(), turned = Math.abs(values[values.length - 1] - values[0]), words = [`At speed 1\u00d7 one sweep takes ${SWEEP_SECONDS} s`];
   const speed = name === data.over.name ? data.over.speed : 0, [symbol, si] = name === "stroke" ? ["stroke speed", "m/s"] : [AXES[name][1].replace("\u03b8", "\u03c9"), "rad/s"];
   if (speed) words[0] += `; at ${symbol} = ${rounded(inUnit(si, speed), 4)} ${nameOf(si)} the mechanism takes ${rounded(turned / Math.abs(speed), 3)} s`;
-  if (!edited && data.positions > grid.length) words.push(`Shown are ${grid.length} of the ${data.positions} positions`);
+  if (data.positions > grid.length) words.push(`Shown are ${grid.length} of the ${data.positions} positions`);
   return words.join(". ") + ".";
 }
 
-// The scene file of what is shown: other lengths, with the range swept here, and the branch.
-function sceneFile() {
-  if (!edited && branch === data.branch) return data.toml;
-  let file = data.toml;
-  Object.values(BAR_NAMES).forEach((name, k) => { file = file.replace(new RegExp(`^${name} = .*$`, "m"), () => `${name} = "${lengths[k]} m"`); });
-  if (edited && !single()) {
-    const range = `theta_2 = { from = "${grid[0]} rad", to = "${grid[grid.length - 1]} rad", steps = ${grid.length - 1} }`;
-    file = file.replace(/^theta_2 = (\[[^\]]*\]|.*)\n/m, "").replace(/^\[motion\]\n/m, () => `[motion]\n${range}\n`);
-  }
-  return file.replace(/^branch = .*$/m, `branch = "${branch === 1 ? "open" : "crossed"}"`);
-}
+// The scene file of what is shown: on another branch where one was chosen.
+const sceneFile = () => branch === data.branch ? data.toml : data.toml.replace(/^branch = .*$/m, `branch = "${branch === 1 ? "open" : "crossed"}"`);
 
 const SINES = { theta_2: "|sin(\u03b8\u2084 \u2212 \u03b8\u2083)|", theta_3: "|sin(\u03b8\u2084 \u2212 \u03b8\u2082)|", theta_4: "|sin(\u03b8\u2083 \u2212 \u03b8\u2082)|", stroke: "sine of its bar times lever" };
 function refresh() {
   showDimensions();
-  const type = typeName(lengths), was = typeName(data.lengths);
-  byId("type").textContent = type === was ? type : `${type}; with the original lengths ${was}`;
+  byId("type").textContent = data.type;
   byId("pace").textContent = pace();
   byId("theta").max = grid.length - 1;
   byId("theta").disabled = grid.length < 2;
-  byId("edited").hidden = !edited || !("F12" in table());
-  byId("branch").parentElement.hidden = single() && !edited || lineAddress !== "";
+  byId("branch").parentElement.hidden = single() || lineAddress !== "";
   const [what, symbol] = AXES[axis().name];
   byId("axis").textContent = `${what} ${symbol}`;
   byId("over").textContent = timed() ? "Over time" : `Over ${symbol}`;
-  byId("sine").textContent = edited ? SINES.theta_2 : SINES[data.over.commanded];
+  byId("sine").textContent = SINES[data.over.commanded];
   for (const element of document.querySelectorAll(".driven")) element.hidden = !shows("torque");
   for (const element of document.querySelectorAll(".pushed")) element.hidden = !shows("drive_force");
   for (const element of document.querySelectorAll(".erring")) element.hidden = !shows("torque_error");
   for (const element of document.querySelectorAll(".energy")) element.hidden = !shows("energy");
-  byId("original").disabled = !edited;
   for (const element of document.querySelectorAll(".dynamic")) element.hidden = !dynamic();
   byId("show-forces").disabled = byId("arrow-scale").disabled = !dynamic();
   fit();
@@ -144,43 +123,14 @@ function refresh() {
   draw();
 }
 
-function readLengths() {
-  const theta = grid[row], inputs = [1, 2, 3, 4].map(k => byId(`length-${k}`)), error = byId("length-error");
-  const values = inputs.map((input, k) => input.value === String(shown(data.lengths[k])) ? data.lengths[k] : Number(input.value) / unit.factor);
-  let message = "";
-  inputs.forEach((input, k) => {
-    const good = input.value.trim() !== "" && Number.isFinite(values[k]) && values[k] > 0;
-    input.setAttribute("aria-invalid", String(!good));
-    if (!good) message = "Every length must be a number greater than 0.";
-  });
-  const longest = Math.max(...values), total = values.reduce((x, y) => x + y, 0);
-  if (!message && 2 * longest > total) message = "These bars can never close: the longest exceeds the sum of the other three.";
-  error.hidden = !message;
-  error.textContent = message;
-  if (message) return;
-  if (playing) play(false);
-  lengths = values;
-  const wasSingle = single() && !edited;
-  edited = values.some((value, k) => value !== data.lengths[k]);
-  const before = row;
-  grid = edited ? gridFor(theta) ?? grid : data.theta_2;
-  row = phase = single() && !edited && wasSingle ? before : nearest(theta);
-  refresh();
-}
 const shown = value => Number((value * unit.factor).toPrecision(12));
-
-function original() {
-  data.lengths.forEach((value, k) => { byId(`length-${k + 1}`).value = shown(value); });
-  readLengths();
-}
 function reset() {
   if (playing) play(false);
   branch = data.branch;
   byId("branch").value = branch;
   direction = data.over.speed < 0 ? -1 : 1;
-  original();
   row = phase = data.start;
-  draw();
+  refresh();
 }
 function toggle(id) {
   const box = byId(id);
@@ -200,11 +150,9 @@ byId("play").addEventListener("click", () => play(!playing));
 byId("back").addEventListener("click", () => step(-1));
 byId("forward").addEventListener("click", () => step(1));
 byId("reset").addEventListener("click", reset);
-byId("original").addEventListener("click", original);
 byId("theta").addEventListener("input", event => go(Number(event.target.value)));
 byId("branch").addEventListener("change", event => chooseBranch(Number(event.target.value)));
 byId("quantity").addEventListener("change", () => { drawChart(); moveCursor(row); });
-for (const k of [1, 2, 3, 4]) byId(`length-${k}`).addEventListener("input", readLengths);
 byId("arrow-scale").addEventListener("change", () => { scaleForces(); draw(playing ? phase : row); });
 for (const name of ["labels", "acting", "v", "a", "dimensions", "centres", "curve", "forces", "pictures"]) byId(`show-${name}`).addEventListener("change", () => { showDimensions(); scaleForces(); draw(playing ? phase : row); });
 document.addEventListener("keydown", event => {
@@ -246,7 +194,6 @@ function furnish() {
     parts.image[k].setAttribute("href", source);
     probe.src = source;
   }
-  data.lengths.forEach((value, k) => { byId(`length-${k + 1}`).value = shown(value); });
 }
 for (const letter of "va") byId(`show-${letter}`).checked = data.vectors;
 if (dynamic()) {   // one scale for all positions, unless most arrows would then be too short to see

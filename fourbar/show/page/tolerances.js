@@ -1,11 +1,11 @@
 // ---- tolerances ------------------------------------------------------------------------------
-// Of the original lengths on the scene's branch: spreads at this position, their shares, and bands over the motion.
+// On the scene's branch: spreads at this position, their shares, and bands over the motion.
 let loose = data.tolerances;
 const bands = byId("bands");
 let banded = null;
 const factorOf = spread => ({ rad: DEG, m: unit.factor }[spread.unit] ?? inUnit(spread.unit, 1));   // lengths as everywhere on the page
 const spreadUnit = spread => ({ rad: "deg", m: unit.name }[spread.unit] ?? nameOf(spread.unit));
-const spreadsShown = () => loose !== null && !edited && branch === data.branch && Object.keys(loose.parts).length > 0;
+const spreadsShown = () => loose !== null && branch === data.branch && Object.keys(loose.parts).length > 0;
 
 function cells(row, texts) {
   const line = row.insertRow(), head = document.createElement("th");
@@ -39,7 +39,7 @@ function showSpreads(i) {
 function drawBands() {
   byId("tolerances").hidden = loose === null;
   if (loose === null) return;
-  byId("tolerance-note").textContent = [...loose.lines, ...spreadsShown() || !Object.keys(loose.parts).length ? [] : ["They belong to the original lengths and branch and are hidden."]].join(". ");
+  byId("tolerance-note").textContent = [...loose.lines, ...spreadsShown() || !Object.keys(loose.parts).length ? [] : ["They belong to the branch of the scene and are hidden."]].join(". ");
   for (const element of document.querySelectorAll(".spread")) element.hidden = !spreadsShown();
   if (!spreadsShown()) return;
   const s = loose.parts[byId("tolerance-quantity").value], f = factorOf(s), scaled = name => s[name].map(v => v === null ? NaN : v * f);
