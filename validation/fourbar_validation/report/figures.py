@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.quantities import ANGLES, COUPLE, FORCES, LINE, OK
-from fourbar.scene import Command
-from fourbar.show.drawing import draw_scene
+from fourbar.scene import Command, Scene
+from fourbar.show.plot.labels import Labels
+from fourbar.show.plot.linkage import draw_linkage
+from fourbar.show.plot.style import apply_style
+from fourbar.show.plot.view import View
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.reversals import Reversal, break_curve
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, find_condition, find_error, magnitude
-from fourbar_validation.report.colours import ALLOWED, BAND, INK, PAPER, choose_style, replace_colours
+from fourbar_validation.report.colours import ALLOWED, BAND, INK, PAPER, choose_style
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.svg import FLOOR, set_frame, write_svg
 
@@ -25,6 +28,11 @@ MARKS = 10
 """Marks of one engine on a curve. Every engine has its own positions, so no mark hides another."""
 STRETCHES = 24
 """Stretches of a sweep; the error shown in each is its largest."""
+PLOT_COLOURS = {
+    **{"#1a1a1a": "--ink", "#6b6b6b": "--soft", "#d9d9d9": "--grid", "#e4e4e4": "--grid", "#ffffff": "--paper"},
+    **{"#007a5a": "--e2", "#d55e00": "--e3", "#8a3b78": "--e4"},
+}
+"""Colours of `fourbar plot`, and the page's own that take their place."""
 MOTION_AND_FORCE = ("theta_4", "F32")
 """Of a released linkage: its torque is rounding."""
 SUBSCRIPT = str.maketrans("234", "₂₃₄")
@@ -35,10 +43,26 @@ def draw_scene_figure(record: Record) -> str | None:
     solution = record.solution
     if record.scene is None or solution is None or not np.any(solution.status_code == OK):
         return None
-    linkage = replace_colours(draw_scene(record.scene, solution))
+    linkage = _draw_linkage(record.name, record.scene, solution)
     if np.count_nonzero(solution.status_code == OK) < 2:
         return linkage
     return linkage + _draw_answers(record, solution)
+
+
+def _draw_linkage(name: str, scene: Scene, solution: Solution) -> str:
+    """Draw the linkage as `fourbar plot` does, at its best conditioned position."""
+    from matplotlib.figure import Figure
+
+    best = int(np.argmax(np.where(solution.status_code == OK, solution.condition, -1.0)))
+    with apply_style():
+        figure, labels = Figure(figsize=(4.3, 4.0), layout="constrained"), Labels()
+        here = solve(scene, "position", at=solution.at.part(slice(best, best + 1)))
+        draw_linkage(figure.subplots(), View(scene, solution, here), labels)
+        labels.settle(figure)
+        svg = write_svg(figure, f"{name} linkage")
+    for light, variable in PLOT_COLOURS.items():
+        svg = svg.replace(light, f"var({variable})")
+    return svg.replace("<svg", '<svg class="linkage"', 1)
 
 
 def _draw_answers(record: Record, solution: Solution) -> str:
