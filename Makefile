@@ -36,9 +36,9 @@ long-simulators:
 long-problems:
 	PROBLEMS=all $(BIN)/python -m pytest tests/validation/lab/simulators/test_problems.py
 long-releases:
-	RELEASES=pip $(BIN)/python -m pytest tests/validation/lab/simulators/test_versions.py
+	RELEASES=pip $(BIN)/python -m pytest tests/validation/lab/simulators/test_releases.py
 long-standing:
-	$(BIN)/python -m validation standing --history mujoco --history pinocchio
+	$(BIN)/python -m validation standing
 long-free:
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/evaluation/test_free_motion_reference.py
 long-fuzz:

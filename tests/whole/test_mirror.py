@@ -70,11 +70,11 @@ JUDGED_BY = {
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "
     "thesis_dynamics thesis_positions thirteen; validation/lab: ladder",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "
-    "history_page record render scenes steps times; validation/report: junit; validation/run: elsewhere",
+    "record render scenes; validation/report: junit; validation/run: elsewhere",
     "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
     "templating",
     # studies: each through its command
-    "validation/lab/stress/test_bench.py": "validation/lab/stress: against contenders timed",
+    "validation/lab/stress/test_bench.py": "validation/lab/stress: contenders",
     "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families "
     "libraries slopes tally",
     "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
@@ -88,7 +88,6 @@ JUDGED_BY = {
     "validation/lab/simulators/test_simulators.py": "validation/lab/simulators: drake_sap examine exudyn_simulated "
     "genesis_rigid gradients motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco "
     "pinocchio_simulated pybullet standing work",
-    "validation/lab/simulators/test_versions.py": "validation/lab/simulators: releases versions_page",
 }
 """Modules without a test of their name, folder by folder, and the test that says when one of them is wrong."""
 

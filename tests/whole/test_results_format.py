@@ -12,6 +12,7 @@ from fourbar.effects import PinFriction
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.quantities import FORCES, OF_LINE, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
 from fourbar.solution import Solution
+from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import COLUMNS, FORMULAS, IDENTITIES, Row
 from fourbar_validation.engines.free_body import FreeBody
@@ -39,12 +40,6 @@ OF_A_SCENE = ("assembled", "undecided", "torque_inertia", "drive_force_inertia")
 """Of every engine, besides what it says of positions and of the linkage."""
 SHIPPED_RUN = find_baseline(ACCEPTED)
 TYPES = {"string": str, "double": float, "boolean": bool}
-
-
-def block(language: str) -> str:
-    found = re.search(f"```{language}\n(.*?)```", PAGE, re.DOTALL)
-    assert found is not None
-    return found[1]
 
 
 @pytest.fixture(scope="module")
@@ -136,13 +131,20 @@ def test_the_pandas_snippet_runs(
 ) -> None:
     pytest.importorskip("pandas", reason="pandas is optional")
     monkeypatch.chdir(results)
-    exec(block("python"), {})
+    assert status(["accept", "results"]) == 0
+    rows, accepted = re.findall("```python\n(.*?)```", PAGE, re.DOTALL)
+    exec(rows, {})
     printed = capsys.readouterr().out
-    assert "free-body" in printed
-    assert "0 of " in printed
+    assert "free-body" in printed and "0 of " in printed
+    names: dict[str, object] = {}
+    exec(accepted, names)
+    assert "free-body" in capsys.readouterr().out and not len(names["failing"]) and len(names["times"])  # type: ignore[arg-type]
 
 
 def test_the_sql_runs(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     duckdb = pytest.importorskip("duckdb", reason="DuckDB is optional")
     monkeypatch.chdir(results)
-    assert ("free-body", "torque") in {row[:2] for row in duckdb.sql(block("sql")).fetchall()}
+    assert status(["accept", "results"]) == 0
+    rows, accepted = re.findall("```sql\n(.*?)```", PAGE, re.DOTALL)
+    assert ("free-body", "torque") in {row[:2] for row in duckdb.sql(rows).fetchall()}
+    assert len(duckdb.sql(accepted.replace("mujoco-simulated", "free-body")).fetchall()) == 1

@@ -13,7 +13,6 @@ COMMANDS = {
     "run": "fourbar_validation.run.command:command",
     "accept": "fourbar_validation.regression.accept:accept_command",
     "compare": "fourbar_validation.regression.accept:compare",
-    "history": "fourbar_validation.regression.accept:history",
     "check": "fourbar_validation.check:check",
     "check-mjcf": "fourbar_validation.check.mjcf:command",
     "published": "fourbar_validation.lab.ladder:published",
@@ -29,7 +28,6 @@ COMMANDS = {
     "faults --mutants": "fourbar_validation.lab.stress.mutation.harness:command",
     "standing": "fourbar_validation.lab.simulators.standing:command",
     "standing --findings": "fourbar_validation.lab.simulators.findings:command",
-    "standing --versions": "fourbar_validation.lab.simulators.versions:command",
     "write": "fourbar_validation.lab.models:models",
     "write --problems": "fourbar_validation.lab.simulators.problems:command",
 }

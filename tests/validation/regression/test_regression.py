@@ -1,6 +1,7 @@
 """What changed since the accepted state: real changes distinguished from round-off, the surroundings first."""
 
 import ast
+import contextlib
 import csv
 import errno
 import html
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
@@ -30,7 +32,7 @@ from fourbar_validation.regression import record, render
 from fourbar_validation.regression.accept import accept_command, compare
 from fourbar_validation.regression.change import Kind
 from fourbar_validation.regression.changes import compare_rows, compare_runs
-from fourbar_validation.regression.history import HISTORY, append, read_history
+from fourbar_validation.regression.history import HISTORY
 from fourbar_validation.regression.record import (
     About,
     Recorded,
@@ -41,7 +43,6 @@ from fourbar_validation.regression.record import (
     write_about,
 )
 from fourbar_validation.regression.scenes import describe_changes
-from fourbar_validation.regression.times import TimeChange
 from fourbar_validation.report.junit import list_cases
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.suites import read_scene_files
@@ -179,7 +180,6 @@ def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path: Path, capsys: p
     before = {path: path.read_bytes() for path in kept.iterdir()}
     commands = {
         "RESULTS": ["accept", str(run), "--to", str(kept)],
-        "--add": ["history", str(kept), "--add", str(run)],
         "OLD": ["compare", str(run), str(good)],
         "NEW": ["compare", str(good), str(run)],
     }
@@ -191,30 +191,39 @@ def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path: Path, capsys: p
             assert not out and message.startswith(f"error: {key} = '{file}': ") and words in message
             assert message.count("\n") == 1
         assert {path: path.read_bytes() for path in kept.iterdir()} == before
-    assert [status(command) for command in commands.values()] == [0, 0, 0, 0]
+    assert [status(command) for command in commands.values()] == [0, 0, 0]
 
 
-def test_every_bit_of_a_history_is_guarded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = save(tmp_path / "run", [ROW])
-    kept = tmp_path / "kept"
+def test_a_damaged_table_is_one_line_and_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run, kept = save(tmp_path / "run", [ROW]), tmp_path / "kept"
     assert status(["accept", str(run), "--to", str(kept)]) == 0
-    file = kept / HISTORY
+    file, table = kept / HISTORY, (kept / "results.csv").read_bytes()
     whole = file.read_bytes()
-    table = (kept / "results.csv").read_bytes()
     run = save(tmp_path / "later", [replace(ROW, error=2e-15)])
-    for place in range(0, len(whole), 7):
-        file.write_bytes(whole[:place] + bytes([whole[place] ^ 1 << place % 8]) + whole[place + 1 :])
-        with pytest.raises(InputError, match="is damaged, or no history"):
-            read_history(file)
-    for command in (
-        ["history", str(kept)],
-        ["accept", str(run), "--to", str(kept)],
-        ["history", str(kept), "--add", str(run)],
+    another = replace(HERE, date="later")
+    write_about(another, run)
+    with Columns(tmp_path) as columns:
+        columns.add([ROW])
+    for damage in (
+        b"",
+        b"no columns",
+        whole[:-100],
+        whole[:300] + b"\0" + whole[301:],
+        (tmp_path / "results.parquet").read_bytes(),
     ):
+        file.write_bytes(damage)
         capsys.readouterr()
-        assert status(command) == 2
-        assert capsys.readouterr().err.count("\n") == 1
-    assert (kept / "results.csv").read_bytes() == table and not (kept / "history.html").exists()
+        assert status(["accept", str(run), "--to", str(kept)]) == 2, damage[:20]
+        line = capsys.readouterr().err
+        assert line == f"error: --to = '{file}': is damaged, or no table written by `accept`\n"
+        assert (kept / "results.csv").read_bytes() == table and file.read_bytes() == damage
+    for place in range(4, len(whole)):  # a bit of a number, which the checksum of its page shows
+        damage = whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :]
+        with contextlib.suppress(OSError, ValueError):
+            if pq.read_table(pa.BufferReader(damage), columns=["error"])["error"].to_pylist() != [ROW.error]:
+                break
+    file.write_bytes(damage)
+    assert status(["accept", str(run), "--to", str(kept)]) == 2
 
 
 def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted(
@@ -224,8 +233,7 @@ def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted
     (bare / "record.json").unlink()
     assert status(["compare", str(bare), str(good)]) == 0
     assert f"{bare / 'results.csv'}: not verified" in capsys.readouterr().out
-    assert status(["accept", str(bare)]) == 2 and status(["history", str(tmp_path), "--add", str(bare)]) == 2
-    assert not (tmp_path / "accepted").exists() and not (tmp_path / HISTORY).exists()
+    assert status(["accept", str(bare)]) == 2 and not (tmp_path / "accepted").exists()
 
 
 def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> None:
@@ -348,7 +356,7 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
             yield scene, rows
             alive -= 1
 
-    found = compare_runs((HERE, watched(before)), (HERE, watched(after)), {"engine"}, [], kept)
+    found = compare_runs((HERE, watched(before)), (HERE, watched(after)), {"engine"}, kept)
     assert most == 2 and found.rows == 2 * scenes and found.regressed == found.kinds[Kind.WORSE] == scenes - 1
     assert [change.key[0][-3:] for change in found.of(Kind.WORSE)] == ["999", "998", "997", "996", "995"]
     assert len(found.changes) == 2 * kept
@@ -547,43 +555,6 @@ def test_what_is_compared_can_be_chosen(tmp_path: Path, capsys: pytest.CaptureFi
     assert capsys.readouterr().err == "error: --engines = 'motor': must be among engine\n"
 
 
-def test_an_engine_is_slower_only_beyond_the_scatter_of_its_times() -> None:
-    scenes = [f"scene {k}" for k in range(6)]
-    old = {(scene, "engine"): 100.0 for scene in scenes}
-
-    def ratios(*factors: float) -> list[TimeChange]:
-        new = {key: 100.0 * factor for key, factor in zip(old, factors, strict=False)}
-        return compare_rows((HERE, [ROW]), (HERE, [ROW]), (old, new)).other_times
-
-    (slower,) = ratios(1.9, 2.1, 2.0, 2.0, 1.9, 2.1)
-    assert str(slower).startswith("engine is 2.00 times slower") and slower.ratio > 1.0
-    assert not ratios(1.1, 1.15, 1.1, 1.2, 1.1, 1.1)  # of one mind, and less than nights differ
-    assert not ratios(9.0, 1.0, 1.0, 4.0, 1.0, 1.0)  # twice as slow on the mean, by two scenes
-    assert not ratios(2.0, 2.0)
-    (faster,) = ratios(0.5, 0.5, 0.5)
-    assert "2.00 times faster" in str(faster)
-
-
-def test_a_slower_engine_is_a_regression_on_the_same_machine_and_slower_formulas_are_theirs(tmp_path: Path) -> None:
-    def timed(name: str, **ratios: float) -> Path:
-        lines = [f"{scene},{engine},-,1,1,{ratio}\n" for scene in "abcd" for engine, ratio in ratios.items()]
-        return save(tmp_path / name, [ROW], "".join(lines))
-
-    old, slower = timed("old", engine=100.0, other=50.0), timed("slower", engine=180.0, other=50.0)
-    xml = tmp_path / "changes.xml"
-    assert status(["compare", str(old), str(slower), "--junit", str(xml)]) == 1
-    (failure,) = ET.parse(xml).getroot().findall(".//failure")
-    assert failure.get("message") == "engine is 1.80 times slower (factor of scatter 1.00, 4 scenes)"
-    assert status(["compare", str(slower), str(old)]) == 0
-    write_about(replace(HERE, machine="another"), slower)
-    assert status(["compare", str(old), str(slower)]) == 0
-    both = {("a", "b"): 100.0}
-    halved, doubled = ({(s, e): t for s in "abcd" for e in ("engine", "other")} for t in (50.0, 200.0))
-    for one, other, word in ((doubled, halved, "slower"), (halved, doubled, "faster")):
-        (change,) = compare_rows((HERE, [ROW]), (HERE, [ROW]), ({**both, **one}, {**both, **other})).times
-        assert str(change).startswith(f"formulas is 4.00 times {word}")
-
-
 def test_the_run_itself_is_written_as_junit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fourbar_validation.report.junit.LISTED", 10)
     judge_here(monkeypatch)
@@ -599,66 +570,23 @@ def test_the_run_itself_is_written_as_junit(tmp_path: Path, monkeypatch: pytest.
     assert kinds == [("failure", "not held")] * 2 + [("skipped", "")]
 
 
-@pytest.fixture(scope="module")
-def nights(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Eight runs of three scenes: a drift of 10 % a night in one row, a new version and a failure in the sixth."""
-    folder = tmp_path_factory.mktemp("nights")
-    for night in range(8):
-        scenes = [f"scene {k}" for k in range(3)]
-        error = 1e-9 * 1.1**night
-        rows = [replace(ROW, scene=scene, error=1e-9, allowed=1e-8, condition=1e-5) for scene in scenes]
-        rows[0] = replace(rows[0], error=error, condition=1.0)
-        if night >= 5:
-            rows[1] = replace(rows[1], error=1e-3, verdict=FAILS)
-        if night == 3:
-            rows = rows[:1]  # a part of the suite
-        record, _ = made(rows, {row.scene: SCENE for row in rows})
-        versions = {**record.versions, "mujoco": "4.0.0" if night < 5 else "4.1.0"}
-        date, commit = f"2026-01-0{night + 1}T02:00:00+00:00", f"{night}abcdef"
-        record = replace(record, versions=versions, date=date, commit=commit)
-        times = {(scene, "engine"): 50.0 * (3.0 if night >= 6 else 1.0) for scene in scenes}
-        append(folder / HISTORY, (record, rows), times)
-    return folder
-
-
-def test_a_history_names_the_step_at_which_a_row_changed(nights: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert status(["history", str(nights)]) == 0
-    out = capsys.readouterr().out.splitlines()
-    assert [line.split()[2] for line in out[:-1]] == ["(3abcdef):", "(5abcdef):", "(6abcdef):"]
-    assert "1 grew within its allowance" in out[0]  # 1.1^3: no night by itself was beyond 1.25
-    assert "1 verdict got worse" in out[1] and "mujoco 4.0.0 -> 4.1.0" in out[1]
-    assert "engine is 3.00 times slower" in out[2] and out[-1].startswith("8 runs, 3 steps")
-    page = (nights / "history.html").read_text()
-    assert page.count("<svg") == 3 + 2 and "scene 1 / engine / exact / torque" in page and "mujoco 4.1.0" in page
-    assert status(["history", str(nights), "--only", "scene 2", "-o", str(nights / "two.html")]) == 0
-    assert "1 step changed" in capsys.readouterr().out
-
-
-def test_a_history_is_read_by_pandas_and_keeps_what_each_scene_states(nights: Path) -> None:
+def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -> None:
     import pandas as pd
 
-    table = pd.read_parquet(nights / HISTORY)
-    assert table.groupby("commit", observed=True).size().tolist() == [6, 6, 6, 4, 6, 6, 6, 6]
-    errors = table[(table.quantity == "torque") & (table.scene == "scene 0")].error
-    assert errors.tolist() == pytest.approx([1e-9 * 1.1**night for night in range(8)], rel=1e-15)
-    assert set(table.version_mujoco) == {"4.0.0", "4.1.0"}
-    runs = read_history(nights / HISTORY)
-    assert runs[0].about.scenes["scene 2"] == describe_changes(SCENE) and len(runs[3].rows) == 1
-    before = (nights / HISTORY).read_bytes()
-    append(nights / HISTORY, (runs[4].about, runs[4].rows), runs[4].times)  # it is in it
-    assert (nights / HISTORY).read_bytes() == before
-
-
-def test_what_is_no_history_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = save(tmp_path / "run", [ROW])
-    with Columns(run) as columns:
-        columns.add([ROW])
-    (tmp_path / "text.parquet").write_text("no columns")
-    for file, words in ((tmp_path, "there is no such file"), (run / "results.parquet", "no history written by"),
-                        (tmp_path / "text.parquet", "no history written by")):  # fmt: skip
-        assert status(["history", str(file)]) == 2
-        message = capsys.readouterr().err.strip()
-        assert words in message and "\n" not in message
+    kept, dates = tmp_path / "kept", [f"2026-01-0{night}T02:00:00+00:00" for night in (1, 2, 3)]
+    for night, date in enumerate(dates):
+        record, rows = made([replace(ROW, error=1e-15 * (1 + night))], {"scene": SCENE})
+        versions = {**record.versions, "mujoco": f"4.{night}.0"} | ({"drake": "1"} if night else {})
+        about = replace(record, versions=versions, date=date, commit=f"{night}abcdef")
+        run = save(tmp_path / str(night), rows, "scene,engine,-,1,1,3.0\n", about)
+        assert status(["accept", str(run), "--to", str(kept)]) == 0
+    assert status(["accept", str(tmp_path / "1"), "--to", str(kept)]) == 0  # it is in it
+    table = pd.read_parquet(kept / HISTORY)
+    assert table.groupby("date", observed=True).size().to_dict() == dict.fromkeys(dates, 2)
+    assert table[table.quantity == "torque"].error.tolist() == [1e-15 * n for n in (1, 2, 3)]
+    assert table[table.quantity == "time"].times_formulas.tolist() == [3.0] * 3
+    assert set(table.version_mujoco) == {"4.0.0", "4.1.0", "4.2.0"} and table.version_drake.isna().sum() == 2
+    assert table.scene_hash.nunique() == 1
 
 
 def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(

@@ -20,7 +20,7 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.solve import solve
 from fourbar.writing import write_text
 from fourbar_validation.engines.witnesses import WITNESSES
-from fourbar_validation.lab.stress.timed import time_call, time_in_turns
+from fourbar_validation.lab.cost.study import time_call, time_in_turns
 from fourbar_validation.places import PROGRAM
 from fourbar_validation.report.machine import describe_setup
 from fourbar_validation.report.templating import render

@@ -1,7 +1,7 @@
-"""`python -m validation compare`, `accept` and `history`."""
+"""`python -m validation compare` and `accept`."""
 
 from collections.abc import Callable, Iterable, Mapping
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,20 +14,17 @@ from fourbar_validation.compare.columns import CSV_ROWS
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import FAILS, Row
 from fourbar_validation.regression import render
-from fourbar_validation.regression.changes import Differences, compare_runs, merge_scenes, rename_scenes
+from fourbar_validation.regression.changes import Differences, compare_runs
 from fourbar_validation.regression.history import HISTORY, append
 from fourbar_validation.regression.record import (
     ABOUT,
     ACCEPTED,
     TABLES,
-    About,
-    Recorded,
     accept,
     find_baseline,
     open_run,
 )
 from fourbar_validation.regression.scenes import find_renamed
-from fourbar_validation.regression.times import list_time_changes
 
 FORMS: dict[str, Callable[[Differences], str]] = {
     "markdown": render.write_markdown,
@@ -70,9 +67,8 @@ def report_differences(
     names = find_renamed(before.about.scenes, after.about.scenes)
     keep = _is_chosen(chosen or {}, lambda column: chain(before.words(column), after.words(column)), names)
     engines = set(after.words("engine"))
-    times = list_time_changes(merge_scenes(rename_scenes(before.times(), names), after.times()))
     scenes = track(after.scenes(keep), "comparing", console=Console(stderr=True), transient=True)
-    result = compare_runs((before.about, before.scenes(keep)), (after.about, scenes), engines, times)
+    result = compare_runs((before.about, before.scenes(keep)), (after.about, scenes), engines)
     unproven = [str(run.table) for run in (before, after) if not run.verified]
     result.notes += [f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing" for table in unproven]
     for form, path in forms.items():
@@ -134,7 +130,7 @@ def compare(
 def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     """Record RESULTS (a run's folder) as the accepted state that later runs are compared with.
 
-    It is kept in DIR, and appended to DIR/history.parquet, of which `history` makes a page.
+    It is kept in DIR, and its rows are appended to DIR/history.parquet, a table for pandas or DuckDB.
     """
     folder = results if results.is_dir() else results.parent
     target = folder.absolute().parent / ACCEPTED if to is None else to
@@ -148,61 +144,12 @@ def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     if counts.status != HOLDS and not even_failing:
         why = f"{counts[FAILS]} comparisons fail" if counts[FAILS] else "nothing was compared"
         raise InputError("RESULTS", str(results), f"must hold, or say --even-failing: {why}")
-    _require_verified(run)
-    too_long = counts.total > CSV_ROWS
-    if not too_long:
-        append(target / HISTORY, *_read_whole(run))  # first: where it is damaged nothing is written
-    accept(run, target)
-    history = "too many for a history" if too_long else f"appended to {target / HISTORY}"
-    click.echo(f"accepted: {target} ({counts.total} rows; {history})")
-
-
-def _require_verified(run: Recorded) -> None:
-    """InputError for a run of which nothing says whether it lost some of its rows."""
-    if not run.verified:
+    if not run.verified:  # nothing says whether it lost some of its rows
         raise InputError(run.key, str(run.table), f"needs a {ABOUT} with its rows and SHA-256; `run` writes one")
-
-
-def _read_whole(run: Recorded) -> tuple[tuple[About, list[Row]], dict[tuple[str, str], float]]:
-    """All rows and times of a run, as a history takes them; InputError where there are too many."""
-    rows = list(islice(run.rows(), CSV_ROWS + 1))
-    if len(rows) > CSV_ROWS:
-        raise InputError("--add", str(run.table), f"must have at most {CSV_ROWS} rows: a history is read as a whole")
-    return (run.about, rows), {(scene, engine): time for scene, some in run.times() for engine, time in some}
-
-
-@click.command()
-@click.argument("history", type=click.Path(path_type=Path))
-@click.option("--add", type=click.Path(path_type=Path), metavar="RESULTS", help="Append this run first.")
-@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-              help="Page to write; left out: history.html next to HISTORY.")  # fmt: skip
-@add_choosing_options
-def history(
-    history: Path, add: Path | None, out: Path | None, only: str | None, engines: str | None, quantity: str | None
-) -> None:
-    """Show HISTORY (a file history.parquet, or the folder that holds it) over time, as a page with charts.
-
-    Error, verdict and time by date, commit and engine version, and the step at which each row changed.
-    """
-    from fourbar_validation.regression.history import read_history
-    from fourbar_validation.regression.history_page import write_page
-    from fourbar_validation.regression.steps import find_steps
-
-    file = history / HISTORY if history.is_dir() or not history.suffix else history
-    if add is not None:
-        run = open_run(add, "--add")
-        _require_verified(run)
-        append(file, *_read_whole(run))
-    runs = read_history(file)
-    keep = _is_chosen(
-        {"only": only, "engines": engines, "quantity": quantity},
-        lambda column: (getattr(row, column) for run in runs for row in run.rows),
-    )
-    runs = [run.of(keep) for run in runs]
-    result = find_steps(runs)
-    target = file.with_name("history.html") if out is None else out
-    write_text(target, write_page(runs, result))
-    for step in result:
-        click.echo(step.sentence())
-    changed = f"{len(result)} step{'s' if len(result) > 1 else ''} changed something" if result else "nothing changed"
-    click.echo(f"{len(runs)} runs, {changed}: {target}")
+    too_long = counts.total > CSV_ROWS
+    if not too_long:  # first: if the table is damaged nothing is written
+        times = {(scene, engine): time for scene, some in run.times() for engine, time in some}
+        append(target / HISTORY, run.about, list(run.rows()), times)
+    accept(run, target)
+    history = f"too many for {HISTORY}" if too_long else f"appended to {target / HISTORY}"
+    click.echo(f"accepted: {target} ({counts.total} rows; {history})")

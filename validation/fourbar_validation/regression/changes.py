@@ -15,7 +15,6 @@ from fourbar_validation.regression.change import OTHER_QUESTION, REGRESSIONS, Ch
 from fourbar_validation.regression.fault import Fault
 from fourbar_validation.regression.record import About
 from fourbar_validation.regression.scenes import SceneChange, find_renamed, list_scene_changes
-from fourbar_validation.regression.times import Time, TimeChange, list_time_changes
 
 KEPT = 10_000
 """Rows of one kind that are listed, the worst of them; all are counted."""
@@ -61,7 +60,6 @@ class Differences:
     """Scenes that ask something else; reported first."""
     notes: list[str] = field(default_factory=list)
     """Scenes of another name, and what an older record cannot say."""
-    times: list[TimeChange] = field(default_factory=list)
     kept: int = KEPT
     kinds: Counter[Kind] = field(default_factory=Counter)
     """Rows by what happened to them."""
@@ -111,19 +109,8 @@ class Differences:
 
     @property
     def regressed(self) -> int:
-        """How many rows, and times, a run fails for."""
-        return sum(self.kinds[kind] for kind in REGRESSIONS) + len(self.slower)
-
-    @property
-    def other_times(self) -> list[TimeChange]:
-        """Engines whose times changed by more than their scatter."""
-        return [each for each in self.times if each.beyond]
-
-    @property
-    def slower(self) -> list[TimeChange]:
-        """Those that are slower than on the same machine before."""
-        same = all(what != "machine" for what, _, _ in self.surroundings)
-        return [each for each in self.other_times if same and each.slower]
+        """How many rows a run fails for."""
+        return sum(self.kinds[kind] for kind in REGRESSIONS)
 
     @property
     def not_run(self) -> list[str]:
@@ -157,31 +144,17 @@ def _explain_refusal(of: Change, old: Row, new: Row) -> str:
     return f"scene {of.key[0]} {'changed' if of.kind is Kind.OTHER_SCENE else 'has other positions'}"
 
 
-def compare_rows(
-    old: tuple[About, Iterable[Row]],
-    new: tuple[About, Iterable[Row]],
-    times: tuple[Mapping[tuple[str, str], float], Mapping[tuple[str, str], float]] = ({}, {}),
-    kept: int = KEPT,
-) -> Differences:
+def compare_rows(old: tuple[About, Iterable[Row]], new: tuple[About, Iterable[Row]], kept: int = KEPT) -> Differences:
     """Compare two runs whose rows are at hand, in any order."""
     before, after = (sort_rows(run[1]) for run in (old, new))
     engines = {row.engine for row in after}
-    names = find_renamed(old[0].scenes, new[0].scenes)
-    timed = rename_scenes(_group_times(times[0]), names), _group_times(times[1])
-    changed = list_time_changes(merge_scenes(*timed))
-    return compare_runs((old[0], group_by_scene(before)), (new[0], group_by_scene(after)), engines, changed, kept)
-
-
-def _group_times(times: Mapping[tuple[str, str], float]) -> Iterator[tuple[str, list[Time]]]:
-    for scene, some in groupby(sorted(times.items()), key=lambda item: item[0][0]):
-        yield scene, [(engine, time) for (_, engine), time in some]
+    return compare_runs((old[0], group_by_scene(before)), (new[0], group_by_scene(after)), engines, kept)
 
 
 def compare_runs(
     old: tuple[About, ByScene[Row]],
     new: tuple[About, ByScene[Row]],
     engines: set[str],
-    times: list[TimeChange],
     kept: int = KEPT,
 ) -> Differences:
     """Compare two runs by their scenes, in ascending order: only where both answer the same question.
@@ -192,9 +165,9 @@ def compare_runs(
     names = find_renamed(old[0].scenes, new[0].scenes)
     surroundings, older = _list_surroundings(old[0], new[0])
     notes = [f"renamed: {before} -> {after}" for before, after in names.items()]
-    result = Differences(surroundings, list(scenes.values()), notes, times, kept)
+    result = Differences(surroundings, list(scenes.values()), notes, kept)
     known = engines | (new[0].engines or set())
-    for scene, before, after in merge_scenes(rename_scenes(old[1], names), new[1]):
+    for scene, before, after in _merge_scenes(_rename_scenes(old[1], names), new[1]):
         wanted = scene in new[0].scenes if new[0].scenes else bool(after) or not engines
         rows = _index_rows(scene, before), _index_rows(scene, after)
         result.add(_compare_scene(*rows, known if wanted else set(), wanted, scenes.get(scene)))
@@ -206,7 +179,7 @@ def compare_runs(
     return result
 
 
-def rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
+def _rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
     """Each scene of the old run by the name that the new one gives it; nothing is held where none has another."""
     if not names:
         return scenes
@@ -219,7 +192,7 @@ def group_by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
         yield scene, list(some)
 
 
-def merge_scenes(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
+def _merge_scenes(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
     """Each scene that either run has, with what both have of it; InputError where the scenes are not in order."""
     both = merge(_require_order("OLD", old), _require_order("NEW", new), key=lambda each: each[0])
     for scene, some in groupby(both, key=lambda each: each[0]):

@@ -24,7 +24,6 @@ ROWS = 5
 def write_verdict(found: Differences) -> str:
     """One line: how many regressions among how many rows, what else moved, and the counts of the new run."""
     counts = [f"{found.kinds[kind]} {kind.value}" for kind in Kind if found.kinds[kind]]
-    counts += [f"{len(found.slower)} slower"] if found.slower else []
     many = found.regressed
     head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
     if found.nothing and not many:
@@ -55,7 +54,6 @@ def write_text(found: Differences) -> str:
     lines += [f"{what}: {old} -> {new}" for what, old, new in found.surroundings]
     lines += [f"not compared: {name}" for name in found.not_compared]
     lines += [f"not run: {name}" for name in found.not_run]
-    lines += [f"time: {change}" for change in found.other_times]
     lines += [f"disagree: {sentence}" for sentence in found.fault.sentences]
     groups, more = _group_rows(found)
     lines += [f"{group.kind.value}: {group}" for group in groups] + more
@@ -78,12 +76,11 @@ def _list_worst(found: Differences, kind: Kind) -> list[str]:
 
 
 def list_other_questions(found: Differences) -> list[tuple[str, list[str]]]:
-    """List what is another question, was not run, or took longer, under its headings."""
+    """List what is another question or was not run, under its headings."""
     parts = {
         "The scenes changed": [*map(str, found.scenes), *found.notes],
         "Not compared": found.not_compared,
         "Not run": found.not_run,
-        "Times": [*map(str, found.other_times)],
         "Who disagrees": found.fault.sentences,
     }
     return [(heading, texts) for heading, texts in parts.items() if texts]
@@ -146,7 +143,6 @@ def _list_cases(found: Differences) -> Iterator[JunitCase]:
             yield JunitCase(*name, "skipped", kind, f"{change.new.verdict}: {change.new.reason}")
         else:
             yield JunitCase(*name, "passed")
-    yield from (JunitCase("times", "times", each.engine, "failure", "slower", str(each)) for each in found.slower)
     yield from count_beyond(found.rows - len(found.changes))
     if found.nothing:
         yield JunitCase(

@@ -24,8 +24,8 @@ from fourbar_validation.engines.pinocchio_forward import PinocchioForward
 from fourbar_validation.lab.cost import formulas, laws, pictures, study
 from fourbar_validation.lab.cost.cost import cost, list_front
 from fourbar_validation.lab.cost.series import BEST
+from fourbar_validation.lab.stress.contenders import LINKAGE
 from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
-from fourbar_validation.lab.stress.timed import LINKAGE
 from tests.support.scenes import crank_rocker, thesis
 
 

@@ -1,8 +1,6 @@
 """The limits of speed: each is of a row that is measured, is reported with its reason, and costs the run."""
 
 import math
-import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -10,15 +8,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from fourbar.errors import BAD_INPUT, BROKEN, HOLDS
+from fourbar.errors import HOLDS
 from fourbar.quantities import UNKNOWNS
 from fourbar.solve import solve
-from fourbar_validation.cli import status as ended
-from fourbar_validation.lab.stress import against, bench, contenders
-from fourbar_validation.lab.stress.timed import make_command, make_example
-
-ROOT = Path(__file__).parents[4]
-
+from fourbar_validation.lab.stress import bench, contenders
+from fourbar_validation.lab.stress.contenders import make_command, make_example
 
 ROUNDING = 1e-11
 """Relative to the largest of each unknown: a few hundred roundings."""
@@ -97,97 +91,3 @@ def test_what_is_beyond_its_limit_fails_with_the_reason(
     result = CliRunner().invoke(bench.bench, standalone_mode=False)
     assert result.return_value == (0 if spoiled is None else 1)
     assert (f"fails: {name}: {limit.reason}" in result.output) == (spoiled is not None)
-
-
-SLOWER = """
-import time as _time
-_quick = solve
-def solve(*given, **named):
-    end = _time.process_time() + 0.02
-    while _time.process_time() < end:
-        pass
-    return _quick(*given, **named)
-"""
-
-
-def git(folder: Path, *arguments: str) -> None:
-    named = ("-c", "user.name=test", "-c", "user.email=test@example.invalid", "-c", "commit.gpgsign=false")
-    subprocess.run(["git", "-C", str(folder), *named, *arguments], check=True, capture_output=True)
-
-
-@pytest.fixture
-def repository(tmp_path: Path) -> Path:
-    """A repository whose one commit is the package, with the tag `broken` for one that cannot solve."""
-    if shutil.which("git") is None:
-        pytest.skip("git is not installed")
-    package = tmp_path / "fourbar"
-    shutil.copytree(ROOT / "fourbar", package, ignore=shutil.ignore_patterns("__pycache__"))
-    git(tmp_path, "init", "-q")
-    git(tmp_path, "add", "fourbar")
-    git(tmp_path, "commit", "-q", "-m", "whole")
-    whole = (package / "__init__.py").read_text()
-    (package / "__init__.py").write_text("")
-    git(tmp_path, "commit", "-q", "-a", "-m", "empty")
-    git(tmp_path, "tag", "broken")
-    git(tmp_path, "reset", "-q", "--hard", "HEAD~1")
-    assert (package / "__init__.py").read_text() == whole
-    return tmp_path
-
-
-def test_a_slower_tree_is_found_by_every_timing(repository: Path) -> None:
-    with (repository / "fourbar" / "__init__.py").open("a") as module:
-        module.write(SLOWER)
-    before = sorted(path for path in repository.iterdir())
-    rows = against.time_against("HEAD", 1000, 1, repository)
-    assert len(rows) == 5
-    for row in rows.values():
-        assert row.least <= row.ratio <= row.most
-        assert row.ours > 0.02 and row.least > 1.5
-    assert sorted(path for path in repository.iterdir()) == before
-
-
-def reported(capsys: pytest.CaptureFixture[str], revision: str) -> tuple[int, str]:
-    status = ended(["bench", "--against", revision, "--positions", "1000", "--rounds", "1"])
-    return status, capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("revision", "words"),
-    [
-        ("no-such-revision", "must be a revision of the git repository"),
-        ("--output=made", "must be a revision of the git repository"),
-        ("", "must be a revision of the git repository"),
-        ("broken", "broken cannot be timed: ImportError: cannot import name 'Bar'"),
-    ],
-)
-def test_a_revision_that_cannot_be_timed_is_one_line(
-    revision: str, words: str, repository: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(against, "find_checkout", lambda _: repository)
-    status, line = reported(capsys, revision)
-    assert status == BAD_INPUT and line.startswith("error: ") and line.count("\n") == 1 and words in line
-    assert {path.name for path in repository.iterdir()} == {".git", "fourbar"}
-
-
-def test_without_a_repository_no_revision_exists(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(against, "find_checkout", lambda _: tmp_path)
-    status, line = reported(capsys, "HEAD")
-    assert status == BAD_INPUT and line.count("\n") == 1
-
-
-def test_without_git_the_command_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setenv("PATH", "")
-    assert reported(capsys, "HEAD") == (BROKEN, "error: bench --against needs git, which is not installed\n")
-
-
-def test_the_ratios_are_printed_whole_on_a_narrow_terminal(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    row = against.Ratio(0.3875, 0.001, 387.5, 375.25, 400.125)
-    monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(bench, "against_revision", lambda *_: {"one position with error bars": row})
-    assert ended(["bench", "--against", "HEAD"]) == HOLDS
-    line = next(line for line in capsys.readouterr().out.splitlines() if "error bars" in line)
-    assert line.split()[-5:] == ["387.5", "1", "387.500", "375.250", "400.125"]

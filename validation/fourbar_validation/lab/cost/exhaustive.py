@@ -13,7 +13,7 @@ from fourbar.mjcf import Settings
 from fourbar_validation.advise.advise import MOST_STEPS
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, TrialSetup, make_settings
-from fourbar_validation.lab.stress.timed import time_in_turns
+from fourbar_validation.lab.cost.study import time_in_turns
 
 COARSE, FINE = 2.0, 2.0 ** (1.0 / 3.0)
 """Ratios of the ladder of steps: first by factors of two, then thirds of an octave below what serves."""

@@ -1,11 +1,13 @@
 """The work-precision study of one scene: curve after curve, each kept once it is done."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from statistics import median
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,7 +22,6 @@ from fourbar_validation.engines.loop import Trial
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.lab.cost import formulas
 from fourbar_validation.lab.cost.series import BEST, SLOW, Curve, Spot, design_curves
-from fourbar_validation.lab.stress.timed import time_call, time_in_turns
 from fourbar_validation.report.machine import list_versions
 from fourbar_validation.run.store import Store
 
@@ -36,6 +37,7 @@ ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
 VERSION = 6
 """Of what is tried; parts of another one are made again."""
 EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,3 +292,20 @@ def _time_interleaved(
     times = time_in_turns({number: partial(clock, n) for number, (clock, n) in enumerate(every)}, ROUNDS)
     base, *rest = ([each / n for each in times[number]] for number, (_, n) in enumerate(every))
     return [summarise_timings(kept) for kept in rest], median(base)
+
+
+def time_call(action: Callable[[], object], calls: int = 1) -> float:
+    """Time one call in this process, in CPU seconds."""
+    start = time.process_time()
+    for _ in range(calls):
+        action()
+    return (time.process_time() - start) / calls
+
+
+def time_in_turns(clocks: Mapping[Any, Callable[[], T]], rounds: int) -> dict[Any, list[T]]:
+    """Read the clocks in turns, there and back: a slow spell hits all, and none always finds a warmer machine."""
+    times: dict[Any, list[T]] = {name: [] for name in clocks}
+    for number in range(rounds):
+        for name in list(clocks)[:: -1 if number % 2 else 1]:
+            times[name].append(clocks[name]())
+    return times

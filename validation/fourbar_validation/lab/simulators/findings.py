@@ -44,7 +44,7 @@ class Reproduction:
         """Run the script under one release, installed by itself."""
         name, module = self.engine
         more = [part.format(version=release) for part in self.fields.get("With", "").split(", ") if part]
-        python, why = install_version(name, release, cache, more, module)
+        python, why = install_version(name, module, release, cache, more)
         return why if python is None else self.run(python, seconds)
 
 

@@ -8,14 +8,12 @@ from typing import Any
 import click
 
 import fourbar
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import InputError
 from fourbar.quantities import PIN_FORCES
 from fourbar.writing import write_text
-from fourbar_validation.compare.rows import say_error, write_csv
+from fourbar_validation.compare.rows import write_csv
 from fourbar_validation.lab.simulators.examine import TORQUE_AND_FORCES, Examination, Line, examine
 from fourbar_validation.lab.simulators.findings import run_findings
-from fourbar_validation.lab.simulators.releases import CACHE, find_module, list_released
-from fourbar_validation.lab.simulators.versions import command as versions
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.svg import draw_svg, shrink_svg
@@ -50,13 +48,7 @@ DIFFERENTIATED = (
 )
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("results/standing"), show_default=True)
 @click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each simulator and each finding.")
-@click.option(
-    "--history", "engines", metavar="ENGINE", multiple=True, help="Compare its two newest releases too (repeat)."
-)
-@click.pass_context
-def command(
-    ctx: click.Context, scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float, engines: tuple[str, ...]
-) -> None:
+def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float) -> None:
     """Examine every simulator that is installed here or under a --python, and write one page (repeat --python).
 
     It runs the findings too, and says what could not run: the command of a night.
@@ -64,20 +56,12 @@ def command(
     for python in pythons:
         if not python.is_file():
             raise InputError("--python", str(python), "must be a Python interpreter, such as .venv-warp/bin/python")
-    for engine in engines:
-        find_module(engine)  # before anything is examined
     given = fourbar.load(scene)
     out.mkdir(parents=True, exist_ok=True)
     interpreters = [Path(sys.executable), *(path.absolute() for path in pythons)]
     found = examine(given, scene, interpreters, time_limit)
     if not found.lines:
         raise InputError("--python", ", ".join(map(str, pythons)) or None, "no simulator answered there")
-    for engine in engines:
-        try:
-            before, _ = list_released(engine, None, None)[-2:]
-            ctx.invoke(versions, engine=engine, first=before, jobs=1, cache=CACHE, out=out / f"versions-{engine}")
-        except FourBarError as error:
-            found.left_out[f"the two newest releases of {engine}"] = say_error(error)
     chart = draw_work_precision(found)
     examined_versions = dict.fromkeys(f"{line.simulator} {line.version}" for line in found.lines)
     lists = {

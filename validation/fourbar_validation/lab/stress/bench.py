@@ -23,19 +23,20 @@ from fourbar.show.plot.style import format_of
 from fourbar.solve import solve
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.lab.cost.formulas import make_bodies
-from fourbar_validation.lab.stress.against import ONE_THREAD
-from fourbar_validation.lab.stress.against import time_against as against_revision
+from fourbar_validation.lab.cost.study import time_call
 from fourbar_validation.lab.stress.contenders import (
     POSITIONS,
     STUDY,
     Times,
+    allocate,
     collect_loops,
     draw_bench,
+    make_command,
+    make_example,
     time_interleaved,
     time_linkages,
     time_positions,
 )
-from fourbar_validation.lab.stress.timed import allocate, make_command, make_example, time_call
 from fourbar_validation.published.thirteen import solve_thirteen
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.terminal import make_table
@@ -45,6 +46,7 @@ from fourbar_validation.scenes.suites import Random
 
 Array = NDArray[np.float64]
 
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
 """Its input swings between limit positions: each of its positions has to be looked at."""
 THIRTEEN_BATCH = 20_000
@@ -167,13 +169,10 @@ def make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
     "--largest", default=1_000_000, show_default=True, type=click.IntRange(1000, 10**8), help="For the growth, to 1e8."
 )
 @click.option("--picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw the growth: svg, png or pdf.")
-@click.option("--against", metavar="REVISION", help="This tree's times over those of a git revision, instead.")
-def bench(positions: int, rounds: int, largest: int, picture: Path | None, against: str | None) -> int:
+def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> int:
     """Time NumPy, C and the 13x13 system side by side; ratios that must hold."""
     if picture is not None:
         format_of(picture)
-    if against is not None:
-        return print_comparison(against, positions, rounds)
     from rich.console import Console
 
     if any(os.environ.get(name) != "1" for name in ONE_THREAD):
@@ -209,22 +208,6 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None, again
     for what in broken:
         click.echo(f"fails: {what}")
     return FAILED if broken else HOLDS
-
-
-def print_comparison(revision: str, positions: int, rounds: int) -> int:
-    """Print this tree's times over those of a revision; a measurement without limits."""
-    from rich.console import Console
-    from rich.markup import escape
-
-    rows = []
-    for what, row in against_revision(revision, positions, rounds).items():
-        times = (f"{1e3 * each:.4g}" for each in (row.ours, row.theirs))
-        rows.append((what, *times, *(f"{each:.3f}" for each in (row.ratio, row.least, row.most))))
-    title = f"CPU ms of a call in this tree and at {escape(revision)}, and their ratio; "
-    title += f"{positions} positions, one core, medians of {rounds} pairs in turns; {name_machine()}"
-    head = ("what", "ours", "theirs", "ratio", "least", "most")
-    Console().print(make_table(head, rows, title=title))
-    return HOLDS
 
 
 def measure(positions: int, rounds: int, largest: int) -> Measured:

@@ -4,7 +4,7 @@ import ctypes
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar import vary
+from fourbar import Bar, FourBar, Gravity, Motion, Scene, vary
 from fourbar.errors import say_install
 from fourbar.quantities import UNKNOWNS, VECTORS
+from fourbar.scene import Command
 from fourbar.show.plot.style import apply_style, format_of, save
 from fourbar.solve import solve
 from fourbar.studies.function import function
-from fourbar_validation.lab.stress.timed import make_command, make_example, time_call, time_in_turns
+from fourbar_validation.lab.cost.study import time_call, time_in_turns
 from fourbar_validation.report.machine import name_machine
 
 if TYPE_CHECKING:
@@ -44,6 +45,8 @@ MOST_LINKAGES = 100_000
 MOST_LOOPED = 1000
 """Linkages that are solved one after the other: beyond them the cost of one no longer changes."""
 STUDY, POSITIONS, LOOPED = "study, NumPy", "one linkage, as many positions", "one after the other"
+LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
+"""Crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, uniform bars."""
 
 
 class Peers(NamedTuple):
@@ -51,6 +54,22 @@ class Peers(NamedTuple):
 
     here: dict[str, Loop]
     not_run: dict[str, str]
+
+
+def make_example(linkage: FourBar = LINKAGE, theta_2: float | None = 0.0) -> Scene:
+    """Build the scene that is timed: crank at 10 rad/s, gravity, drive on the input; theta_2 None: its full range."""
+    return Scene(linkage, Motion(theta_2, 10.0), 2, (), (Gravity(),))
+
+
+def make_command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
+    """Command n positions, over a revolution unless specified otherwise."""
+    return Command(np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
+
+
+def allocate(names: Iterable[str], at: Command) -> dict[str, Array]:
+    """Allocate arrays as `solve` lays them out, touched so that no page is faulted in while the clock runs."""
+    first = solve(make_example(), at=at)
+    return {name: getattr(first, name) for name in names}
 
 
 def time_interleaved(actions: Mapping[str, Callable[[], object]], rounds: int, calls: int = 1) -> dict[str, float]:

@@ -1,0 +1,1 @@
+"""Trends over commits: `asv run`, `asv publish`, `asv find`; CONTRIBUTING.md has the commands."""
