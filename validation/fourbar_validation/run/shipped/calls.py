@@ -1,5 +1,6 @@
 """Studies of many linkages, by the free bodies of each linkage for itself."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from fourbar.scene.point import Point
 from fourbar.studies.keys import command_key
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import magnitude
-from fourbar_validation.run.question import Question
+from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import (
     ask_free_bodies,
     at_places,
@@ -57,13 +58,13 @@ def study(question: Question) -> list[Row]:
     values = {key: np.array([x + number * APART * step for number in range(MEMBERS)]) for key, (x, step) in of.items()}
     # the places of each member lie within those of the scene: nothing says that a table reaches further
     each = np.array([places + APART * number * (places.mean() - places) for number in range(MEMBERS)])
-    members = [
-        move_numbers(at_places(scene, own), {k: number * APART * of[k].step for k in of})
-        for number, own in enumerate(each)
-    ]
+    members: dict[int, Scene] = {}
+    for number, own in enumerate(each):
+        with suppress(NotAskedError):  # the others are judged, beside one that never assembles
+            members[number] = move_numbers(at_places(scene, own), {k: number * APART * of[k].step for k in of})
     rows = []
     with np.errstate(all="ignore"):
         result = fourbar.solve(fourbar.vary(scene, values | {key: each}))
-        for number, one in enumerate(members):
+        for number, one in members.items():
             rows += hold_to(question, "study", one, take_member(result, number), ask_free_bodies(one))
     return keep_worst(rows)

@@ -1,69 +1,81 @@
-"""Equilibria, by free bodies held at rest: the torque that holds them vanishes there, and nowhere between.
+"""Judge equilibria by the linkage held at rest in 320-bit arithmetic: its torque, the slope of that and its inertia.
 
-With T the torque on the independent bar at rest and J the torque per unit of its acceleration, T = -Q and
+With T the torque that holds the independent bar and J the torque per unit of its acceleration, T = -Q and
     dT/dq > 0: stable,   sqrt((dT/dq)/J)/(2 pi): the frequency.
+Free bodies held at many positions between say that no equilibrium was missed.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fourbar
 from fourbar.formulas.mobility import change_points, find_intervals, turns_fully
+from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.studies.equilibrium import Equilibrium
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.rows import AGREES, FAILS, Row
-from fourbar_validation.compare.tolerance import WELL_CONDITIONED, ErrorBound
+from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, WELL_CONDITIONED, ErrorBound, K
+from fourbar_validation.engines.description import find_centre, find_inertia
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.prediction import FIRST_ORDER
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import make_row
 
 SAMPLES = 720
-"""Of a turn of the input: between two of them the torque changes its sign at an odd number of equilibria."""
-STEP = 3e-4
-"""rad, of differences of the sixth order."""
-DIFFERENCES = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
-SOUND = 0.3
-"""Least condition of such: of a slope that grows as 1/x they leave out 36 (3e-4/x)^6, 2e-12 where x is 0.05 rad."""
+"""Positions of a turn of the input: between two of them the torque changes its sign at an odd number of equilibria."""
 OFF_GRID = 0.381966
-"""Of a sample's step: no equilibrium of a round angle falls on one."""
+"""Part of a sample's step by which the samples are moved: no equilibrium of a round angle falls on one."""
+ANGLES = ("theta", "rest", "phi", "angle")
+"""Parts of the names of inputs that are angles: they are rounded as 1 rad at least."""
+AT_LIMIT = EPS**-0.5
+"""Most roundings by which a rounding of theta_2 moves theta_4, at a limit of theta_2."""
 REST = ErrorBound(
     "rest",
-    "1e-9 of the usual torque: differences of free bodies where the condition is at least 0.3, which leave out 2e-12, "
-    "and to which rounding adds 1e-12 of what acts, which may be 1000 times the torque that is left",
-    1e-9,
+    "K eps of the sum of what moving each stored number by its own size would change, from differences in 320-bit "
+    "arithmetic; of an inertia at least of the sum of m L^2 and I",
+    K * EPS,
     conditioned=False,
 )
 
 
+class Derived(NamedTuple):
+    """A number in many digits, rounded, and the size that its error is relative to."""
+
+    value: float
+    size: float
+
+
 def equilibria(question: Question) -> Iterator[Row]:
     """Judge the torque, its slope and the frequency at every equilibrium, and that there are no others."""
-    scene, result = _at_rest(question.scene), fourbar.equilibrium(question.scene)
+    scene = _at_rest(question.scene)
+    theta_2, result = _list_samples(question), fourbar.equilibrium(question.scene)
     if result.indifferent:
         raise NotAskedError("the linkage is indifferent")
     branches: tuple[int, ...] = (1, -1)
     if turns_fully(scene.linkage) and not change_points(scene.linkage):
         branches = (int(question.solution.branch[0]),)
-    theta_2 = _around(question)
-    torques = {sign: _held(scene, 2, theta_2, sign, least=WELL_CONDITIONED) for sign in branches}
-    known = [torque[np.isfinite(torque)] for torque in torques.values()]
-    most = float(np.median(np.abs(np.concatenate(known)))) if sum(map(len, known)) else 0.0
-    if not most > 0.0:
+    torques = {branch: _hold(scene, theta_2, branch) for branch in branches}
+    if not any(np.any(torque[np.isfinite(torque)]) for torque in torques.values()):
         raise NotAskedError("no position is held by a torque")
-    missed = sum(_differing(theta_2, torque, _of_branch(result.found, sign)) for sign, torque in torques.items())
+    judged = [(each, _judge(scene, each)) for each in result.found]
+    missed = 0
+    for branch, torque in torques.items():
+        found = [(each.place.theta_2, off) for each, (off, _) in judged if each.place.branch in (branch, 0)]
+        missed += _count_missed(scene, branch, theta_2, torque, found)
     reason = f"{len(result.found)} equilibria; {SAMPLES} positions of a turn held by free bodies"
     verdict = FAILS if missed else AGREES
     yield Row(question.name, "equilibria", "exact", "missed", float(missed), 0.0, verdict, reason, float("nan"), 1.0)
-    decided = [each for each in result.found if each.stability != "undecided"]
-    rows = [(each.place.theta_2, *error) for each in decided if (error := _errors(scene, each, most)) is not None]
-    if rows:
-        where, *errors = np.array(rows).T
-        for name, error in zip(("torque", "slope", "inertia", "frequency"), errors, strict=True):
-            compared = f"{len(rows)} of {len(result.found)} equilibria"
+    for name in ("torque", "slope", "inertia", "frequency"):
+        of = [(each.place.theta_2, errors[name]) for each, (_, errors) in judged if name in errors]
+        if of:
+            where, error = np.array(of).T
+            compared = f"{len(of)} of {len(result.found)} equilibria"
             yield make_row(question, "equilibria", name, error, REST, where, compared)
 
 
@@ -77,71 +89,147 @@ def _at_rest(scene: Scene) -> Scene:
     return replace(scene, motion=Motion(), effects=effects, drive=None, drive_bar=2, points=(), tolerances=())
 
 
-def _around(question: Question) -> Array:
-    """List the input's angles at which it is held: through its sweep, or all that it reaches."""
-    swept, motion = question.solution.theta_2, question.scene.motion
-    swept = swept[np.isfinite(swept)]
-    turn, first = 2.0 * np.pi, float(swept[0])
+def _list_samples(question: Question) -> Array:
+    """List the input's angles at which it is held: all that it reaches from the first one, of a sweep those in it."""
+    solution, motion, linkage = question.solution, question.scene.motion, question.scene.linkage
+    swept, turn = solution.theta_2[solution.assembled], 2.0 * math.pi
+    if not len(swept):
+        raise NotAskedError("the linkage assembles at none of its positions")
+    first, away = float(swept[0]), math.inf
+    for start, stop in find_intervals(linkage):  # at an end of one it is in it but for rounding
+        middle = first - math.remainder(first - 0.5 * (start + stop), turn)
+        if (outside := abs(first - middle) - 0.5 * (stop - start)) < away:
+            low, high, away = middle - 0.5 * (stop - start), middle + 0.5 * (stop - start), outside
     if isinstance(motion.angle, Sweep) or motion.law is not None:
-        low, high = float(swept.min()), min(float(swept.max()), float(swept.min()) + turn)
-    else:
-        low, high = next(
-            own for own in find_intervals(question.scene.linkage) if (first - own[0]) % turn <= own[1] - own[0]
-        )
+        if turns_fully(linkage):
+            low, high = first - 2.0 * turn, first + 2.0 * turn
+        low, high = max(low, float(swept.min())), min(high, float(swept.max()), float(swept.min()) + turn)
     return np.arange(low + OFF_GRID * turn / SAMPLES, high, turn / SAMPLES)
 
 
-def _held(
-    scene: Scene, bar: int, angle: Array, branch: int, acceleration: float = 0.0, *, least: float = SOUND
-) -> Array:
-    """Ask the free bodies for the torque on a bar at rest; NaN where it is ill-conditioned or does not assemble."""
-    sign = np.full(angle.shape, branch, dtype=np.int8)
-    at = Command(angle, sign, np.zeros(angle.shape), np.full(angle.shape, acceleration), bar=bar)
+def _hold(scene: Scene, angle: Array, branch: int) -> Array:
+    """Ask the free bodies for the torque on the input at rest; NaN where it is ill-conditioned or does not assemble."""
+    at = Command(angle, np.full(angle.shape, branch, dtype=np.int8), np.zeros(angle.shape), np.zeros(angle.shape))
     with np.errstate(all="ignore"):
-        answer = FreeBody().answer(replace(scene, drive_bar=bar), at)
+        answer = FreeBody().answer(scene, at)
         if answer.refusal is not None:
             raise NotAskedError(answer.refusal)
-        theta = {2: angle, **{each: answer.quantities[f"theta_{each}"] for each in (2, 3, 4) if each != bar}}
-        theta[bar] = angle
-        one, other = (theta[each] for each in (2, 3, 4) if each != bar)
-        sound = np.abs(np.sin(other - one)) >= least
-    held: Array = np.where(sound & np.asarray(answer.assembled), answer.quantities["torque"], np.nan)
-    return held
+        if "torque" not in answer.quantities:  # nothing assembles
+            return np.full(angle.shape, np.nan)
+        sine = np.sin(answer.quantities["theta_4"] - answer.quantities["theta_3"])
+    sound = np.asarray(answer.assembled) & (np.abs(sine) >= WELL_CONDITIONED)
+    return np.where(sound, answer.quantities["torque"], np.nan)
 
 
-def _of_branch(found: tuple[Equilibrium, ...], sign: int) -> Array:
-    return np.array([each.place.theta_2 for each in found if each.place.branch == sign])
+def _count_missed(scene: Scene, branch: int, theta_2: Array, torque: Array, found: list[tuple[float, float]]) -> int:
+    """Count the steps in which the torque changes its sign and no equilibrium was found, or the reverse.
 
-
-def _differing(theta_2: Array, torque: Array, found: Array) -> int:
-    """Count the steps in which the torque changes its sign and no equilibrium was found, or the reverse."""
-    changes = torque[:-1] * torque[1:] < 0.0
-    counted = np.zeros(len(changes), dtype=int)
-    for place in found:
+    `found`: angles of the equilibria on the branch, and how far off each may be: a step that one may be in or not is
+    not counted, nor one at an end of which 320 bits find another sign than the free bodies, or none.
+    """
+    counted, open_steps = np.zeros(len(torque) - 1, dtype=int), ~np.isfinite(torque[:-1] * torque[1:])
+    for place, off in found:
         at = theta_2[0] + np.remainder(place - theta_2[0], 2.0 * np.pi)
-        index: NDArray[np.intp] = np.searchsorted(theta_2, at) - 1
+        index = int(np.searchsorted(theta_2, at)) - 1
         if 0 <= index < len(counted):
             counted[index] += 1
-    known = np.isfinite(torque[:-1]) & np.isfinite(torque[1:])
-    return int(np.count_nonzero(known & (changes != (counted % 2 == 1))))
+        first, last = (int(np.searchsorted(theta_2, end)) - 1 for end in (at - off, at + off))
+        if first != last:
+            open_steps[max(first, 0) : max(last + 1, 0)] = True
+    differing = ~open_steps & ((torque[:-1] * torque[1:] < 0.0) != (counted % 2 == 1))
+
+    def is_certain(index: int) -> bool:
+        held = _derive(scene, 2, float(theta_2[index]), branch)
+        return held is not None and held[0].value * torque[index] > 0.0 and abs(held[0].value) > K * EPS * held[0].size
+
+    return sum(is_certain(index) and is_certain(index + 1) for index in np.flatnonzero(differing).tolist())
 
 
-def _errors(scene: Scene, each: Equilibrium, most: float) -> tuple[float, float, float, float] | None:
-    """Compare torque, slope, inertia and frequency, each by its size; None where it is ill-conditioned."""
+def _judge(scene: Scene, each: Equilibrium) -> tuple[float, dict[str, float]]:
+    """Compare torque, slope, inertia and frequency; also, how far off the equilibrium may be, rad.
+
+    No errors where nothing is decided: that near to a singular position first order predicts nothing.
+    """
     place, bar = each.place, int(each.angle[-1])
     theta = {2: place.theta_2, 3: place.theta_3, 4: place.theta_4}
-    one, other = (theta[k] for k in (2, 3, 4) if k != bar)
-    branch = 1 if np.sin(other - one) > 0.0 else -1
-    around = theta[bar] + STEP * np.arange(-3.0, 4.0)
-    torque = _held(scene, bar, around, branch)
-    push = most / each.inertia if each.inertia > 0.0 else 1.0
-    pushed = _held(scene, bar, around[3:4], branch, push)
-    if not np.isfinite(torque).all():
+    one, other = (theta[k] for k in MOVING_BARS if k != bar)
+    held = _derive(scene, bar, theta[bar], 1 if np.sin(other - one) > 0.0 else -1)
+    if held is None or each.stability == "undecided":
+        return math.inf, {}
+    torque, slope, inertia = held
+    errors = {"torque": _divide(torque.value, torque.size), "slope": _divide(slope.value + each.slope, slope.size)}
+    errors["inertia"] = _divide(inertia.value - each.inertia, inertia.size)
+    part = [K * EPS * x.size / abs(x.value) if x.value else math.inf for x in (slope, inertia)]
+    off = K * EPS * torque.size / abs(slope.value) if part[0] < 1.0 else math.inf
+    if part[0] < FIRST_ORDER:
+        stable = slope.value > 0.0
+        if (each.stability == "stable") != stable or (each.frequency is not None and not stable):
+            errors["frequency"] = math.inf
+        elif stable and part[1] < FIRST_ORDER:
+            frequency = math.sqrt(slope.value / inertia.value) / (2.0 * math.pi)
+            apart = math.inf if each.frequency is None else abs(each.frequency - frequency)
+            errors["frequency"] = apart / frequency / (0.5 * sum(part)) * K * EPS
+    return off, errors
+
+
+def _divide(apart: float, size: float) -> float:
+    return abs(apart) / size if size else (0.0 if apart == 0.0 else math.inf)
+
+
+def _derive(scene: Scene, bar: int, angle: float, branch: int) -> tuple[Derived, Derived, Derived] | None:
+    """Derive the torque on a bar held at rest, its slope over the bar's angle, and the bar's inertia.
+
+    None where there are none, or where the rounding of the inputs decides the angles of the others. The bar's angle
+    may be off by as much as makes theta_2 round otherwise: a place is stated by theta_2.
+    """
+    from flint import arb
+
+    from fourbar_validation.engines.balls import OF_PIECE, STEP_BITS, compute_outputs, make_balls
+
+    given: Any = {f"theta_{bar}": angle, f"omega_{bar}": 0.0}
+    scene = replace(scene, motion=Motion(**given), drive_bar=bar)
+    x = make_balls(scene, angle)
+    x |= {f"{name}_{k}": arb(1) for k, load in enumerate(scene.loads) if load.table for name in OF_PIECE}
+    step, commanded = arb(2) ** -STEP_BITS, f"theta_{bar}"
+
+    def derive(**changed: Any) -> tuple[list[Any], dict[str, Any], Any] | None:
+        """Return torque, slope, inertia and angles; all outputs; and the change of theta_2 per rad of the bar."""
+        given = x | changed
+        turned = [given | {commanded: given[commanded] + side * step} for side in (1, -1)]
+        answers = [compute_outputs(scene, branch, each) for each in (given, *turned, given | {f"alpha_{bar}": arb(1)})]
+        held, ahead, behind, pushed = (answer if answer and "torque" in answer else None for answer in answers)
+        if held is None or ahead is None or behind is None or pushed is None:
+            return None
+        slope = (ahead["torque"] - behind["torque"]) / (2 * step)
+        angles = [held.get(f"theta_{k}", given[commanded]) for k in MOVING_BARS]
+        numbers = [held["torque"], slope, pushed["torque"] - held["torque"], *angles]
+        return numbers, held, (ahead.get("theta_2", step) - held.get("theta_2", 0)) / step
+
+    base = derive()
+    if base is None:
         return None
-    slope = float(DIFFERENCES @ torque) / STEP
-    J = float(pushed[0] - torque[3]) / push
-    off = abs(slope + each.slope) / (most + abs(slope)), abs(J - each.inertia) / max(abs(J), each.inertia, 1e-300)
-    frequency = np.sqrt(slope / J) / (2.0 * np.pi) if slope > 0.0 and J > 0.0 else 0.0
-    ours = 0.0 if each.frequency is None else each.frequency
-    size = max(frequency, ours) * max(1.0, most / max(abs(slope), 1e-300)) or 1.0
-    return abs(float(torque[3])) / most, off[0], off[1], abs(frequency - ours) / size
+    numbers, outputs, rate = base
+    sizes = np.zeros(len(numbers))
+    for name, value in x.items():
+        weight = max(abs(float(value)), float(any(part in name for part in ANGLES)))
+        if name == commanded:
+            weight = max(weight, min(AT_LIMIT, 1.0 / max(abs(float(rate.mid())), 1.0 / AT_LIMIT)))
+        moved = next((m for side in (1, -1) if weight and (m := derive(**{name: value + side * weight * step}))), None)
+        if moved is not None:
+            sizes += [abs(float(((own - of) / step).mid())) for own, of in zip(moved[0], numbers, strict=True)]
+    if not np.isfinite(sizes).all() or ROUNDINGS * EPS * sizes[3:].max() >= FIRST_ORDER * float(outputs["condition"]):
+        return None
+    sizes[2] = max(sizes[2], _sum_inertias(scene))
+    torque, slope, inertia = (
+        Derived(float(x.mid()), float(size)) for x, size in zip(numbers[:3], sizes[:3], strict=True)
+    )
+    return torque, slope, inertia
+
+
+def _sum_inertias(scene: Scene) -> float:
+    """Sum m L^2 and I of the bars, L the linkage's longest reach, and the inertias of flywheels."""
+    linkage: FourBar = scene.linkage
+    bars = [linkage.bar(number) for number in MOVING_BARS]
+    reach = max(linkage.lengths) + max(abs(find_centre(bar)[0]) for bar in bars)
+    wheels = (getattr(effect, "inertia", 0.0) for effect in scene.effects if effect.key == "flywheel")
+    return sum(bar.mass * reach**2 + find_inertia(bar) for bar in bars) + sum(wheels)

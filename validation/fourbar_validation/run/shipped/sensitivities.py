@@ -27,6 +27,11 @@ from fourbar_validation.run.shipped.variants import (
 
 STEP = 1e-4
 """Of each number, of an angle in rad: what the fourth order leaves out and what rounding adds are then alike."""
+SMALL = 1e-8
+"""Step of the first order that tolerances are held to: rounding adds 1e-7, and what bends a curve nothing."""
+CONVERGED = 1e-5
+"""Most that the fourth order may change the second by, in parts of the sum of the absolute terms: it leaves out some
+hundred times the square of that. Elsewhere a linkage that does not assemble is too near for differences."""
 DIFFERENCES = ErrorBound(
     "differences",
     "1e-7 of the sum of the absolute terms: the fourth-order difference of free bodies at positions whose condition is "
@@ -52,7 +57,7 @@ SLIGHT = 1e-3
 MOST = 3
 """Tolerances of a scene that are judged together: three points each."""
 GIVEN = 1e-4
-"""Of a length: the tolerance that the run gives it."""
+"""Of the shortest bar: the tolerance that the run gives it."""
 NODES = {False: (0.6**0.5, 5.0 / 18.0), True: (3.0**0.5, 1.0 / 6.0)}
 """Outer nodes, in parts of the width, and weights of Gauss's three points of an even and of a normal distribution."""
 
@@ -74,10 +79,11 @@ def sensitivity(question: Question) -> list[Row]:
     rows = []
     for name in (name for name in (*UNKNOWNS, LINE.value) if name in result.by):
         first, second = (_subtract(name, up[name], down[name]) for up, down in (near, far))
-        slope = (8.0 * first - second) / (12.0 * STEP)
+        slope, coarse = (8.0 * first - second) / (12.0 * STEP), first / (2.0 * STEP)
         terms = np.array([step * result.of(name, key) for key, step in directions.items()])
         size = magnitude(result.value(name)) + sum(magnitude(term) for term in terms)
         known = np.array([status == "ok" for status in result.status]) | (name not in FORCES)
+        known &= divide(magnitude(slope - coarse), size) <= CONVERGED
         error = np.where(known, divide(magnitude(terms.sum(axis=0) - slope), size), 0.0)
         if known.any():
             reason = f"along one direction in {len(directions)} numbers"
@@ -88,8 +94,8 @@ def sensitivity(question: Question) -> list[Row]:
 def tolerances(question: Question) -> list[Row]:
     """Judge the spread that a few tolerances make: the scene's own, or those that the run gives it."""
     scene = take_few(question)
-    lengths = {name: getattr(scene.linkage, name).length for name in ("input", "coupler", "output")}
-    given = (fourbar.Tolerance(f"lengths.{name}", GIVEN * x, name == "output") for name, x in lengths.items())
+    width, names = GIVEN * min(scene.linkage.lengths), ("input", "coupler", "output")
+    given = (fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names)
     scene = replace(scene, tolerances=(scene.tolerances or tuple(given))[:MOST])
     result, expected = fourbar.tolerances(scene, SAMPLES), _compute_expected(scene)
     errors: dict[str, Array] = {}
@@ -110,6 +116,8 @@ class Expected(NamedTuple):
 
     deviation: Array
     """By cubature of the linkages themselves."""
+    skew: Array
+    """How far that moves the mean from the nominal value."""
     first_order: Array
     worst: Array
     low: Array
@@ -134,7 +142,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
         weights.append(math.prod(w for _, w in node))
     slopes = []
     for each in scene.tolerances:
-        h = max(STEP * abs(numbers[each.key].number), STEP * each.width)
+        h = SMALL * max(abs(numbers[each.key].number), each.width)
         up, down = (changed({each.key: change}) for change in (h, -h))
         slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
     rng, w = np.random.default_rng(0), np.array(weights)[:, None]
@@ -149,6 +157,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
         low, high = np.percentile(np.array(drawn).T @ (slope * widths), (1.0, 99.0), axis=0)
         result[part] = Expected(
             np.sqrt((w * (values - mean) ** 2).sum(axis=0)),
+            np.abs(mean),
             np.sqrt((variances * (slope * widths) ** 2).sum(axis=0)),
             np.abs(slope * reaches).sum(axis=0),
             low,
@@ -160,6 +169,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
 def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
     """By what part the figures of a spread are off, (n,)."""
     bent = divide(np.abs(expected.deviation - expected.first_order), expected.deviation)
+    bent = np.maximum(bent, divide(expected.skew, expected.deviation) ** 2)
     every, near, straight = bent >= 0.0, bent <= NEARLY_STRAIGHT, bent <= STRAIGHT
     pairs = [
         (spread.worst, expected.worst, expected.worst, 1.0, every),

@@ -1,6 +1,7 @@
 """What the checks of something shipped share: scenes with other numbers, and the rows of a comparison."""
 
 import json
+import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -93,8 +94,14 @@ def find_stated(scene: Scene, keys: Iterable[str]) -> dict[str, FileNumber]:
 def move_numbers(scene: Scene, changes: Mapping[str, float]) -> Scene:
     """Change some numbers of a scene by so much, through the text of its file: keys as there.
 
-    motion.theta_2 moves every position.
+    motion.theta_2 moves every position. Raises NotAskedError where the changed linkage can never assemble.
     """
+    lengths = [
+        length + changes.get(f"lengths.{bar}", 0.0)
+        for bar, length in zip(("ground", "input", "coupler", "output"), scene.linkage.lengths, strict=True)
+    ]
+    if max(lengths) >= 0.5 * math.fsum(lengths):
+        raise NotAskedError("a changed linkage can never assemble")
     document = tomllib.loads(dump(scene))
     for key, change in changes.items():
         table, last = _place(document, key)
