@@ -25,6 +25,7 @@ PIN_FORCE = dict(zip(PINS, PIN_FORCES, strict=True))
 ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
 """The pins at both ends of each moving bar, that which it is measured from first."""
 FIRST_PIN = {bar: first for bar, (first, _) in ENDS.items()}
+SECOND_PIN = {1: "O4", **{bar: second for bar, (_, second) in ENDS.items()}}
 NO_NUMBERS = (bool, str, bytes, complex)
 """What `float` may read all the same."""
 A_BRANCH = "must be +1 (open) or -1 (crossed)"

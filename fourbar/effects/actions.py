@@ -1,11 +1,12 @@
 """What loads and effects do to the bars: forces and moments, and the generalised force that they make."""
 
 from collections.abc import Callable, Iterable
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from fourbar.formulas.arithmetic import Number, cross, is_any, sign
+from fourbar.formulas.arithmetic import Number, cross, is_any, select, sign
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Bodies, Body, PinForces, Wrenches
 from fourbar.linkage import PINS, FourBar
@@ -52,7 +53,7 @@ class Actions:
         self.couples: dict[str, Any] = {}
         """Between the two bars that meet at a pin, on the second of them, N m."""
         self.through: dict[str, Any] = {}
-        """Forces between bars 2 and 3, 3 and 4, as if through their pin, on the second of them, complex, N."""
+        """Forces between two bars that meet at a pin, as if through it, on the second of them, complex, N."""
 
     def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
         """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.
@@ -78,16 +79,17 @@ class Actions:
     def pull(self, start: Any, end: Any, force: Number) -> None:
         """Add a force (complex, N, world axes) at a point of a bar, and its opposite at one of another bar.
 
-        Between bars 2 and 3, or 3 and 4, it goes through their pin and leaves a couple: it is in no sum of another bar.
+        It acts along the line of the two points. Between bars that meet at a pin it goes through the pin and leaves a
+        couple, by the arm of the point that is nearer to the pin; it is in no sum of another bar.
         """
-        pin = next((pin for pin in ("A", "B") if {start.bar, end.bar} == {*PINS[pin]}), None)
+        pin = find_common_pin(start.bar, end.bar)
         if pin is None:
             self.pull_ends(start, end, force)
             return
-        point, sense = (end, -1.0) if end.bar > start.bar else (start, 1.0)
-        on_second, arm = self.rounded(sense * force, turned=True), point.arm(self.state)
-        if pin == "B":  # which is no first pin
-            arm = self.rounded(point.of(self.state) - self.state.lengths.c, turned=True) * self.state.at.u4
+        on_second = self.rounded(force if start.bar > end.bar else -force, turned=True)
+        (one, square), (other, other_square) = (p.from_pin(pin, self.state, self.rounded) for p in (start, end))
+        by_one, by_other = one * self.state.direction(start.bar), other * self.state.direction(end.bar)
+        arm = select(square < other_square, by_one, by_other)
         self.through[pin] = self.through[pin] + on_second if pin in self.through else on_second
         self.couple(pin, cross(-on_second, arm))
 
@@ -167,5 +169,11 @@ class Actions:
         """Return what the pins themselves carry of the forces between their bars."""
         if not self.through:
             return pins
-        A, B = (self.through.get(pin, 0.0) for pin in ("A", "B"))
-        return pins._replace(F32=pins.F32 + A, F43=pins.F43 + B)
+        O2, A, B, O4 = (self.through.get(pin, 0.0) for pin in PINS)
+        return PinForces(pins.F12 - O2, pins.F32 + A, pins.F43 + B, pins.F14 - O4)
+
+
+@cache
+def find_common_pin(one: int, other: int) -> str | None:
+    """Return the pin at which two bars meet, or None if they have none in common."""
+    return next((pin for pin, bars in PINS.items() if {one, other} == {*bars}), None)

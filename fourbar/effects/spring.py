@@ -1,18 +1,19 @@
 """Linear springs, each between two points of two bars, the ground included."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions
+from fourbar.effects.actions import Actions, keep_number
 from fourbar.effects.effect import Effect
 from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import is_any, namespace, polar, select
+from fourbar.formulas.arithmetic import dot, is_any, namespace, polar, select
 from fourbar.formulas.motion import State
-from fourbar.linkage import BAR_NAMES, FourBar, require, require_whole
+from fourbar.linkage import BAR_NAMES, SECOND_PIN, FourBar, require, require_whole
 from fourbar.quantities import NO_DIRECTION, OK
 
 COINCIDE = 16.0 * 2.0**-52
@@ -40,6 +41,14 @@ class SpringEnd(NamedTuple):
     def of(self, state: State) -> Any:
         """In the bar's frame, in the numbers of a state's library."""
         return self.in_bar if namespace(state.at.u2) is np else polar(self.distance, self.angle)
+
+    def from_pin(self, pin: str, state: State, rounded: Callable[..., Any] = keep_number) -> tuple[Any, Any]:
+        """Return the vector from one of the bar's pins in the bar's frame, complex, m, and the square of its length."""
+        vector = rounded(self.of(state), turned=True)
+        if pin != SECOND_PIN[self.bar]:
+            return vector, self.distance * self.distance
+        vector = vector - state.lengths[self.bar - 1]
+        return vector, dot(vector, vector)
 
     def arm(self, state: State) -> Any:
         """From the bar's first pin, complex, m, world axes."""

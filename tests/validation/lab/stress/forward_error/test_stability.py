@@ -153,7 +153,7 @@ def test_kites_that_stand_still_beside_no_exact_directions() -> None:
 
 
 def test_error_bars_are_neither_too_small_nor_useless(tallies: dict[str, Tally]) -> None:
-    for bar, families in (("torque_error", 9), ("drive_force_error", 2), ("force_error", 11)):
+    for bar, families in (("torque_error", 10), ("drive_force_error", 3), ("force_error", 12)):
         judged = [tally for tally in tallies.values() if bar in tally.too_small]
         assert len(judged) == families and max(tally.too_small[bar] for tally in judged) <= TOO_SMALL
         assert is_by_chance(sum(tally.too_large[bar] for tally in judged), SAMPLES * families)

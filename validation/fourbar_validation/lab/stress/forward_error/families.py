@@ -1,5 +1,6 @@
 """Families of hard positions, each a generator of scenes of one position from a random generator alone."""
 
+import cmath
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fourbar.effects import LinearDrive, Load, Spring, SpringEnd, Springs, Table, Torsion
-from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
+from fourbar.linkage import MOVING_BARS, PINS, SECOND_PIN, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar.scene.point import Point
@@ -219,6 +220,33 @@ def _put_cylinder(scene: Scene, rng: np.random.Generator, one: int, other: int) 
     return replace(scene, drive_bar=None, drive=LinearDrive(*ends))  # type: ignore[arg-type]
 
 
+def near_pins(rng: np.random.Generator) -> Scene:
+    """Draw a spring or a cylinder with an end at 1e-1 to 1e-11 m from the pin that joins its two bars, or a load there.
+
+    The line of the force then passes the pin at that distance, though its other end lies far off.
+    """
+    scene, pin = massless(rng), str(rng.choice(list(PINS)))
+    near = {"O2": 1, "A": 3, "B": 3, "O4": 4}[pin]
+    (far,) = {*PINS[pin]} - {near}
+    distance, angle = float(10.0 ** rng.uniform(-11.0, -1.0)), float(rng.uniform(-3.0, 3.0))
+    if pin == SECOND_PIN[near]:
+        distance, angle = cmath.polar(scene.linkage.lengths[near - 1] - cmath.rect(distance, angle))
+    ends = [SpringEnd(near, distance, angle), SpringEnd(far, *rng.uniform((0.1, -3.0), (1.0, 3.0)).tolist())]
+    if rng.random() < 0.5:
+        ends.reverse()
+    kind = rng.integers(0, 3)
+    if kind == 0 and near in MOVING_BARS:
+        frame, force = str(rng.choice(["world", "bar"])), (1.0, float(rng.uniform(-3.0, 3.0)))
+        bars = [scene.linkage.bar(bar) for bar in MOVING_BARS]
+        bars[near - 2] = replace(bars[near - 2], centre=(0.0, 0.0))
+        loaded = FourBar(scene.linkage.ground, *bars, scene.linkage.ground_angle)
+        return replace(scene, linkage=loaded, loads=(Load(near, force, (distance, angle), 0.0, frame),))
+    if kind == 1:
+        return replace(random(rng), drive_bar=None, drive=LinearDrive(*ends))
+    stiffness, length = float(rng.uniform(10.0, 1000.0)), float(rng.uniform(0.0, 2.0))
+    return replace(scene, effects=(Springs((Spring(*ends, stiffness, length),)),))
+
+
 FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "random": random,
     "limit": limit,
@@ -231,4 +259,5 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
     "tables": tables,
     "drives": drives,
     "strokes": strokes,
+    "near_pins": near_pins,
 }
