@@ -1,6 +1,7 @@
 """Texts with units where a scene is described in Python: the same numbers as SI gives, and one line for a mistake."""
 
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import fourbar
 from fourbar.effects import SpringEnd, Table
 from fourbar.errors import InputError
 from fourbar.files import loads
+from fourbar.quantities.units import DEFINITIONS, to_si
 
 ENDS = SpringEnd(1, 0.1, 0.0), SpringEnd(4, 0.2, np.pi)
 SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
@@ -66,3 +68,75 @@ def test_a_motion_is_written_as_in_the_file() -> None:
 def test_a_mistake_is_one_line(make: Callable[[], object], words: str) -> None:
     with pytest.raises(InputError, match=words):
         make()
+
+
+PI = Fraction(314159265358979323846264338327950288419716939937510582097494459, 10**62)
+"""To 63 digits (A000796 of the On-Line Encyclopedia of Integer Sequences)."""
+FOOT, POUND, GRAVITY = Fraction(3048, 10_000), Fraction(45_359_237, 100_000_000), Fraction(980_665, 100_000)
+"""m; kg; m/s^2: exact by definition."""
+UNITS: dict[str, tuple[str, Fraction | int]] = {
+    **dict.fromkeys(("meter", "m", "metre"), ("m", 1)),
+    **dict.fromkeys(("inch", "in", "inches"), ("m", FOOT / 12)),
+    **dict.fromkeys(("foot", "ft", "feet"), ("m", FOOT)),
+    **dict.fromkeys(("yard", "yd"), ("m", 3 * FOOT)),
+    **dict.fromkeys(("second", "s", "sec"), ("s", 1)),
+    **dict.fromkeys(("minute", "min"), ("s", 60)),
+    **dict.fromkeys(("hour", "h"), ("s", 3600)),
+    **dict.fromkeys(("gram", "g"), ("kg", Fraction(1, 1000))),
+    **dict.fromkeys(("tonne", "t"), ("kg", 1000)),
+    **dict.fromkeys(("pound", "lb"), ("kg", POUND)),
+    **dict.fromkeys(("ounce", "oz"), ("kg", POUND / 16)),
+    **dict.fromkeys(("radian", "rad"), ("rad", 1)),
+    **dict.fromkeys(("degree", "deg", "°"), ("rad", PI / 180)),
+    **dict.fromkeys(("gradian", "grad", "gon"), ("rad", PI / 200)),
+    **dict.fromkeys(("revolution", "rev", "turn", "r"), ("rad", 2 * PI)),
+    "rpm": ("rad/s", 2 * PI / 60),
+    "rps": ("rad/s", 2 * PI),
+    **dict.fromkeys(("newton", "N"), ("kg m/s^2", 1)),
+    **dict.fromkeys(("standard_gravity", "g_0", "g0"), ("m/s^2", GRAVITY)),
+    **dict.fromkeys(("kilogram_force", "kgf", "kp"), ("N", GRAVITY)),
+    **dict.fromkeys(("pound_force", "lbf"), ("N", POUND * GRAVITY)),
+    **dict.fromkeys(("ounce_force", "ozf"), ("N", POUND * GRAVITY / 16)),
+    "slug": ("kg", POUND * GRAVITY / FOOT),
+    **dict.fromkeys(("newton_meter", "Nm"), ("N m", 1)),
+    **dict.fromkeys(("newton_centimeter", "Ncm"), ("N m", Fraction(1, 100))),
+    **dict.fromkeys(("newton_millimeter", "Nmm"), ("N m", Fraction(1, 1000))),
+    **dict.fromkeys(("joule", "J"), ("kg m^2/s^2", 1)),
+    **dict.fromkeys(("watt", "W"), ("kg m^2/s^3", 1)),
+    **dict.fromkeys(("horsepower", "hp"), ("W", 550 * FOOT * POUND * GRAVITY)),
+    **dict.fromkeys(("metric_horsepower", "PS"), ("W", 75 * GRAVITY)),
+}
+"""Each unit in SI units: A. Thompson, B. N. Taylor, Guide for the Use of the SI, NIST SP 811 (2008), tables 1 to 8 and
+appendix B.8; slug, hp and PS by their definitions there."""
+PREFIXES: dict[str, int] = {
+    **dict.fromkeys(("nano", "n"), -9),
+    **dict.fromkeys(("micro", "\u00b5", "\u03bc", "u"), -6),
+    **dict.fromkeys(("milli", "m"), -3),
+    **dict.fromkeys(("centi", "c"), -2),
+    **dict.fromkeys(("deci", "d"), -1),
+    **dict.fromkeys(("deca", "da"), 1),
+    **dict.fromkeys(("kilo", "k"), 3),
+    **dict.fromkeys(("mega", "M"), 6),
+    **dict.fromkeys(("giga", "G"), 9),
+}
+"""Powers of ten: NIST SP 811, table 5."""
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_every_unit_is_its_fraction(name: str) -> None:
+    unit, exact = UNITS[name]
+    assert to_si(f"1 {name}", unit) == float(exact)
+    assert to_si(f"0.7 {name}", unit) == float(exact * Fraction(7, 10))
+
+
+@pytest.mark.parametrize("prefix", PREFIXES)
+def test_every_prefix_is_its_power_of_ten(prefix: str) -> None:
+    assert to_si(f"3 {prefix}N", "N") == float(3 * Fraction(10) ** PREFIXES[prefix])
+
+
+def test_the_tables_name_every_unit_and_prefix() -> None:
+    lines = [line.split(" = ") for line in DEFINITIONS.strip().splitlines() if not line.startswith(("#", "pi = "))]
+    names = {name for name, _, *others in lines for name in (name, *others)}
+    prefixes = {name for name in names if name.endswith("-")}
+    assert names - prefixes == set(UNITS)
+    assert prefixes == {f"{prefix}-" for prefix in PREFIXES}

@@ -231,20 +231,19 @@ def near_pins(rng: np.random.Generator) -> Scene:
     distance, angle = float(10.0 ** rng.uniform(-11.0, -1.0)), float(rng.uniform(-3.0, 3.0))
     if pin == SECOND_PIN[near]:
         distance, angle = cmath.polar(scene.linkage.lengths[near - 1] - cmath.rect(distance, angle))
-    ends = [SpringEnd(near, distance, angle), SpringEnd(far, *rng.uniform((0.1, -3.0), (1.0, 3.0)).tolist())]
+    start, end = SpringEnd(near, distance, angle), SpringEnd(far, *rng.uniform((0.1, -3.0), (1.0, 3.0)).tolist())
     if rng.random() < 0.5:
-        ends.reverse()
+        start, end = end, start
     kind = rng.integers(0, 3)
     if kind == 0 and near in MOVING_BARS:
-        frame, force = str(rng.choice(["world", "bar"])), (1.0, float(rng.uniform(-3.0, 3.0)))
-        bars = [scene.linkage.bar(bar) for bar in MOVING_BARS]
-        bars[near - 2] = replace(bars[near - 2], centre=(0.0, 0.0))
-        loaded = FourBar(scene.linkage.ground, *bars, scene.linkage.ground_angle)
-        return replace(scene, linkage=loaded, loads=(Load(near, force, (distance, angle), 0.0, frame),))
+        bars = {bar: replace(scene.linkage.bar(bar), centre=(0.0, 0.0)) for bar in MOVING_BARS}
+        force, frame = (1.0, float(rng.uniform(-3.0, 3.0))), str(rng.choice(["world", "bar"]))
+        linkage = FourBar(scene.linkage.ground, bars[2], bars[3], bars[4], scene.linkage.ground_angle)
+        return replace(scene, linkage=linkage, loads=(Load(near, force, (distance, angle), 0.0, frame),))
     if kind == 1:
-        return replace(random(rng), drive_bar=None, drive=LinearDrive(*ends))
+        return replace(random(rng), drive_bar=None, drive=LinearDrive(start, end))  # type: ignore[arg-type]
     stiffness, length = float(rng.uniform(10.0, 1000.0)), float(rng.uniform(0.0, 2.0))
-    return replace(scene, effects=(Springs((Spring(*ends, stiffness, length),)),))
+    return replace(scene, effects=(Springs((Spring(start, end, stiffness, length),)),))
 
 
 FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
