@@ -17,7 +17,7 @@ from fourbar.errors import DependencyError, say_install
 def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) -> None:
     """Change a scene in the browser, and see torque and forces follow; without SCENE a new one.
 
-    Ctrl-C ends it, and so do 10 s after the last page has gone.
+    Ctrl-C ends it, and so does a minute and a half without a page.
     """
     from fourbar.writing import require_file
 

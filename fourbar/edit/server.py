@@ -3,11 +3,11 @@
 import asyncio
 import hmac
 import json
+import os
 import signal
 import socket
 import sys
 import threading
-import webbrowser
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -15,11 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from tornado.httpserver import HTTPServer
+from tornado.ioloop import IOLoop
+from tornado.iostream import IOStream
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from fourbar.edit.reply import pack_frame
-from fourbar.edit.session import Session
+from fourbar.edit.redirect import Redirect
+from fourbar.edit.reply import evaluate_scene, pack_frame
+from fourbar.edit.session import SceneState, Session
 from fourbar.edit.witness import HarnessRun
 from fourbar.errors import FourBarError, InputError
 from fourbar.show.animate import write_page
@@ -31,8 +34,14 @@ LARGEST_REQUEST = 2_000_000
 MOST_PAGES = 16
 MOST_WAITING = 100
 """Requests of all pages that wait; of a drag only the latest does."""
-GONE = 10.0
-"""s, after which the server ends when the last page has gone."""
+MOST_CONNECTIONS = 64
+"""Connections besides those of pages; where there are more the oldest one is closed."""
+IDLE = 10.0
+"""Time within which a request must be complete, s."""
+PAUSE = 0.5
+"""Time without new connections where the process can open no more files, s."""
+GONE = 90.0
+"""Time from the last page's going to the server's end, s: a page in the background looks for it once a minute."""
 SETTLED = 0.15
 """s without a change, after which error bars follow."""
 STILL = 1.0
@@ -82,7 +91,9 @@ class Workbench:
         data = pack_frame(about)
         for line in [to] if to else list(self.pages):
             with suppress(WebSocketClosedError):
-                line.write_message(data, binary=True)
+                # a page may close while it is sent: that is no error
+                sent = asyncio.ensure_future(line.write_message(data, binary=True))
+                sent.add_done_callback(lambda done: done.cancelled() or done.exception())
 
     def take(self, line: "PageLine", asked: dict[str, Any]) -> None:
         """Put a request in the queue; a later one of the same gesture takes the place of one that waits."""
@@ -128,52 +139,65 @@ class Workbench:
             self.loop.call_soon_threadsafe(self.tell, {"note": f"the state file cannot be written: {error}"})
 
     async def _settle(self) -> None:
-        """Send the error bars, unless something has changed again."""
-        with suppress(FourBarError):
-            about = await self.loop.run_in_executor(self.one, lambda: self.session.answer(settled=True))
-            if not self.waiting:
-                self.tell(about)
-                self.later("sample", STILL, lambda: asyncio.create_task(self._sample(about["data"])))
+        """Send error bars and summary, unless something has changed again; changes are answered meanwhile."""
+        state, units = self.session.now, self.session.units
 
-    async def _sample(self, data: dict[str, Any]) -> None:
+        def is_present() -> bool:
+            return state is self.session.now and units is self.session.units
+
+        def evaluate() -> dict[str, Any] | None:
+            return evaluate_scene(state.scene, state.plain, units, settled=True) if is_present() else None
+
+        def describe(data: dict[str, Any]) -> dict[str, Any] | None:
+            return self.session.describe(data, settled=True) if is_present() else None
+
+        try:
+            data = await self.loop.run_in_executor(self.aside, evaluate)
+            about = data and await self.loop.run_in_executor(self.one, describe, data)
+        except FourBarError as error:
+            self.tell({"note": str(error)})
+            return
+        if about and not self.waiting:
+            self.tell(about)
+            self.later("sample", STILL, lambda: asyncio.create_task(self._sample(state, about["data"])))
+
+    async def _sample(self, state: SceneState, data: dict[str, Any]) -> None:
         """Send what the tolerances do, unless something has changed meanwhile."""
-        scene = self.session.now.scene
+        scene = state.scene
 
         def give_up(_: float) -> None:
-            if self.ended.is_set() or scene is not self.session.now.scene:
+            if self.ended.is_set() or state is not self.session.now:
                 raise FourBarError("nobody waits for these samples any more")
 
         if scene.tolerances:
             with suppress(FourBarError):
                 places = data["over"]["values"] or data["theta_2"]
                 found = await self.loop.run_in_executor(self.aside, collect_tolerances, scene, places, give_up)
-                if scene is self.session.now.scene:
+                if state is self.session.now:
                     self.tell({"tolerances": found})
 
-    async def serve(self, port: int, browse: bool) -> None:
-        """Serve until all pages have gone, or until Ctrl-C."""
+    async def serve(self, port: int, redirect: Redirect | None = None, *, browse: bool = False) -> None:
+        """Serve until all pages have gone, or until Ctrl-C; `redirect` leads browsers and other servers here."""
         try:
             listening = socket.create_server((LOOPBACK, port))
         except (OSError, OverflowError) as error:
             raise InputError("--port", port, f"cannot be listened to: {error}") from None
         listening.setblocking(False)
         own = listening.getsockname()[1]
-        server = HTTPServer(
-            make_application(self, own),
-            **{"max_body_size": LARGEST_REQUEST, "max_buffer_size": 2 * LARGEST_REQUEST, "max_header_size": 16_384},
-        )
-        server.add_socket(listening)
+        self.entrance = Entrance(make_application(self, own), listening)
         for name in (signal.SIGINT, signal.SIGTERM):
             with suppress(NotImplementedError):  # Windows: KeyboardInterrupt
                 self.loop.add_signal_handler(name, self.ended.set)
         address = f"http://{LOOPBACK}:{own}/{self.session.token}/"
         self.one.submit(self._keep)
         self.address.set_result(address)
+        if redirect is not None:
+            redirect.write(address)
         print(address, flush=True)
-        if browse:
-            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+        if browse and redirect is not None:
+            threading.Thread(target=redirect.open, daemon=True).start()
         await self.ended.wait()
-        server.stop()
+        self.entrance.close()
         gone = not self.pages
         self.waiting.clear()
         if self.working is not None:
@@ -188,6 +212,55 @@ class Workbench:
         await self.loop.run_in_executor(self.one, lambda: self.session.end(gone=gone))
         self.one.shutdown()
         self.aside.shutdown(wait=False, cancel_futures=True)
+
+
+class Entrance:
+    """The listening socket: connections that say nothing are closed after a while, the oldest where they are many."""
+
+    def __init__(self, application: Application, listening: socket.socket) -> None:
+        self.server = HTTPServer(
+            application,
+            max_body_size=LARGEST_REQUEST,
+            max_header_size=16_384,
+            idle_connection_timeout=IDLE,
+            body_timeout=IDLE,
+        )
+        self.listening, self.streams = listening, list[IOStream]()
+        self._open()
+
+    def _open(self) -> None:
+        if self.listening.fileno() >= 0:
+            IOLoop.current().add_handler(self.listening, self._accept, IOLoop.READ)
+
+    def _accept(self, *_: Any) -> None:
+        try:
+            connection, peer = self.listening.accept()
+        except (BlockingIOError, ConnectionAbortedError):
+            return
+        except OSError:  # no more files (EMFILE, ENFILE): the socket would offer the connection again and again
+            IOLoop.current().remove_handler(self.listening)
+            IOLoop.current().call_later(PAUSE, self._open)
+            self._close_oldest(MOST_CONNECTIONS // 4)
+            return
+        if len(self.streams) >= MOST_CONNECTIONS:
+            self.streams = [stream for stream in self.streams if not stream.closed()]
+            self._close_oldest(len(self.streams) - MOST_CONNECTIONS + 1)
+        self.streams.append(IOStream(connection, max_buffer_size=2 * LARGEST_REQUEST))
+        self.server.handle_stream(self.streams[-1], peer)
+
+    def _close_oldest(self, number: int) -> None:
+        for stream in self.streams[: max(number, 0)]:
+            stream.close()
+        self.streams = self.streams[max(number, 0) :]
+
+    def spare(self, stream: Any) -> None:
+        """Leave a connection open however many others come: that of a page."""
+        self.streams = [one for one in self.streams if one is not stream]
+
+    def close(self) -> None:
+        """Take no more connections."""
+        IOLoop.current().remove_handler(self.listening)
+        self.listening.close()
 
 
 class Guarded(RequestHandler):
@@ -217,6 +290,11 @@ class Guarded(RequestHandler):
     def write_error(self, status_code: int, **details: Any) -> None:
         """Say no more than the status."""
         self.finish(f"{status_code}\n")
+
+    def log_exception(self, kind: Any, error: Any, traceback: Any) -> None:
+        """Say in one line what went wrong here; what was wrong with the request was its sender's."""
+        if not isinstance(error, HTTPError):
+            print(f"error: {kind.__name__}: {error}", file=sys.stderr)
 
 
 class Page(Guarded):
@@ -261,6 +339,7 @@ class PageLine(WebSocketHandler, Guarded):
     def open(self, *args: str, **kwargs: str) -> None:
         """Welcome the page."""
         self.set_nodelay(True)
+        self.bench.entrance.spare(getattr(self.ws_connection, "stream", None))
         self.bench.join(self)
 
     def on_message(self, message: str | bytes) -> None:
@@ -305,14 +384,24 @@ class Nothing(RequestHandler):
 def edit(path: Path, exports: Path, port: int = 0, *, browse: bool = True) -> None:
     """Open a scene in the workbench, and serve it until all pages have gone.
 
-    A file that does not exist is begun; exports and reports go to the folder `exports`; port 0: any that is free.
+    A file that does not exist is begun; exports and reports go to the folder `exports`; port 0: any that is free. Where
+    another process serves the file, its address is printed and its page opened.
     """
+    redirect = Redirect(Path(os.path.realpath(path)))
+    if not redirect.claim():
+        print(redirect.read(), flush=True)
+        if browse:
+            redirect.open()
+        return
 
     async def run() -> None:
-        await Workbench(session).serve(port, browse)
+        await Workbench(session).serve(port, redirect, browse=browse)
 
-    session = Session(path, exports)
-    session.answer()  # what assembles nowhere has no page
-    with suppress(KeyboardInterrupt):
-        asyncio.run(run())
+    try:
+        session = Session(path, exports)
+        session.answer()  # what assembles nowhere has no page
+        with suppress(KeyboardInterrupt):
+            asyncio.run(run())
+    finally:
+        redirect.remove()
     sys.stdout.flush()

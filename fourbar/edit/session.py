@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-import re
+import os
 import secrets
 import tomllib
 from collections.abc import Callable
@@ -25,15 +25,18 @@ from fourbar.solution import Conversion
 from fourbar.studies.keys import list_entries, read_place
 from fourbar.writing import write_bytes
 
-SCHEMA = "fourbar-edit/1"
+SCHEMA = "fourbar-edit/2"
 ENDING = ".edit"
 MOST_STATES = 500
-"""That are kept for undo."""
+"""Number of states that undo and redo reach."""
+MOST_CHARACTERS = 10_000_000
+"""Characters of all these states; with those that are kept to compare they stay below `LARGEST_STATE` as JSON."""
+MOST_KEPT = 20
+"""Number of states that are kept to compare with, the one at the start among them."""
 MOST_POSITIONS = 100_000
 """That a change solves anew, in a second; a slip of the finger on the number of steps is not to fill the memory."""
 LARGEST_STATE = 100_000_000
 """Bytes of a state file."""
-TOKEN = re.compile(r"[A-Za-z0-9_-]{32,100}")
 NEW = ("300 mm", "100 mm", "250 mm", "220 mm")
 """Ground, input, coupler and output of a new scene."""
 
@@ -50,44 +53,54 @@ class Session:
     """The scene file at `path`, changed step by step; whatever is refused leaves the last good state."""
 
     def __init__(self, path: Path, exports: Path) -> None:
-        self.path, self.exports = path, Exports(exports, path.stem)
-        self.state_file = path.with_name(path.name + ENDING)
-        self.token = secrets.token_urlsafe(32)
+        self.path, self.exports = Path(os.path.realpath(path)), Exports(exports, path.stem)
+        self.state_file = self.path.with_name(self.path.name + ENDING)
+        self.token = secrets.token_urlsafe(32)  # of this process alone
         self.unit_names, self.units = "SI", units("SI")
-        text = read_text(path) if path.exists() else write_new_scene(NEW)
+        text = read_text(self.path) if self.path.exists() else write_new_scene(NEW)
         self.disk = self._read_disk()
         self.texts, self.place, self.kept = [text], 0, {"start": text}
         self.reference, self.gesture = "start", ""
         if self.state_file.exists():
             self._resume()
-        self.now = self._read(self.texts[self.place])
+        else:
+            self.now = self._read(text)
         self.document = SceneDocument(self.now.text)
         self.base = self.now
 
     def _resume(self) -> None:
         """Go on where an earlier session stopped."""
+        data = read_bytes(self.state_file, "state file", LARGEST_STATE)
         try:
-            kept = json.loads(read_bytes(self.state_file, "state file", LARGEST_STATE))
-            if kept["schema"] != SCHEMA or not TOKEN.fullmatch(kept["token"]):
-                raise ValueError(kept["schema"])
-            texts, place = [str(text) for text in kept["texts"]], int(kept["place"])
-            own = units(kept["units"])
-            texts[place], kept["kept"][kept["reference"]]
-        except (ValueError, KeyError, TypeError, IndexError) as error:
-            allowed = f"is no state of the workbench ({error}): take it away to begin from the scene file"
+            state = json.loads(data)
+            if state["schema"] != SCHEMA:
+                raise ValueError(f"schema {str(state['schema'])[:60]!r}")
+            self.texts, self.place = [str(text) for text in state["texts"]], int(state["place"])
+            self.kept = {str(name): str(text) for name, text in state["kept"].items()}
+            self.reference, self.unit_names, self.disk = str(state["reference"]), str(state["units"]), state["disk"]
+            self.units = units(self.unit_names)
+            if self.place < 0 or self.reference not in self.kept:
+                raise ValueError("it names a state that it does not hold")
+            self.now = self._read(self.texts[self.place])
+        except (
+            ValueError,
+            LookupError,
+            TypeError,
+            AttributeError,
+            ArithmeticError,
+            RecursionError,
+            FourBarError,
+        ) as error:
+            allowed = f"is no state of the workbench ({error}): remove it to begin from the scene file"
             raise InputError("state file", str(self.state_file), allowed) from None
-        self.token, self.disk, self.texts, self.place = kept["token"], kept["disk"], texts, place
-        self.kept, self.reference, self.unit_names, self.units = kept["kept"], kept["reference"], kept["units"], own
 
     def keep(self) -> None:
-        """Write the state file: readable by its owner alone, for it holds the token."""
-        first = max(0, self.place - MOST_STATES)
-        kept = {
-            **{"schema": SCHEMA, "token": self.token, "disk": self.disk, "kept": self.kept},
-            **{"texts": self.texts[first : first + 2 * MOST_STATES], "place": self.place - first},
-            **{"reference": self.reference, "units": self.unit_names},
+        """Write the state file, readable by its owner alone as the scene may be."""
+        state = {
+            **{"schema": SCHEMA, "disk": self.disk, "texts": self.texts, "place": self.place},
+            **{"kept": self.kept, "reference": self.reference, "units": self.unit_names},
         }
-        write_bytes(self.state_file, json.dumps(kept).encode(), private=True)
+        write_bytes(self.state_file, json.dumps(state, ensure_ascii=False).encode(), private=True)
 
     def end(self, *, gone: bool) -> None:
         """Take the state file away where all is saved, or nothing was changed, and no page is left (`gone`)."""
@@ -113,10 +126,14 @@ class Session:
 
     # ---- what a page asks for ----------------------------------------------------------------
 
-    def answer(self, *, settled: bool = False) -> dict[str, Any]:
-        """Describe the present state."""
+    def answer(self) -> dict[str, Any]:
+        """Describe the present state, without error bars and summary."""
+        return self.describe(evaluate_scene(self.now.scene, self.now.plain, self.units))
+
+    def describe(self, data: dict[str, Any], *, settled: bool = False) -> dict[str, Any]:
+        """Describe the present state, whose numbers are `data`; `settled`: with error bars and summary."""
         return {
-            "data": evaluate_scene(self.now.scene, self.now.plain, self.units, settled=settled),
+            "data": data,
             "settled": settled,
             "plain": self.now.plain,
             "text": self.now.text,
@@ -166,6 +183,8 @@ class Session:
         elif now.text != self.now.text:
             self.texts = [*self.texts[: self.place + 1], now.text]
             self.place += 1
+        while len(self.texts) > MOST_STATES or sum(map(len, self.texts)) > MOST_CHARACTERS:
+            self.texts, self.place = self.texts[1:], self.place - 1
         self.now = now
 
 
@@ -214,8 +233,10 @@ def _move(session: Session, by: int) -> None:
 
 
 def _keep(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    name = f"state {len(session.kept)}"
+    name = f"state {max((int(name.split()[1]) for name in session.kept if name != 'start'), default=0) + 1}"
     session.kept[name] = session.now.text
+    if len(session.kept) > MOST_KEPT:
+        del session.kept[next(name for name in session.kept if name != "start")]
     return _refer(session, {"to": name})
 
 

@@ -24,7 +24,7 @@ JUDGED_BY = {
     "fourbar/effects/test_effects.py": "fourbar/effects: actions cones effect flywheel friction gravity load "
     "numbers pin_friction pins torsion viscous",
     "fourbar/edit/test_session.py": "fourbar/edit: reply document dragging exports",
-    "fourbar/edit/test_server.py": "fourbar/edit: witness",
+    "fourbar/edit/test_server.py": "fourbar/edit: redirect witness",
     "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve holding zeros; fourbar/show: equilibrium; "

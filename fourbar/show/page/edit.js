@@ -10,29 +10,39 @@ function ask(request, path = null, theta = null) {
   pump();
 }
 function pump() {
+  while (waiting[0]?.request.do === "undo" && dropRefused()) waiting.shift();
   if (inFlight || !waiting.length || line?.readyState !== WebSocket.OPEN || !greeted) return;
   inFlight = waiting.shift();
   inFlight.request.id = `${me}:${++asked}`;
   line.send(JSON.stringify(inFlight.request));
 }
 
+// An entry that was refused is no state of the history: undo takes it back and leaves the last good state.
+function dropRefused() {
+  const refused = document.querySelector(".editor [aria-invalid=true]");
+  if (inFlight || !refused) return false;
+  restore(refused);
+  return true;
+}
+
+let cut = null;   // since when there is no line to the server
 function connect() {
   line = new WebSocket(lineAddress);
   line.binaryType = "arraybuffer";
   line.addEventListener("open", () => {
-    greeted = true;
+    greeted = true; cut = null;
     if (inFlight) { waiting.unshift(inFlight); inFlight = null; }
     waiting.unshift({ request: { do: "hello" }, path: null, theta: null, since: performance.now() });
     pump();
   });
   line.addEventListener("message", event => take(unpacked(event.data)));
   line.addEventListener("close", () => {
-    greeted = false;
-    say(`The server has stopped. What stands here is kept; start it again with: fourbar edit ${fileName} --port ${location.port}`, true);
-    setTimeout(connect, 1000);
+    greeted = false; cut ??= Date.now();
+    say(`The server has stopped. The state is kept in ${fileName}.edit: to go on from it, run fourbar edit ${fileName} and use the page that it opens.`, true);
+    setTimeout(connect, Date.now() - cut < 120000 ? 1000 : 30000);
   });
 }
-let fileName = "SCENE";
+let fileName = "SCENE", fileText = "";
 
 // JSON and its columns of doubles, as fourbar.edit.reply packs them; NaN is null as in a saved page.
 function unpacked(buffer) {
@@ -58,8 +68,8 @@ function take(about) {
   if (about.check) showCheck(about.check);
   if (about.compared) { keptData = about; compareAnew(); }
   if (about.offers) { offers = about.offers; fileName = about.file; shape = ""; }
-  if (about.refused !== undefined) refuse(own?.path ?? null, about.refused);
-  else if (own) { refuse(own.path, ""); refuse(null, ""); }
+  if (about.refused !== undefined) refuse(own?.request.do === "text" ? TEXT : own?.path ?? null, about.refused);
+  else if (own) { refuse(own.path, ""); refuse(null, ""); if (own.request.do === "text") refuse(TEXT, ""); }
   if (about.ask) { byId("ask").firstElementChild.textContent = about.ask; byId("ask").hidden = false; }
   if (about.data && !about.compared && !(about.settled && (inFlight || waiting.length))) show(about, own);
   if (about.tolerances && data.summary) { data.tolerances = about.tolerances; furnishTolerances(); drawBands(); showSpreads(row); }
@@ -93,12 +103,14 @@ function show(about, own) {
   if (playing) { run = { bounds: stretch(row), wraps: turnsFully() }; if (run.bounds[0] === run.bounds[1]) play(false); }
   plain = about.plain;
   if (offers) showFields();
-  if (document.activeElement !== byId("file-text")) byId("file-text").value = about.text;
+  if ([fileText, about.text].includes(byId("file-text").value) || own?.request.do === "text") byId("file-text").value = about.text;   // a draft stays
+  fileText = about.text;
   if (document.activeElement !== byId("units")) byId("units").value = about.units;
   byId("undo").disabled = !about.undo; byId("redo").disabled = !about.redo;
   byId("reference").replaceChildren(...about.kept.map(name => new Option(name, name, false, name === about.reference)));
   document.querySelector("h1").textContent = document.title = about.plain.title || "Four-bar linkage";
   document.querySelector(".source").textContent = about.plain.source ?? "";
+  byId("computing").hidden = "summary" in about.data;
   if (about.data.summary) byId("summary").replaceChildren(...about.data.summary.map(line => {
     const shown = document.createElement("div");
     shown.textContent = line;

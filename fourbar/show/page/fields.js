@@ -33,7 +33,7 @@ function field(path, value, example) {
   };
   input.addEventListener("keydown", event => {
     if (event.key === "ArrowUp" || event.key === "ArrowDown") by(event.key === "ArrowUp" ? 1 : -1, event);
-    if (event.key === "Escape") { input.value = entryAt(plain, path) ?? ""; refuse(path, ""); }
+    if (event.key === "Escape") restore(input);
   });
   input.addEventListener("wheel", event => { if (document.activeElement === input) by(event.deltaY < 0 ? 1 : -1, event); }, { passive: false });
   const shown = PAIRS[path[path.length - 2]]?.[key] ?? nameOfKey(key);
@@ -50,12 +50,21 @@ function stepped(text, direction, coarse) {
   return (value + direction * size).toFixed(Math.min(digits, 15)) + found[2];
 }
 
+const TEXT = ["file", "text"];   // in place of the path of an entry: the whole file
 function refuse(path, words) {
-  const input = path && document.getElementById(fieldId(path)), place = input ? document.getElementById(`${fieldId(path)}!`) : byId("refused");
+  const input = path === TEXT ? byId("file-text") : path && document.getElementById(fieldId(path)), place = input && path !== TEXT ? document.getElementById(`${fieldId(path)}!`) : byId("refused");
   if (input) input.setAttribute("aria-invalid", String(words !== ""));
   place.textContent = words;
   place.hidden = words === "";
 }
+
+// What a field says in the last good state.
+function restore(input) {
+  const path = input.id === "file-text" ? TEXT : entryPath(input);
+  input.value = path === TEXT ? fileText : entryAt(plain, path) ?? "";
+  refuse(path, "");
+}
+const entryPath = input => input.id.slice(6).split("/").map((step, n, all) => /^\d+$/.test(step) && Array.isArray(entryAt(plain, all.slice(0, n))) ? Number(step) : step);
 
 function group(path, node, example) {
   const box = element("div", { className: "group" });
@@ -112,7 +121,7 @@ function showFields() {
   }
   for (const input of byId("fields").querySelectorAll("input[id],select[id]")) {
     if (input === document.activeElement && !input.dataset.follows) continue;
-    const value = entryAt(plain, input.id.slice(6).split("/").map((step, n, all) => /^\d+$/.test(step) && Array.isArray(entryAt(plain, all.slice(0, n))) ? Number(step) : step));
+    const value = entryAt(plain, entryPath(input));
     if (!scalar(value ?? null) || input.value === String(value ?? "")) continue;
     input.value = value ?? "";
     input.removeAttribute("aria-invalid");

@@ -3,6 +3,7 @@
 import asyncio
 import gc
 import json
+import os
 import re
 import socket
 import struct
@@ -12,6 +13,7 @@ import threading
 import time
 import warnings
 from collections.abc import Awaitable, Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -22,8 +24,10 @@ from tornado.httpclient import AsyncHTTPClient, HTTPRequest
 from tornado.websocket import websocket_connect
 
 from fourbar.edit import server, witness
-from fourbar.edit.server import LARGEST_REQUEST, MOST_WAITING, Workbench
+from fourbar.edit.redirect import ENDING, Redirect
+from fourbar.edit.server import GONE, LARGEST_REQUEST, MOST_CONNECTIONS, MOST_WAITING, Workbench
 from fourbar.edit.session import Session
+from fourbar.errors import InputError
 
 CRANK_ROCKER = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
 HUGE = 100_000_000
@@ -44,7 +48,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
 
         async def both() -> None:
             made = Workbench(session)
-            serving = asyncio.create_task(made.serve(0, browse=False))
+            serving = asyncio.create_task(made.serve(0))
             try:
                 await what(made, await made.address)
             finally:
@@ -198,13 +202,13 @@ def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch) ->
     async def ask(made: Workbench, address: str) -> None:
         text = made.session.now.text + '[tolerances]\n"lengths.input" = "0.1 mm"\n'
         data = made.session.do({"do": "text", "text": text})["data"]
-        sampled = asyncio.create_task(made._sample(data))
+        sampled = asyncio.create_task(made._sample(made.session.now, data))
         await asyncio.sleep(0)
         made.session.do({"do": "set", "path": ["lengths", "input"], "value": "101 mm"})
         changed.set()
         await sampled
         assert not finished
-        await made._sample(data)
+        await made._sample(made.session.now, data)
         assert len(finished) == 1
 
     monkeypatch.setattr(server, "collect_tolerances", watched)
@@ -258,6 +262,206 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(bench
     bench(ask)
 
 
+def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch) -> None:
+    evaluate, asked_for, released, summaries = server.evaluate_scene, threading.Event(), threading.Event(), []
+
+    def slow(scene, plain, units, *, settled=False):
+        asked_for.set()
+        released.wait(20)
+        summaries.append(scene.linkage.input.length)
+        return evaluate(scene, plain, units, settled=settled)
+
+    async def ask(made: Workbench, address: str) -> None:
+        line = await page(address)
+        await told(line, {"do": "hello"})
+        await asyncio.to_thread(asked_for.wait, 20)  # the summary of the first state is under way
+        for size in range(101, 111):
+            about = await told(line, {"do": "set", "path": ["lengths", "input"], "value": f"{size} mm"})
+            assert f'"{size} mm"' in about["text"] and not about["settled"]
+            await asyncio.sleep(server.SETTLED * 1.2)  # each asks for a summary of its own
+        released.set()
+        about = await told(line, settled=True)
+        assert '"110 mm"' in about["text"] and summaries == [0.1, 0.11]  # the one of each state between was given up
+
+    monkeypatch.setattr(server, "evaluate_scene", slow)
+    bench(ask)
+
+
+def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog) -> None:
+    async def ask(made: Workbench, address: str) -> None:
+        line = await page(address)
+        for _ in range(3):
+            reader, writer = await asyncio.open_connection("127.0.0.1", int(port_of(address)))
+            host, path = address.split("/")[2], "/" + address.split("/", 3)[3] + "live"
+            head = f"GET {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nUpgrade: websocket\r\n"
+            head += f"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: {'A' * 22}==\r\n\r\n"
+            writer.write(head.encode())
+            await reader.readuntil(b"\r\n\r\n")
+            for number in range(60):
+                text = json.dumps({"do": "units", "units": "SI", "id": number}).encode()
+                writer.write(struct.pack("!BB4x", 0x81, 0x80 | len(text)) + text)  # masked by zeros
+            await writer.drain()
+            writer.transport.pause_reading()
+            while made.waiting:
+                await asyncio.sleep(0.05)
+            writer.transport.abort()
+        await asyncio.sleep(0.5)
+        gc.collect()
+        assert (await told(line, {"do": "hello"}))["file"] == "scene.toml"
+
+    bench(ask)
+    gc.collect()
+    assert not caplog.records
+
+
+def half_open(address: str, number: int) -> list[socket.socket]:
+    """Connections that begin a request and say no more."""
+    made = []
+    for _ in range(number):
+        made.append(socket.create_connection(("127.0.0.1", int(port_of(address))), timeout=5.0))
+        made[-1].sendall(b"GET / HTTP/1.1\r\n")
+    return made
+
+
+def processor_time(process: subprocess.Popen) -> float:
+    """User and system time of a process so far, s."""
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+@pytest.mark.linux
+@pytest.mark.parametrize("files", [256, 40], ids=["within its limit of files", "beyond its limit of files"])
+def test_half_open_connections_neither_stop_the_server_nor_stay(tmp_path: Path, files: int) -> None:
+    import resource
+
+    path = tmp_path / "scene.toml"
+    path.write_bytes(CRANK_ROCKER.read_bytes())
+    # imported before the limit holds: the server alone is tried
+    program = f"""
+import resource, sys, fourbar.edit.server as server, fourbar.show.page_data, fourbar.mjcf
+from pathlib import Path
+resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))
+server.IDLE = 3.0
+server.edit(Path(sys.argv[1]), Path(sys.argv[1] + "_exports"), browse=False)
+"""
+    most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, most), most))
+    idle: list[socket.socket] = []
+    with ExitStack() as stack:
+        command = [sys.executable, "-c", program, str(path)]
+        process = stack.enter_context(
+            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        )
+        stack.callback(process.kill)
+        address = process.stdout.readline().strip()
+        before = processor_time(process)
+        idle = half_open(address, 377 if files == 256 else 120)
+        for connection in idle:
+            stack.callback(connection.close)
+        time.sleep(2.0)
+        assert processor_time(process) - before < 1.0  # it was all of it
+
+        async def save() -> None:
+            line = await page(address)
+            await told(line, {"do": "set", "path": ["lengths", "input"], "value": "105 mm"})
+            assert (await told(line, {"do": "save"})).get("saved")
+            line.close()
+
+        if files == 256:
+            asyncio.run(save())
+        for connection in idle:
+            connection.settimeout(20.0)
+            assert connection.recv(100) == b""  # closed by the server
+        asyncio.run(save())
+        process.send_signal(2)
+        error = process.communicate(timeout=20)[1]
+    assert error == "" and '"105 mm"' in path.read_text()
+
+
+def test_the_oldest_connection_gives_way_and_a_page_stays(bench) -> None:
+    async def ask(made: Workbench, address: str) -> None:
+        line = await page(address)
+        await told(line, {"do": "hello"})
+        idle = await asyncio.to_thread(half_open, address, 2 * MOST_CONNECTIONS)
+        await asyncio.sleep(0.2)
+        assert await asyncio.to_thread(idle[0].recv, 100) == b""
+        assert len([stream for stream in made.entrance.streams if not stream.closed()]) <= MOST_CONNECTIONS
+        assert (await told(line, {"do": "hello"}))["file"] == "scene.toml"
+        for connection in idle:
+            connection.close()
+
+    bench(ask)
+
+
+def test_a_page_in_the_background_which_is_woken_once_a_minute_finds_its_server() -> None:
+    assert GONE >= 60.0 + 20.0
+
+
+@pytest.mark.posix
+def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_processes(tmp_path: Path) -> None:
+    path, seen = tmp_path / "scene.toml", tmp_path / "seen"
+    path.write_bytes(CRANK_ROCKER.read_bytes())
+    browser = tmp_path / "browser"
+    browser.write_text(f'#!/bin/sh\necho "$@" >> {seen}.part; mv {seen}.part {seen}\n')
+    browser.chmod(0o755)
+    command = [sys.executable, "-m", "fourbar", "edit", str(path)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env={**os.environ, "BROWSER": f"{browser} %s"}
+    ) as process:
+        address = process.stdout.readline().strip()
+        deadline = time.monotonic() + 20
+        while not seen.exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        (given,) = seen.read_text().split()
+        redirect = Path(given.removeprefix("file://"))
+        assert given.startswith("file://") and address.split("/")[3] not in given
+        assert redirect.stat().st_mode & 0o777 == 0o600 and f'url={address}"' in redirect.read_text().replace("0; ", "")
+        process.send_signal(2)
+        process.communicate(timeout=20)
+    assert not redirect.exists()
+
+
+@pytest.mark.posix
+def test_a_second_workbench_on_one_file_leads_to_the_first(tmp_path: Path) -> None:
+    path, link = tmp_path / "scene.toml", tmp_path / "link.toml"
+    path.write_bytes(CRANK_ROCKER.read_bytes())
+    link.symlink_to(path)
+
+    def start(name: Path) -> subprocess.Popen:
+        command = [sys.executable, "-m", "fourbar", "edit", str(name), "--no-browser"]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    first, second = start(path), start(link)
+    addresses = [process.stdout.readline() for process in (first, second)]
+    assert addresses[0] == addresses[1] and addresses[0].startswith("http://127.0.0.1:")
+    deadline = time.monotonic() + 20
+    while first.poll() is None and second.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.05)
+    guest, host = (first, second) if first.poll() is not None else (second, first)
+    assert (guest.returncode, guest.communicate(), host.poll()) == (0, ("", ""), None)
+    host.kill()
+    host.communicate()
+    with start(path) as third:  # the page of a server that was killed leads nobody astray
+        assert third.stdout.readline() not in addresses
+        third.send_signal(2)
+        assert third.communicate(timeout=20) == ("", "")
+    assert not path.with_name(path.name + ENDING).exists()
+
+
+@pytest.mark.posix
+def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(tmp_path: Path, monkeypatch) -> None:
+    from fourbar.edit import redirect
+
+    monkeypatch.setattr(redirect, "PATIENCE", 0.1)
+    first, second = Redirect(tmp_path / "a.toml"), Redirect(tmp_path / "a.toml")
+    assert first.claim() and not second.claim()
+    with pytest.raises(InputError, match="has no address"):
+        second.read()
+    first.remove()
+    assert second.claim()
+    second.remove()
+
+
 @pytest.mark.posix
 def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
@@ -268,7 +472,8 @@ def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(tmp_path:
         address = process.stdout.readline()
         assert address.startswith("http://127.0.0.1:")
         port = port_of(address)
-        taken = subprocess.run([*command, "--port", port], capture_output=True, text=True, check=False)
+        other = [sys.executable, "-m", "fourbar", "edit", str(tmp_path / "other.toml"), "--port", port]
+        taken = subprocess.run(other, capture_output=True, text=True, check=False)
         assert taken.returncode == 2 and "--port" in taken.stderr and "Traceback" not in taken.stderr
         process.send_signal(2)
         out, error = process.communicate(timeout=20)

@@ -158,9 +158,40 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, t
     assert not driver.get_log("browser")
 
 
-def test_a_stopped_server_is_named_and_the_page_goes_on_when_it_is_started_again(
-    chromium, opened, tmp_path: Path
-) -> None:
+def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(chromium, opened, tmp_path: Path) -> None:
+    driver = chromium
+    driver.get(opened(tmp_path / "mine.toml").address)
+    wait_for(driver, "offers && document.getElementById('field:lengths/input')")
+    type_into(driver, "field:lengths/input", "110 mm")
+    wait_for(driver, "data.lengths[1] === 0.11")
+    type_into(driver, "field:lengths/coupler", "240 mm")
+    wait_for(driver, "data.lengths[2] === 0.24")
+    type_into(driver, "field:lengths/input", "4 lb")
+    driver.find_element("id", "field:lengths/input").send_keys(Keys.CONTROL, "z")  # while the refusals are on their way
+    entry = "document.getElementById('field:lengths/input')"
+    wait_for(driver, f"{entry}.value === '110 mm' && {entry}.getAttribute('aria-invalid') !== 'true'")
+    assert driver.execute_script("return data.lengths.slice(1, 3)") == [0.11, 0.24]
+    driver.find_element("id", "field:lengths/input").send_keys(Keys.CONTROL, "z")
+    wait_for(driver, "data.lengths[2] === 0.25")
+    driver.execute_script("document.getElementById('file-text').closest('details').open = true")
+    driver.execute_script("document.getElementById('file-text').value = 'lengths = 3'")
+    driver.find_element("id", "apply").click()
+    wait_for(driver, "document.getElementById('file-text').getAttribute('aria-invalid') === 'true'")
+    driver.find_element("id", "undo").click()
+    wait_for(driver, "document.getElementById('file-text').value.includes('110 mm')")
+    assert driver.execute_script("return data.lengths.slice(1, 3)") == [0.11, 0.25]
+
+
+def test_a_page_whose_line_is_cut_finds_its_server_again(chromium, opened, tmp_path: Path) -> None:
+    driver = chromium
+    driver.get(opened(tmp_path / "mine.toml").address)
+    wait_for(driver, "offers && document.getElementById('field:lengths/input')")
+    driver.execute_script("line.close()")
+    type_into(driver, "field:lengths/input", "110 mm")
+    wait_for(driver, "data.lengths[1] === 0.11")
+
+
+def test_a_stopped_server_is_named_and_a_new_one_goes_on_from_its_state(chromium, opened, tmp_path: Path) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     server = opened(path)
     port = server.address.split("/")[2].partition(":")[2]
@@ -170,10 +201,11 @@ def test_a_stopped_server_is_named_and_the_page_goes_on_when_it_is_started_again
     wait_for(driver, "data.lengths[1] === 0.11")
     server.end()
     wait_for(driver, "document.getElementById('bench').textContent.includes('The server has stopped')")
-    type_into(driver, "field:lengths/input", "111 mm")  # it waits
-    assert opened(path, port).address == server.address
-    wait_for(driver, "data.lengths[1] === 0.111")
-    driver.find_element("id", "undo").click()
-    wait_for(driver, "data.lengths[1] === 0.11")
+    again = opened(path, port)
+    assert again.address != server.address  # the token is another one, and the old page is told nothing
+    time.sleep(2.0)
+    assert driver.execute_script("return line.readyState") != 1
+    driver.get(again.address)
+    wait_for(driver, "offers && data.lengths[1] === 0.11")
     driver.find_element("id", "undo").click()
     wait_for(driver, "data.lengths[1] === 0.1")

@@ -17,8 +17,8 @@ from fourbar.files import loads
 pytest.importorskip("tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit")
 from fourbar.edit.document import SceneDocument, list_offers
 from fourbar.edit.dragging import find_unit, write_rounded
-from fourbar.edit.reply import pack_frame
-from fourbar.edit.session import Session
+from fourbar.edit.reply import evaluate_scene, pack_frame
+from fourbar.edit.session import LARGEST_STATE, MOST_KEPT, Session
 
 ROOT = Path(__file__).parents[3]
 CRANK_ROCKER = ROOT / "models" / "crank_rocker.toml"
@@ -194,6 +194,28 @@ def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> Non
     )
 
 
+@pytest.mark.parametrize("frame", ["world", "bar"])
+@pytest.mark.parametrize("size", ["5 N", "-5 N"])
+def test_the_arrow_of_a_load_goes_where_it_is_dragged_in_either_frame_and_a_negative_force_stays(
+    session: Session, frame: str, size: str
+) -> None:
+    load = f'[[loads]]\nbar = 3\nforce = ["{size}", "10 deg"]\nat = ["20 mm", "0 deg"]\nframe = "{frame}"\n'
+    session.do({"do": "text", "text": session.now.text + load})
+    at = ["loads", len(session.now.scene.loads) - 1]
+    to = 0.13 + 0.11j
+    dragged(session, [*at, "at"], to)
+    s, load = at_50(session), session.now.scene.loads[-1]
+    turned = float(s.theta_3[0]) if frame == "bar" else 0.0
+    foot = complex(*s.G3[0]) + load.at[0] * np.exp(1j * (load.at[1] + turned))
+    assert foot == pytest.approx(to, abs=2 * PIXEL)
+    arrow = 0.05 * np.exp(0.7j)
+    dragged(session, [*at, "force"], foot + arrow, stretch=2.0)
+    force = session.now.scene.loads[-1].force
+    assert force[0] == pytest.approx(2.0 * float(size.split(maxsplit=1)[0]), rel=0.02)
+    pulls = force[0] * np.exp(1j * (force[1] + turned))  # the direction in which it acts
+    assert np.angle(pulls / arrow) == pytest.approx(0.0, abs=0.02)
+
+
 def test_numbers_get_the_digits_of_a_pixel_and_keep_their_unit() -> None:
     assert write_rounded(0.123456, 0.003, "m") == "0.123 m"
     assert write_rounded(123.456, 3.0, "mm") == "123 mm"
@@ -216,9 +238,14 @@ def unpacked(data: bytes) -> dict:
     return about
 
 
+def settled(session: Session) -> dict:
+    now = session.now
+    return session.describe(evaluate_scene(now.scene, now.plain, session.units, settled=True), settled=True)
+
+
 def test_the_answer_is_what_analyze_says(session: Session) -> None:
     session.do({"do": "set", "path": ["bars", "coupler", "mass"], "value": "2 lb"})
-    told = unpacked(pack_frame(session.answer(settled=True)))
+    told = unpacked(pack_frame(settled(session)))
     scene = loads(session.now.text)
     s = fourbar.solve(scene, "error")
     columns = told["data"]["branches"]["1"]
@@ -227,7 +254,7 @@ def test_the_answer_is_what_analyze_says(session: Session) -> None:
     assert any(line.startswith("largest torque") for line in told["data"]["summary"])
     assert any("crank-rocker" in line for line in told["data"]["summary"])
     session.do({"do": "units", "units": "imperial"})
-    assert any("lbf" in line for line in session.answer(settled=True)["data"]["summary"])
+    assert any("lbf" in line for line in settled(session)["data"]["summary"])
     assert "refused" in session.do({"do": "units", "units": "parsec"}) and session.unit_names == "imperial"
 
 
@@ -269,17 +296,74 @@ def test_a_session_goes_on_where_it_stopped(session: Session) -> None:
     session.do({"do": "set", "path": ["lengths", "input"], "value": "110 mm"})
     session.end(gone=True)
     if os.name == "posix":
-        assert session.state_file.stat().st_mode & 0o077 == 0  # it holds the token
+        assert session.state_file.stat().st_mode & 0o077 == 0  # the scene may be its owner's alone
     again = Session(session.path, session.exports.folder)
-    assert (again.token, again.now.text, again.kept) == (session.token, session.now.text, session.kept)
+    assert (again.now.text, again.kept) == (session.now.text, session.kept)
+    assert again.token != session.token and session.token not in session.state_file.read_text()
     assert again.compared()["compared"] == "state 1"
     assert '"105 mm"' in again.do({"do": "undo"})["text"]
     again.do({"do": "save"})
     again.end(gone=True)
     assert not again.state_file.exists()
-    again.state_file.write_text('{"schema": "fourbar-edit/1", "token": "short"}')
-    with pytest.raises(fourbar.InputError, match="is no state of the workbench"):
+
+
+DAMAGES = {
+    "another schema": lambda state: '{"schema": "fourbar-edit/1", "token": "short"}',
+    "no object": lambda state: "3",
+    "nested deeply": lambda state: "[" * 100_000,
+    "cut off": lambda state: state[: len(state) // 2],
+    "infinite": lambda state: state.replace('"place": 1', '"place": Infinity'),
+    "a place beyond": lambda state: state.replace('"place": 1', '"place": 9'),
+    "a place before": lambda state: state.replace('"place": 1', '"place": -1'),
+    "no texts": lambda state: state.replace('"texts": [', '"texts": 3, "others": ['),
+    "no scene": lambda state: state.replace("[lengths]", "[length]"),
+    "units of nothing": lambda state: state.replace('"units": "SI"', '"units": "parsec"'),
+    "a reference to nothing": lambda state: state.replace('"reference": "start"', '"reference": "state 7"'),
+    "kept is a list": lambda state: state.replace('"kept": {', '"kept": [], "others": {'),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_a_damaged_state_file_is_one_line(session: Session, name: str) -> None:
+    session.do({"do": "set", "path": ["lengths", "input"], "value": "105 mm"})
+    session.keep()
+    before = session.state_file.read_text()
+    session.state_file.write_text(damaged := DAMAGES[name](before))
+    assert damaged != before
+    with pytest.raises(fourbar.InputError, match=r"is no state of the workbench .* remove it") as caught:
         Session(session.path, session.exports.folder)
+    assert "\n" not in str(caught.value) and str(session.state_file) in str(caught.value)
+
+
+def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(session: Session) -> None:
+    large = session.now.text + "".join(f"# {'µ' * 100} {n}\n" for n in range(1950))
+    assert len(large) == pytest.approx(205_000, rel=0.05)
+    session.do({"do": "text", "text": large})
+    for size in range(1, 531):
+        session.change(lambda document, size=size: document.set(["lengths", "input"], f"{100 + 0.01 * size:.2f} mm"))
+        if size % 20 == 0:
+            session.do({"do": "keep"})
+    session.keep()
+    assert session.state_file.stat().st_size < LARGEST_STATE / 2
+    again = Session(session.path, session.exports.folder)
+    assert again.now.text == session.now.text and len(again.texts) > 40 and len(again.kept) == MOST_KEPT
+    assert "start" in again.kept and "state 26" in again.kept
+    for _ in range(len(again.texts) - 1):
+        assert "refused" not in again.do({"do": "undo"})
+    assert "refused" in again.do({"do": "undo"})
+
+
+@pytest.mark.posix
+def test_a_scene_behind_a_link_is_saved_where_it_is_and_keeps_its_mode(session: Session) -> None:
+    session.path.chmod(0o600)
+    link = session.path.with_name("link.toml")
+    link.symlink_to(session.path)
+    linked = Session(link, session.exports.folder)
+    assert linked.state_file == session.state_file
+    linked.do({"do": "set", "path": ["lengths", "input"], "value": "105 mm"})
+    assert linked.do({"do": "save"})["saved"]
+    assert link.is_symlink() and '"105 mm"' in session.path.read_text()
+    assert session.path.stat().st_mode & 0o777 == 0o600
 
 
 def test_exports_go_into_their_folder_under_their_own_names(session: Session) -> None:
