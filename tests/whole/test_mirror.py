@@ -84,6 +84,7 @@ JUDGED_BY = {
     "validation/advise: worst_errors; validation/engines/mujoco: one_state",
     "validation/advise/test_advise.py": "validation/advise: matters; validation/lab/cost: exhaustive measure; "
     "validation/run: required_error; validation/engines/mujoco: trial",
+    "validation/lab/simulators/test_problems.py": "validation/lab/simulators: slider_crank; validation/check: problem",
     # simulators that need not be there: their scripts run where they are installed
     "validation/lab/simulators/test_simulators.py": "validation/lab/simulators: drake_sap examine exudyn_simulated "
     "genesis_rigid gradients motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco "

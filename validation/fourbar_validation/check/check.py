@@ -12,6 +12,7 @@ from fourbar.writing import require_file, write_text
 from fourbar_validation.check.judge import Allowance, Discrepancy
 from fourbar_validation.check.judgement import Judgement, judge_table, write_json, write_junit
 from fourbar_validation.check.mistakes import NEARER, Explanation
+from fourbar_validation.check.problem import check_problem
 from fourbar_validation.check.theirs import TheirTable, read_table
 from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.report.terminal import make_table
@@ -43,12 +44,19 @@ def check(
 ) -> int:
     """Judge a table of torques and forces (THEIRS.csv) against the formulas, row by row.
 
+    `check PROBLEM.json RESULT.json` judges the answers to a problem of models/problems, by its levels of accuracy.
+
     Columns are named as by `fourbar analyze --csv`, whose file is read as it is; a unit may follow in
     brackets: theta_2 [deg], torque [lbf ft], F12_x, F12_y, F43 [kN] (a magnitude). A spreadsheet's
     semicolons and blank cells are understood. Half a unit of the last printed digit is allowed; with
     --rtol or --atol these decide, and how many agree exactly is printed too. Where the scene states no
     omega_2 each row is judged at its own omega_2 and alpha_2.
     """
+    if scene.suffix == ".json":
+        for option, value in (("--rtol", rtol), ("--atol", atol), ("--json", json), ("--junit", junit)):
+            if value is not None:
+                raise InputError(option, str(value), "is of a table: a problem has its own levels")
+        return check_problem(scene, theirs)
     table = read_table(theirs)
     for path in (json, junit):
         if path is not None:

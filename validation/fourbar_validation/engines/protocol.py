@@ -245,7 +245,7 @@ def answer_from_json(engine: str, command: Command, data: Any) -> Answer:
     return Answer(
         engine,
         setting,
-        _read_motion(data.get("at"), command),
+        read_motion(data.get("at"), command),
         _read_assembled(data.get("assembled"), quantities, n),
         quantities,
         predicted={name: _read_values("predicted", name, values, n, ()) for name, values in predicted},
@@ -320,7 +320,7 @@ def _read_assembled(value: Any, quantities: dict[str, Array], n: int) -> Any:
     return np.array(value, dtype=bool)
 
 
-def _read_motion(data: Any, command: Command) -> Command:
+def read_motion(data: Any, command: Command) -> Command:
     """Read the motion that an engine made, which must be near the one that was commanded; left out: the same."""
     if data is None or command.stroke is not None:  # of a stroke nothing of the bar is commanded
         return command

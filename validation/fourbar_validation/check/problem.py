@@ -1,0 +1,156 @@
+"""Problems of models/problems and their results: how far each quantity is off, and which level that reaches.
+
+A problem is a question of the protocol with its answer, each value with an error bar; docs/problems.md has the format.
+"""
+
+import json
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fourbar.errors import FAILED, HOLDS, InputError
+from fourbar.files.reading import read_text
+from fourbar.quantities import PIN_FORCES
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.rows import make_plain, write_one_line
+from fourbar_validation.compare.tolerance import EPS, K, magnitude
+from fourbar_validation.engines import protocol
+
+SCHEMA, RESULT = "fourbar-problem/2", "fourbar-result/1"
+LEVELS = {"A": 1e-9, "B": 1e-6, "C": 1e-3}
+"""Largest error of each level, of the largest value; D is worse. Error bars of the problem are allowed."""
+WORSE, MISSING = "D", "-"
+GROUPS = {"reactions": (*PIN_FORCES, "guide_force"), "torque": ("torque", "drive_force")}
+"""What each letter stands for; every other quantity is of the motion."""
+SAFE = 8.0
+"""Times the error bars of the formulas, which are estimates: against many digits an answer is up to 6.6 of them off."""
+LARGEST_FILE = 10**7
+"""Bytes."""
+
+
+class Judged(NamedTuple):
+    """One quantity of a result, where it is worst."""
+
+    quantity: str
+    group: str
+    level: str
+    error: float
+    """Of the largest value; of an angle, rad. NaN where there is no answer."""
+    position: int
+
+
+def read_problem(path: str | Path) -> dict[str, Any]:
+    """Read a problem; InputError names what is wrong."""
+    problem = _read(path, SCHEMA)
+    for name in ("answers", "errors", "scene", "command"):
+        if not isinstance(problem.get(name), dict):
+            raise InputError(name, problem.get(name), "must be an object", str(path))
+    return {**problem, "problem": Path(path).stem}
+
+
+def read_result(path: str | Path, problem: dict[str, Any]) -> dict[str, Any]:
+    """Read somebody's answers to a problem; InputError names what is wrong."""
+    result = _read(path, RESULT)
+    if not isinstance(result.get("answers"), dict):
+        raise InputError("answers", result.get("answers"), "must be an object: a list for each quantity", str(path))
+    if result.get("problem") != problem["problem"]:
+        raise InputError("problem", result.get("problem"), f"must be {problem['problem']!r}", str(path))
+    return result
+
+
+def _read(path: str | Path, schema: str) -> dict[str, Any]:
+    text = read_text(path, "JSON file", LARGEST_FILE)
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError("JSON", None, f"cannot be read: {write_one_line(str(error))}", str(path)) from None
+    if not isinstance(data, dict) or data.get("schema") != schema:
+        raise InputError(
+            "schema", data.get("schema") if isinstance(data, dict) else None, f"must be {schema!r}", str(path)
+        )
+    return data
+
+
+def judge(problem: dict[str, Any], result: dict[str, Any]) -> list[Judged]:
+    """Judge every quantity that a problem asks for; one that is missing has the level "-"."""
+    answers, errors = problem["answers"], problem["errors"]
+    if result.get("at") is not None:
+        answers, errors = _answer_at(problem, result["at"])
+    return [_judge_quantity(name, answers[name], errors[name], result["answers"].get(name)) for name in answers]
+
+
+def _answer_at(problem: dict[str, Any], at: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Evaluate the reference at the motion that an engine really made."""
+    if problem["mechanism"] != "four-bar" or problem["ask"] != "answer":
+        raise InputError("at", None, "is judged of a four-bar's positions alone: answer at the command")
+    scene = protocol.scene_from_json(problem["scene"])
+    scene, command = protocol.command_from_json(scene, problem["command"])
+    made = protocol.read_motion(at, command)
+    answers, errors = collect_answers(solve(scene, "error", at=made))
+    return {name: values.tolist() for name, values in answers.items()}, {k: v.tolist() for k, v in errors.items()}
+
+
+def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return angles, torque (or the drive's force) and pin forces of a solution with their error bars."""
+    drive = "torque" if solution.drive_force is None else "drive_force"
+    angle = K * EPS / solution.condition
+    assert solution.force_error is not None
+    bars = {"theta_3": angle, "theta_4": angle, drive: SAFE * getattr(solution, f"{drive}_error")}
+    bars |= dict.fromkeys(PIN_FORCES, SAFE * solution.force_error)
+    return {name: getattr(solution, name) for name in bars}, bars
+
+
+def _judge_quantity(name: str, values: Any, errors: Any, theirs: Any) -> Judged:
+    group = next((group for group, names in GROUPS.items() if name in names), "motion")
+    ours = np.array(values, dtype=float)
+    try:
+        answered = np.array(theirs, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        answered = np.array(np.nan)
+    if answered.shape != ours.shape or not np.isfinite(answered).all() or theirs is None:
+        return Judged(name, group, MISSING, math.nan, 0)
+    difference = np.atleast_1d(answered - ours)
+    size = 1.0
+    if name.startswith("theta"):
+        difference = np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi
+    else:
+        size = float(magnitude(np.atleast_1d(ours)).max()) or 1.0
+    off, bars = magnitude(difference) / size, np.atleast_1d(np.array(errors, dtype=float)) / size
+    level = next((level for level, most in LEVELS.items() if (off <= np.maximum(most, bars)).all()), WORSE)
+    worst = int(np.argmax(off))
+    return Judged(name, group, level, float(off[worst]), worst)
+
+
+def find_levels(rows: list[Judged]) -> dict[str, str]:
+    """Return the worst level of each group of quantities that a problem asks for."""
+    order = (*LEVELS, WORSE, MISSING)
+    groups = dict.fromkeys(row.group for row in rows)
+    return {group: max((row.level for row in rows if row.group == group), key=order.index) for group in groups}
+
+
+def check_problem(problem_file: Path, result_file: Path) -> int:
+    """Print how far each quantity of a result is off, and its level; the exit status."""
+    from rich.console import Console
+    from rich.markup import escape
+
+    from fourbar_validation.report.terminal import make_table
+
+    problem = read_problem(problem_file)
+    result = read_result(result_file, problem)
+    rows, console = judge(problem, result), Console(soft_wrap=True)
+    engine = escape(make_plain(str(result.get("engine", "")))) or "a result"
+    cells = [
+        (row.quantity, "no answer" if row.level == MISSING else f"{row.error:.1e}", str(row.position), row.level)
+        for row in rows
+    ]
+    title = f"{engine}: {problem['problem']}"
+    console.print(make_table(("quantity", "error", "position", "level"), cells, title=title, show_edge=False))
+    levels = find_levels(rows)
+    console.print("levels: " + ", ".join(f"{group} {level}" for group, level in levels.items()))
+    limits = ", ".join(f"{level} {most:g}" for level, most in LEVELS.items())
+    console.print(f"of the largest value, angles in rad: {limits}, D worse; - no answer")
+    return HOLDS if levels and not set(levels.values()) & {WORSE, MISSING} else FAILED

@@ -1,0 +1,124 @@
+"""Two slider-cranks of the set of problems, as data, and their answers by free bodies in fifty digits.
+
+Crank O2-A of length a, rod A-B of length b, slider with its pin and mass centre at B on the line y = offset. The
+product knows four-bars alone: these answers share nothing with its formulas.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+DIGITS = 50
+CONVENTIONS = (
+    "SI units, radians, world axes x and y, angles counter-clockwise from x. Pins: O2 at the origin, A, B; bars: 1 "
+    "the ground with the guide y = offset, 2 crank O2-A, 3 rod A-B, 4 slider, whose pin and mass centre are B; "
+    "theta_3 points from A to B. branch 1: B right of A, -1: left. stroke: x of B. What a bar leaves out is as in a "
+    "four-bar's scene: inertia m L^2/12 about the mass centre, centre [r, angle] from the first pin and line "
+    "mid-bar. Loads act at the mass centre. Fij: force of bar i on bar j. torque: the couple that the ground exerts "
+    "on the crank. guide_force: of the guide on the slider, along y; the guide has no friction. error: how far off "
+    "the value may be; of a vector, its Euclidean norm."
+)
+TURN = [math.radians(15.0 * step) for step in range(25)]
+SLIDER_CRANKS: dict[str, dict[str, Any]] = {
+    "slider_crank": {
+        "title": "A slider-crank in line",
+        "source": "this project, after public questions about loops with a slider: Genesis issues 1911 and 1993, "
+        "PMKSWeb issue 42, mujoco_warp issue 1487, newton issue 3745.",
+        "scene": {
+            "lengths": {"crank": 0.05, "rod": 0.2, "offset": 0.0},
+            "bars": {"crank": {"mass": 0.3}, "rod": {"mass": 0.5, "centre": [0.08, 0.0]}, "slider": {"mass": 0.4}},
+            "effects": {"gravity": [9.81, -0.5 * math.pi]},
+        },
+        "command": {"theta_2": TURN, "omega_2": 20.0, "alpha_2": 0.0, "branch": 1},
+    },
+    "slider_crank_offset": {
+        "title": "A slider-crank with an offset and a load on the slider",
+        "source": "this project: slider_crank with its guide 20 mm above the crank's pin, a rod whose mass centre lies "
+        "off its line, an accelerating crank and a force of 100 N on the slider.",
+        "scene": {
+            "lengths": {"crank": 0.05, "rod": 0.2, "offset": 0.02},
+            "bars": {
+                "crank": {"mass": 0.3, "inertia": 1e-4, "centre": [0.01, 0.5]},
+                "rod": {"mass": 0.5, "inertia": 2e-3, "centre": [0.08, 0.2]},
+                "slider": {"mass": 0.4},
+            },
+            "loads": [{"bar": 4, "force": [100.0, math.pi]}],
+            "effects": {"gravity": [9.81, -0.5 * math.pi]},
+        },
+        "command": {"theta_2": TURN, "omega_2": 20.0, "alpha_2": 50.0, "branch": 1},
+    },
+}
+UNITS = {
+    "theta_3": "rad", "stroke": "m", "torque": "N m", "F12": "N", "F32": "N", "F43": "N", "guide_force": "N",
+}  # fmt: skip
+
+
+def make_problem(name: str) -> dict[str, Any]:
+    """Make the problem: what is stated, and its answers, each rounded once."""
+    stated = SLIDER_CRANKS[name]
+    command = stated["command"]
+    rates = command["omega_2"], command["alpha_2"], command["branch"]
+    rows = [solve(stated["scene"], theta, *rates) for theta in command["theta_2"]]
+    answers = {quantity: [row[quantity] for row in rows] for quantity in UNITS}
+    errors = {quantity: [math.ulp(max(map(abs, np.atleast_1d(value)))) for value in values]
+              for quantity, values in answers.items()}  # fmt: skip
+    return {"conventions": CONVENTIONS, "mechanism": "slider-crank", "ask": "answer", **stated, "answers": answers,
+            "errors": errors, "units": UNITS}  # fmt: skip
+
+
+def solve(scene: dict[str, Any], theta_2: float, omega_2: float, alpha_2: float, branch: int) -> dict[str, Any]:
+    """Solve the eight equations of the three free bodies at one position."""
+    from mpmath import mp, mpc, mpf
+
+    with mp.workdps(DIGITS):
+        a, b, offset = (mpf(scene["lengths"][name]) for name in ("crank", "rod", "offset"))
+        g = _direct(*scene.get("effects", {}).get("gravity", (0.0, 0.0)))
+        theta, omega, alpha = mpf(theta_2), mpf(omega_2), mpf(alpha_2)
+        sine = (offset - a * mp.sin(theta)) / b
+        cosine = branch * mp.sqrt(1 - sine * sine)
+        crank, rod = a * mp.expj(theta), b * mpc(cosine, sine)
+        omega_3 = -omega * crank.real / rod.real
+        alpha_3 = (omega**2 * crank.imag - alpha * crank.real + omega_3**2 * rod.imag) / rod.real
+        at_A = (1j * alpha - omega**2) * crank
+        at_B = at_A + (1j * alpha_3 - omega_3**2) * rod
+        forces, moments, arms = [], [], []
+        for name, line, rate, growth, start in (
+            ("crank", crank, omega, alpha, 0), ("rod", rod, omega_3, alpha_3, at_A), ("slider", 0, 0, 0, at_B),
+        ):  # fmt: skip
+            bar = scene["bars"].get(name, {})
+            mass, length = mpf(bar.get("mass", 0.0)), abs(line)
+            r, phi = bar.get("centre", (0.5 * length, 0.0))
+            arm = r * mp.expj(phi) * line / length if length else mpc(0)
+            forces.append(mass * (start + (1j * growth - rate**2) * arm - g))
+            moments.append(mpf(bar.get("inertia", mass * length**2 / 12)) * growth)
+            arms.append(arm)
+        for load in scene.get("loads", ()):  # at the mass centre
+            forces[load["bar"] - 2] -= _direct(*load["force"])
+        A, y = mp.zeros(8, 8), mp.zeros(8, 1)  # F12 x y, F32 x y, F43 x y, guide, torque
+        for row, terms in enumerate((
+            {0: 1, 2: 1}, {1: 1, 3: 1}, {2: -1, 4: 1}, {3: -1, 5: 1}, {4: -1}, {5: -1, 6: 1},
+        )):  # fmt: skip
+            y[row] = forces[row // 2].imag if row % 2 else forces[row // 2].real
+            for column, factor in terms.items():
+                A[row, column] = factor
+        # moments about each mass centre: the forces at A on the crank and at O2, those at A and B on the rod
+        for column, arm, factor in ((0, -arms[0], 1), (2, crank - arms[0], 1)):
+            A[6, column], A[6, column + 1] = -factor * arm.imag, factor * arm.real
+        A[6, 7], y[6] = 1, moments[0]
+        for column, arm, factor in ((2, -arms[1], -1), (4, rod - arms[1], 1)):
+            A[7, column], A[7, column + 1] = -factor * arm.imag, factor * arm.real
+        y[7] = moments[1]
+        x = [float(value) for value in mp.lu_solve(A, y)]
+        angle, stroke = float(mp.atan2(sine, cosine)), float((crank + rod).real)
+    return {"theta_3": angle, "stroke": stroke, "torque": x[7], "F12": x[0:2], "F32": x[2:4], "F43": x[4:6],
+            "guide_force": x[6]}  # fmt: skip
+
+
+def _direct(size: float, direction: float) -> Any:
+    """Resolve a force into components; one that the direction as a double cannot tell from zero is zero."""
+    from mpmath import mp, mpc, mpf
+
+    x, y = mp.cos(direction), mp.sin(direction)
+    least = mpf(2) ** -53
+    return mpf(size) * mpc(x if abs(x) > least else 0, y if abs(y) > least else 0)
