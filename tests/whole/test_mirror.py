@@ -17,7 +17,7 @@ JUDGED_BY = {
     "fourbar/cli/test_cli.py": "fourbar/cli: edit evaluate export given; fourbar/show: progress tables words",
     "whole/test_exits.py": "fourbar: errors; validation: cli; validation/report: terminal; "
     "validation/lab/stress: mutants",
-    "whole/test_kills.py": "validation/run: pool run selection store; validation/scenes: suites",
+    "whole/test_kills.py": "validation/run: pool run selection store",
     "whole/test_results_format.py": "validation/compare: columns",
     "whole/test_package.py": "validation: places",
     # one table or one evaluation, whose rows are no use alone
