@@ -38,14 +38,14 @@ long-problems:
 long-releases:
 	RELEASES=pip $(BIN)/python -m pytest tests/validation/lab/simulators/test_releases.py
 long-standing:
-	$(BIN)/python -m validation standing
+	$(BIN)/python -m fourbar_lab standing
 long-free:
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/evaluation/test_free_motion_reference.py
 long-fuzz:
-	$(BIN)/python -m validation fuzz --files --count 100000
-	$(BIN)/python -m validation fuzz --scenes 50000
+	$(BIN)/python -m fourbar_lab fuzz-files --count 100000
+	$(BIN)/python -m fourbar_lab fuzz --scenes 50000
 long-accuracy:
-	$(BIN)/python -m validation stability
+	$(BIN)/python -m fourbar_lab stability
 	$(BIN)/python -m validation published
 long-suites:
 	$(BIN)/python -m validation run --suite hard --out results/hard
@@ -57,14 +57,14 @@ docs: setup
 	$(BIN)/sphinx-build -W -q docs site
 
 models: setup
-	$(BIN)/python -m validation write
+	$(BIN)/python -m fourbar_lab write
 
 setup: $(STAMP)
 
-$(STAMP): pyproject.toml
+$(STAMP): pyproject.toml lab/pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[test]"
+	$(BIN)/python -m pip install --quiet --editable ".[test]" --editable lab
 	touch $(STAMP)
 
 clean:

@@ -19,22 +19,25 @@ import pytest
 
 import fourbar
 import fourbar.cli
+import fourbar_lab.cli
 import fourbar_validation.cli
 from fourbar.cli import status
 from fourbar.errors import FAILED, HOLDS
 from fourbar.files import load
 from fourbar.files.effects import REGISTRY
-from fourbar_validation.cli import COMMANDS, group
+from fourbar_lab.cli import COMMANDS as LABS
+from fourbar_lab.effects import EFFECTS
+from fourbar_validation.cli import COMMANDS
 from fourbar_validation.cli import status as harness
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.lab.effects import EFFECTS
 from fourbar_validation.scenes.suites import read_suite
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 GALLERY = ROOT / "models" / "gallery"
 HARNESS = fourbar_validation.cli.group
-GROUPS = {"fourbar": fourbar.cli.group, "validation": HARNESS, "fourbar-validation": HARNESS}
+LAB = fourbar_lab.cli.group
+GROUPS = {"fourbar": fourbar.cli.group, "validation": HARNESS, "fourbar-validation": HARNESS, "fourbar_lab": LAB}
 TOP = ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")
 PAGES = [*(ROOT / f"{name}.md" for name in TOP), *sorted(DOCS.rglob("*.md"))]
 FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
@@ -51,10 +54,10 @@ def blocks(language: str, text: str) -> list[str]:
 def test_the_examples_of_continuous_integration_use_commands_and_options_that_exist() -> None:
     for file in sorted((DOCS / "ci").glob("*.yml")):
         text = re.sub(r"\\\n\s*|>\n\s*|(?<=\S)\n\s+(?=--)", " ", file.read_text())
-        lines = re.findall(r"(?:-m |fourbar-)validation (\w+)(.*)", text)
-        assert "run" in {name for name, _ in lines}
-        for name, options in lines:
-            known = {option for each in group.get_command(None, name).params for option in each.opts}  # type: ignore[arg-type,union-attr]
+        lines = re.findall(r"(validation|fourbar_lab) ([\w-]+)(.*)", text)
+        assert "run" in {name for _, name, _ in lines}
+        for program, name, options in lines:
+            known = {option for each in GROUPS[program].get_command(None, name).params for option in each.opts}  # type: ignore[arg-type,union-attr]
             wanted = set(re.findall(r"(?<=\s)--[a-z-]+", options))
             assert wanted <= known and wanted, (file.name, name, wanted - known)
 
@@ -171,8 +174,10 @@ def test_the_scene_file_is_one(checkout: Path) -> None:
 def test_every_other_command_line_is_one_that_its_program_takes(page: Path) -> None:
     """Those in running text and shell blocks run for minutes or name a SCENE: they are parsed as they stand."""
     text = page.read_text(encoding="utf-8")
-    lines = re.findall(r"`((?:fourbar|python -m validation|fourbar-validation) [^`]+)`", text)
-    lines += re.findall(r"^((?:python -m |fourbar-)validation .*)$", "".join(blocks("sh", text)), re.MULTILINE)
+    lines = re.findall(r"`((?:fourbar|python -m validation|python -m fourbar_lab|fourbar-validation) [^`]+)`", text)
+    lines += re.findall(
+        r"^((?:python -m |fourbar-)(?:validation|fourbar_lab) .*)$", "".join(blocks("sh", text)), re.MULTILINE
+    )
     for line in lines:
         words = shlex.split(line.removeprefix("python -m "), comments=True)
         program = GROUPS[words[0]]
@@ -189,8 +194,7 @@ def options() -> list[set[str]]:
     found = []
     for program in {id(each): each for each in GROUPS.values()}.values():
         context = click.Context(program)
-        names = COMMANDS if program is group else program.list_commands(context)
-        for command in (program, *(program.get_command(context, each) for each in names)):
+        for command in (program, *(program.get_command(context, each) for each in program.list_commands(context))):
             assert command is not None
             found += [{*param.opts, *param.secondary_opts} for param in command.params]
     return found
@@ -198,8 +202,7 @@ def options() -> list[set[str]]:
 
 @pytest.mark.parametrize("name", ["commands.md", "checks.md", "results-format.md"])
 def test_every_option_that_a_page_names_is_one(name: str) -> None:
-    choosing = {form.partition(" ")[2] for form in COMMANDS}
-    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", read(f"docs/{name}"))) <= choosing.union(*options())
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", read(f"docs/{name}"))) <= set().union(*options())
 
 
 def test_every_out_has_its_short_name() -> None:
@@ -211,12 +214,12 @@ def test_every_effect_whose_cost_is_counted_can_be_chosen_from_a_list() -> None:
     assert not any("," in name for name in EFFECTS)
 
 
-def test_every_command_of_the_harness_is_listed() -> None:
-    text = read("docs/checks.md")
-    table = text[text.index("| `fourbar-validation` |") : text.index("The columns of the results:")]
+@pytest.mark.parametrize(("program", "commands"), [("fourbar-validation", COMMANDS), ("fourbar_lab", LABS)])
+def test_every_command_of_harness_and_lab_is_listed(program: str, commands: dict[str, str]) -> None:
+    table = read("docs/checks.md").partition(f"`{program}` |")[2].partition("\n\n")[0]
     first = "".join(line.split("|")[1] for line in table.splitlines()[2:] if line)
-    listed = [re.match(r"[a-z]+(-[a-z]+)?( --[a-z]+)?", each)[0] for each in re.findall("`([^`]*)`", first)]  # type: ignore[index]
-    assert sorted(listed) == sorted(COMMANDS)
+    listed = [re.match("[a-z-]+", each)[0] for each in re.findall("`([^`]*)`", first)]  # type: ignore[index]
+    assert sorted(listed) == sorted(commands)
 
 
 def anchors(page: Path) -> set[str]:

@@ -12,12 +12,13 @@ import pytest
 
 import fourbar
 import fourbar.cli
+import fourbar_lab.cli
 import fourbar_validation.cli
 from fourbar.errors import BAD_INPUT, BROKEN, FAILED, HOLDS, INTERRUPTED, DependencyError, InputError, run
 from fourbar.writing import write_text
+from fourbar_lab.bench import Measured
+from fourbar_lab.tally import Tally
 from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_results
-from fourbar_validation.lab.stress.bench import Measured
-from fourbar_validation.lab.stress.forward_error.tally import Tally
 from fourbar_validation.published.figures import PublishedFigure
 from tests.support.alone import alone
 from tests.support.here import judge_here
@@ -157,7 +158,7 @@ def study(folder: Path) -> dict[str, str]:
     return {name: str(folder / name) for name in ("good.csv", "bad.csv", "theirs.csv", "scene.toml", "out")}
 
 
-VALIDATION, FOURBAR = fourbar_validation.cli.status, fourbar.cli.status
+VALIDATION, FOURBAR, LAB = fourbar_validation.cli.status, fourbar.cli.status, fourbar_lab.cli.status
 STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
     (FOURBAR, "--version", HOLDS),
     (FOURBAR, "--help", HOLDS),
@@ -179,16 +180,16 @@ STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
     (VALIDATION, "check scene.toml no-such-file", BAD_INPUT),
     (VALIDATION, "run scene.toml --engines free-body --no-pictures --out out", HOLDS),
     (VALIDATION, "run scene.toml --engines nobody --out out", BAD_INPUT),
-    (VALIDATION, "fuzz --files --count 3", HOLDS),
-    (VALIDATION, "stability --samples 2 --family random --jobs 1", HOLDS),
-    (VALIDATION, "stability --samples 0", BAD_INPUT),
-    (VALIDATION, "bench --positions 1", BAD_INPUT),
+    (LAB, "fuzz-files --count 3", HOLDS),
+    (LAB, "stability --samples 2 --family random --jobs 1", HOLDS),
+    (LAB, "stability --samples 0", BAD_INPUT),
+    (LAB, "bench --positions 1", BAD_INPUT),
     (VALIDATION, "cost no-such-file", BAD_INPUT),
     (VALIDATION, "advise no-such-file --error 1e-3", BAD_INPUT),
-    (VALIDATION, "advise --study --count 0", BAD_INPUT),
-    (VALIDATION, "cost --effects --engines nobody", BAD_INPUT),
-    (VALIDATION, "faults --mutants --most -1", BAD_INPUT),
-    (VALIDATION, "fuzz --scenes 0", BAD_INPUT),
+    (LAB, "advice --count 0", BAD_INPUT),
+    (LAB, "effects --engines nobody", BAD_INPUT),
+    (LAB, "mutants --most -1", BAD_INPUT),
+    (LAB, "fuzz --scenes 0", BAD_INPUT),
     (VALIDATION, "accept no-such-file", BAD_INPUT),
 ]
 
@@ -201,15 +202,6 @@ def test_every_command_ends_with_its_status(
     monkeypatch.chdir(tmp_path)
     judge_here(monkeypatch)
     assert command([files.get(word, word) for word in line.split()]) == status
-
-
-def test_an_option_that_makes_another_command_may_stand_anywhere(capsys: pytest.CaptureFixture[str]) -> None:
-    for line in ("fuzz --files --count 2", "fuzz --count 2 --files"):
-        assert VALIDATION(line.split()) == HOLDS
-        assert "2 mutated scene files, 0 of them" in capsys.readouterr().out
-    assert VALIDATION(["fuzz", "--files", "--scenes", "3"]) == BAD_INPUT
-    assert VALIDATION(["fuzz", "--help"]) == HOLDS
-    assert "See also `fuzz --files --help`." in capsys.readouterr().out
 
 
 def test_a_figure_that_no_erratum_explains_is_status_1(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -238,8 +230,8 @@ def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch: pytest.Monke
         return solution
 
     judge_here(monkeypatch)
-    monkeypatch.setattr("fourbar_validation.lab.stress.forward_error.stability.solve", off)
-    assert VALIDATION(STABILITY) == FAILED
+    monkeypatch.setattr("fourbar_lab.stability.solve", off)
+    assert LAB(STABILITY) == FAILED
 
 
 def test_samples_that_compare_nothing_are_status_1(
@@ -250,8 +242,8 @@ def test_samples_that_compare_nothing_are_status_1(
         tally.not_assembled += 1
 
     judge_here(monkeypatch)
-    monkeypatch.setattr("fourbar_validation.lab.stress.forward_error.stability.judge", open_loop)
-    assert VALIDATION(STABILITY) == FAILED
+    monkeypatch.setattr("fourbar_lab.stability.judge", open_loop)
+    assert LAB(STABILITY) == FAILED
     assert "random: nothing was compared" in capsys.readouterr().out
 
 
@@ -259,20 +251,18 @@ def test_a_ratio_that_is_not_reached_is_status_1(monkeypatch: pytest.MonkeyPatch
     for name in ONE_THREAD:
         monkeypatch.setenv(name, "1")
     rows = {"growth from 1000 positions on": 1.1, "floor": 1.0}
-    monkeypatch.setattr("fourbar_validation.lab.stress.bench.measure", lambda *_: Measured(rows, {}, {}, {}))
-    assert VALIDATION(["bench"]) == HOLDS
+    monkeypatch.setattr("fourbar_lab.bench.measure", lambda *_: Measured(rows, {}, {}, {}))
+    assert LAB(["bench"]) == HOLDS
     rows["growth from 1000 positions on"] = 2.0
-    assert VALIDATION(["bench"]) == FAILED
+    assert LAB(["bench"]) == FAILED
 
 
 @pytest.mark.parametrize(("ended", "status"), [(0, HOLDS), (1, FAILED), (3, BROKEN), (-11, BROKEN)])
 def test_bench_passes_on_how_its_own_process_ended(ended: int, status: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ONE_THREAD:
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(
-        "fourbar_validation.lab.stress.bench.subprocess.run", lambda line, **_: subprocess.CompletedProcess(line, ended)
-    )
-    assert VALIDATION(["bench"]) == status
+    monkeypatch.setattr("fourbar_lab.bench.subprocess.run", lambda line, **_: subprocess.CompletedProcess(line, ended))
+    assert LAB(["bench"]) == status
 
 
 PROCESSES = [
@@ -289,25 +279,25 @@ PROCESSES = [
     ("fourbar", "edit --port none", BAD_INPUT),
     ("fourbar", f"sdf {NO_FILE} -o a.sdf", BAD_INPUT),
     ("fourbar", f"usd {NO_FILE} -o a.usda", BAD_INPUT),
-    ("validation", "write --problems --no-such-option", BAD_INPUT),
-    ("validation", "standing --no-such-option", BAD_INPUT),
-    ("validation", "standing --findings --release 1.0", BAD_INPUT),
+    ("fourbar_lab", "problems --no-such-option", BAD_INPUT),
+    ("fourbar_lab", "standing --no-such-option", BAD_INPUT),
+    ("fourbar_lab", "findings --release 1.0", BAD_INPUT),
     ("validation", f"accept {NO_FILE}", BAD_INPUT),
     ("validation", f"compare accepted {ROOT / 'validation/fourbar_validation/regression/accepted'}", HOLDS),
     ("validation", f"check {NO_FILE} {NO_FILE}", BAD_INPUT),
     ("validation", f"check-mjcf {NO_FILE} {NO_FILE}", BAD_INPUT),
-    ("validation", "fuzz --files --count 1", HOLDS),
-    ("validation", "write --no-such-option", BAD_INPUT),
+    ("fourbar_lab", "fuzz-files --count 1", HOLDS),
+    ("fourbar_lab", "write --no-such-option", BAD_INPUT),
     ("validation", "published --no-such-option", BAD_INPUT),
-    ("validation", "faults --mutants --most -1", BAD_INPUT),
-    ("validation", "fuzz --scenes 0", BAD_INPUT),
-    ("validation", "faults --workers 0", BAD_INPUT),
-    ("validation", "stability --samples 0", BAD_INPUT),
-    ("validation", "bench --positions 1", BAD_INPUT),
+    ("fourbar_lab", "mutants --most -1", BAD_INPUT),
+    ("fourbar_lab", "fuzz --scenes 0", BAD_INPUT),
+    ("fourbar_lab", "faults --workers 0", BAD_INPUT),
+    ("fourbar_lab", "stability --samples 0", BAD_INPUT),
+    ("fourbar_lab", "bench --positions 1", BAD_INPUT),
     ("validation", f"cost {NO_FILE}", BAD_INPUT),
     ("validation", f"advise {NO_FILE} --error 1e-3", BAD_INPUT),
-    ("validation", "advise --study --count 0", BAD_INPUT),
-    ("validation", "cost --effects --engines nobody", BAD_INPUT),
+    ("fourbar_lab", "advice --count 0", BAD_INPUT),
+    ("fourbar_lab", "effects --engines nobody", BAD_INPUT),
 ]
 
 
@@ -318,14 +308,11 @@ def test_each_command_in_a_process_of_its_own(program: str, line: str, status: i
 
 
 def test_every_command_is_in_the_table_of_processes() -> None:
-    forms = {form for form in fourbar_validation.cli.COMMANDS if " " in form}
-    tried = {
-        (program, next((form for form in forms if line.startswith(f"{form} ")), line.split()[0]))
-        for program, line, _ in PROCESSES
-    }
+    tried = {(program, line.split()[0]) for program, line, _ in PROCESSES}
     assert tried == {
         *(("fourbar", name) for name in fourbar.cli.group.commands),
         *(("validation", name) for name in fourbar_validation.cli.COMMANDS),
+        *(("fourbar_lab", name) for name in fourbar_lab.cli.COMMANDS),
     }
 
 

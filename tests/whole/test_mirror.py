@@ -10,14 +10,17 @@ import pytest
 
 from tests.whole.test_imports import ROOT
 
-SOURCES = {"fourbar": ROOT / "fourbar", "validation": ROOT / "validation" / "fourbar_validation"}
+SOURCES = {
+    "fourbar": ROOT / "fourbar",
+    "validation": ROOT / "validation" / "fourbar_validation",
+    "lab": ROOT / "lab" / "fourbar_lab",
+}
 """Folder of tests, and folder of the modules that it mirrors."""
 JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
     "fourbar/cli/test_cli.py": "fourbar/cli: edit evaluate export given; fourbar/show: progress tables words",
-    "whole/test_exits.py": "fourbar: errors; validation: cli; validation/report: terminal; "
-    "validation/lab/stress: mutants",
-    "whole/test_kills.py": "validation/run: pool run selection store",
+    "whole/test_exits.py": "fourbar: errors; validation: cli; validation/report: terminal; lab: cli fuzz_files",
+    "whole/test_kills.py": "validation/run: pool run selection store; validation/scenes: suites",
     "whole/test_results_format.py": "validation/compare: columns",
     "whole/test_package.py": "validation: places",
     # one table or one evaluation, whose rows are no use alone
@@ -68,21 +71,21 @@ JUDGED_BY = {
     "validation/check/test_mjcf.py": "validation/check: causes differences screen; "
     "validation/engines: memory; validation/engines/mujoco: attached corrections describe guess theirs topology",
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "
-    "thesis_dynamics thesis_positions thirteen; validation/lab: ladder",
+    "ladder thesis_dynamics thesis_positions thirteen",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "
     "record render scenes; validation/report: junit; validation/run: elsewhere",
     "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
     "templating",
     # studies: each through its command
-    "validation/lab/stress/test_bench.py": "validation/lab/stress: contenders",
-    "validation/lab/stress/forward_error/test_stability.py": "validation/lab/stress/forward_error: families "
-    "libraries slopes tally",
-    "validation/lab/stress/fuzz/test_fuzz.py": "validation/lab/stress/fuzz: outside scenes shrink",
-    "validation/lab/stress/mutation/test_mutation.py": "validation/lab/stress/mutation: code_mutants harness",
-    "validation/lab/stress/mutation/test_faults.py": "validation/lab/stress/mutation: fault_scenes injection",
-    "validation/lab/cost/test_cost.py": "validation/lab/cost: series formulas laws pictures study; "
+    "lab/test_advice.py": "lab: exhaustive",
+    "lab/test_bench.py": "lab: contenders",
+    "lab/test_stability.py": "lab: families libraries slopes tally",
+    "lab/test_fuzz.py": "lab: outside fuzz_scenes shrink",
+    "lab/test_mutants.py": "lab: code_mutants",
+    "lab/test_faults.py": "lab: fault_scenes injection",
+    "validation/cost/test_cost.py": "validation/cost: series formulas laws pictures study; "
     "validation/advise: worst_errors; validation/engines/mujoco: one_state",
-    "validation/advise/test_advise.py": "validation/advise: matters; validation/lab/cost: exhaustive measure; "
+    "validation/advise/test_advise.py": "validation/advise: matters; "
     "validation/run: required_error; validation/engines/mujoco: trial",
     "validation/lab/simulators/test_problems.py": "validation/lab/simulators: slider_crank; validation/check: problem",
     # simulators that need not be there: their scripts run where they are installed

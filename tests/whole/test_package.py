@@ -22,6 +22,7 @@ import pytest
 from fourbar.cli import status
 from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, DependencyError, say_install
 from fourbar.files import save
+from fourbar_lab.cli import status as lab
 from fourbar_validation.cli import status as harness
 from fourbar_validation.places import import_path
 from tests.support.scenes import crank_rocker
@@ -63,12 +64,12 @@ def test_the_source_archive_has_the_package_that_lies_elsewhere() -> None:
         assert (ROOT / module).is_file() and f"include {module}\n" in (ROOT / "MANIFEST.in").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("line", ["write", "write --problems", "faults", "bench --against HEAD"])
+@pytest.mark.parametrize("line", ["write", "problems"])
 def test_what_needs_a_checkout_says_so_in_one_line(
     line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
-    assert harness(line.split()) == BAD_INPUT
+    assert lab([line]) == BAD_INPUT
     complained = capsys.readouterr().err
     assert complained.count("\n") == 1 and "needs a checkout" in complained
 

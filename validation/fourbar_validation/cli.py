@@ -1,7 +1,9 @@
 """Commands of the harness; each lives in its own module and is imported when it is called."""
 
 import sys
+from collections.abc import Mapping
 from pkgutil import resolve_name
+from typing import Any
 
 import click
 
@@ -15,54 +17,33 @@ COMMANDS = {
     "compare": "fourbar_validation.regression.accept:compare",
     "check": "fourbar_validation.check:check",
     "check-mjcf": "fourbar_validation.check.mjcf:command",
-    "published": "fourbar_validation.lab.ladder:published",
-    "cost": "fourbar_validation.lab.cost.cost:cost",
-    "cost --effects": "fourbar_validation.lab.effects:cost_effects",
+    "published": "fourbar_validation.published.ladder:published",
+    "cost": "fourbar_validation.cost.cost:cost",
     "advise": "fourbar_validation.advise.advise:command",
-    "advise --study": "fourbar_validation.lab.cost.measure:study",
-    "stability": "fourbar_validation.lab.stress.forward_error.stability:stability",
-    "bench": "fourbar_validation.lab.stress.bench:bench",
-    "fuzz": "fourbar_validation.lab.stress.fuzz.fuzz:fuzz",
-    "fuzz --files": "fourbar_validation.lab.stress.mutants:fuzz_files",
-    "faults": "fourbar_validation.lab.stress.mutation.faults:command",
-    "faults --mutants": "fourbar_validation.lab.stress.mutation.harness:command",
-    "standing": "fourbar_validation.lab.simulators.standing:command",
-    "standing --findings": "fourbar_validation.lab.simulators.findings:command",
-    "write": "fourbar_validation.lab.models:models",
-    "write --problems": "fourbar_validation.lab.simulators.problems:command",
 }
-"""By name, some with the option that makes another command of it, with options of its own."""
 
 
 class LazyGroup(click.Group):
     """A group whose commands are imported on demand."""
 
+    def __init__(self, *, modules: Mapping[str, str], **settings: Any) -> None:
+        super().__init__(**settings)
+        self.modules = modules
+        """By the name of a command, in the order a newcomer needs them: its module and the command in it."""
+
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """List the commands in the order a newcomer needs them, without the options that make others of them."""
-        return [name for name in COMMANDS if " " not in name]
+        """List the commands in their order."""
+        return list(self.modules)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import a command; its help names those that an option makes of it."""
-        if cmd_name not in COMMANDS:
+        """Import a command."""
+        if cmd_name not in self.modules:
             return None
         try:
-            command: click.Command = resolve_name(COMMANDS[cmd_name])
+            command: click.Command = resolve_name(self.modules[cmd_name])
         except ModuleNotFoundError as error:
             return _stand_in(cmd_name, error)
-        others = [f"`{name} --help`" for name in COMMANDS if name.startswith(f"{cmd_name} ")]
-        command.epilog = f"See also {', '.join(others)}." if others else None
         return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Choose by name and option."""
-        name, *options = args
-        for option in options:
-            if f"{name} {option}" in COMMANDS:
-                options.remove(option)
-                return super().resolve_command(ctx, [f"{name} {option}", *options])
-        return super().resolve_command(ctx, args)
 
 
 def _stand_in(name: str, missing: ModuleNotFoundError) -> click.Command:
@@ -78,7 +59,12 @@ def _stand_in(name: str, missing: ModuleNotFoundError) -> click.Command:
     return unavailable
 
 
-@click.group(cls=LazyGroup, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=LazyGroup,
+    modules=COMMANDS,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(__version__, "-V", "--version", prog_name="fourbar-validation")
 @click.pass_context
 def group(context: click.Context) -> None:

@@ -11,9 +11,9 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
+from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
-from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from fourbar_validation.run import printed
 from fourbar_validation.run.question import Question
 

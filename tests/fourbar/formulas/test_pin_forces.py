@@ -14,7 +14,7 @@ from fourbar.formulas.path import compute_state as state_of
 from fourbar.formulas.path import drive_sine
 from fourbar.formulas.pin_forces import Wrenches, solve_between
 from fourbar.linkage import MOVING_BARS
-from fourbar_validation.lab.stress.contenders import make_command, make_example
+from fourbar_lab.contenders import make_command, make_example
 from fourbar_validation.published.thirteen import FreeBodies, assemble, solve_thirteen
 
 EPS = 2.0**-52

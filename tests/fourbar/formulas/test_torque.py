@@ -18,8 +18,8 @@ from fourbar.formulas.position import half_angle, loop
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.scene import Command, command
 from fourbar.solve import solve
+from fourbar_validation.cost.formulas import solve_thirteen_equations
 from fourbar_validation.engines.balls import BITS, collect_inputs, compute_outputs
-from fourbar_validation.lab.cost.formulas import solve_thirteen_equations
 
 EPS = 2.0**-52
 K = 200.0

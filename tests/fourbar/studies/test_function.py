@@ -28,7 +28,7 @@ from fourbar.quantities import OF_LINE, STAGE_OF
 from fourbar.scene.motion import Free
 from fourbar.studies.function import NEVER, function
 from fourbar.studies.keys import command_key, is_left_out, list_entries, read_place
-from fourbar_validation.lab.stress.forward_error.families import FAMILIES
+from fourbar_lab.families import FAMILIES
 
 EPS = 2.0**-52
 ROUNDED = 200.0 * EPS

@@ -1,4 +1,4 @@
-"""The advice: the figures it reaches, the file it writes, what it says where nothing serves, and its measure."""
+"""The advice: the figures it reaches, the file it writes, what it says where nothing serves."""
 
 import math
 from dataclasses import replace
@@ -10,22 +10,19 @@ import pytest
 from click.testing import CliRunner
 
 import fourbar
-from fourbar.scene import Command, command
+from fourbar.scene import Command
+from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.advise import advise, matters
 from fourbar_validation.advise.worst_errors import compute_errors
-from fourbar_validation.cli import status as ended
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.engines.witnesses import WITNESSES
-from fourbar_validation.lab.cost import measure
-from fourbar_validation.lab.cost.exhaustive import find_cheapest
-from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from fourbar_validation.run import required_error
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import MODELS
-from tests.validation.lab.cost.test_cost import turning
+from tests.validation.cost.test_cost import turning
 
 
 @pytest.mark.parametrize(("omega", "required", "most"), [(10.0, 1e-4, 75), (1000.0, 1e-6, 300), (100.0, 2e-9, 1000)])
@@ -108,59 +105,6 @@ def test_an_error_is_between_0_and_1(required: float) -> None:
         advise.advise(turning(), required)
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
         required_error.adjust_witnesses(WITNESSES, required)
-
-
-def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> None:
-    """A few of those of `advise --study`, of every type, judged between the positions that the advice saw."""
-    costs = {("RK4", True): 1.0}
-    for index in range(2):
-        case = measure.measure_case(99, index, costs)
-        assert case.met and case.cheap, case
-
-
-def test_the_search_knows_when_nothing_serves() -> None:
-    scene = turning(positions=12)
-    setup = TrialSetup(scene, command(scene))
-    assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is not None
-    trials: list[object] = []
-    setup.try_out = lambda settings, build=None: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
-    assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
-
-
-def hopeless(scene: fourbar.Scene) -> object:
-    made = TrialSetup(scene, command(scene)).try_out(advise.make_settings(10.0, 3.0))
-    made.broken = "lost"
-    return made
-
-
-def test_a_count_that_cannot_decide_says_which_one_can(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    case = measure.AdviceCase(0, 1e-3, True, 5e-4, 20.0, 19.0)
-    monkeypatch.setattr(measure, "measure_case", lambda seed, index, costs: replace(case, index=index))
-    monkeypatch.setattr(measure, "time_relative_costs", lambda setup: {})
-    for count, status in ((40, 1), (73, 0)):
-        assert ended(["advise", "--study", "--count", str(count), "--out", str(tmp_path / str(count))]) == status
-        stated = "undecided: with 0 not met the bound is reached from --count 73 on" in capsys.readouterr().out
-        assert stated == (status == 1)
-
-
-def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[int] = []
-
-    def case(seed: int, index: int, costs: object) -> measure.AdviceCase:
-        made.append(index)
-        return measure.AdviceCase(index, 1e-3, True, 5e-4, 20.0, 19.0)
-
-    monkeypatch.setattr(measure, "measure_case", case)
-    monkeypatch.setattr(measure, "time_relative_costs", lambda setup: {})
-    out = tmp_path / "study"
-    list(measure.measure(3, 2, out))
-    cases = list(measure.measure(3, 4, out))
-    assert made == [0, 1, 2, 3] and [each.index for each in cases] == made and all(each.met for each in cases)
-    made.clear()
-    list(measure.measure(4, 1, out))  # another seed starts over
-    assert made == [0]
 
 
 @pytest.mark.parametrize("required", [1e-3, 1e-7])

@@ -21,8 +21,8 @@ from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, write_results
 from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.cost.laws import ErrorLaw
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
-from fourbar_validation.lab.cost.laws import ErrorLaw
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import compare_rows
 from fourbar_validation.report.html import write_html as page_of
@@ -307,10 +307,10 @@ def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.Cap
 def test_a_study_in_which_no_law_is_fitted_is_no_success(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("fourbar_validation.lab.cost.study.CostStudy.points", lambda _: iter(()))
-    monkeypatch.setattr("fourbar_validation.lab.cost.cost.write", lambda *_: [])
+    monkeypatch.setattr("fourbar_validation.cost.study.CostStudy.points", lambda _: iter(()))
+    monkeypatch.setattr("fourbar_validation.cost.cost.write", lambda *_: [])
     law = ErrorLaw("order", "torque", 4.0, 0.1, 4.0, 9)
     for found, code in (([], FAILED), ([replace(law, points=1)], FAILED), ([law], HOLDS)):
-        monkeypatch.setattr("fourbar_validation.lab.cost.cost.fit_laws", lambda _, found=found: found)
+        monkeypatch.setattr("fourbar_validation.cost.cost.fit_laws", lambda _, found=found: found)
         assert status(["cost", "--out", str(tmp_path)]) == code
         assert ("Nothing was compared" in capsys.readouterr().out) == (code == FAILED)

@@ -9,6 +9,7 @@ import fourbar
 from fourbar.formulas.mobility import limit_positions
 from fourbar.quantities import FORCES
 from fourbar.scene import Command, Scene, command
+from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import COMPARED
@@ -16,7 +17,6 @@ from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, R
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, FULL_ACCURACY, K
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.witnesses import WITNESSES, Witness, make_prediction
-from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 

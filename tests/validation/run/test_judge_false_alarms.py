@@ -11,9 +11,9 @@ from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Motion
 from fourbar.solution import Solution
+from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
 from fourbar_validation.engines.witnesses import WITNESSES
-from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from fourbar_validation.run import printed, released
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import Question

@@ -69,11 +69,11 @@ def find_kernels() -> dict[str, str]:
 
 
 @cache
-def name_code() -> dict[str, str]:
-    """Name and version or hash of everything that decides a number; one run, and all its machines, have one."""
+def name_code(*further: Path) -> dict[str, str]:
+    """Name and version or hash of everything that decides a number, `further` packages among it; one for a run."""
     builds = {name: build(package) for name, package in DISTRIBUTIONS.items()}
     known = {f"build of {name}": found for name, found in builds.items() if found and name != "fourbar"}
-    return {"code": hash_modules(FORMULAS, PACKAGE), **list_versions(), **known}
+    return {"code": hash_modules(FORMULAS, PACKAGE, *further), **list_versions(), **known}
 
 
 def hash_modules(*packages: Path) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from fourbar_validation.cli import status
+from fourbar_lab.cli import status
 from fourbar_validation.lab.simulators import findings as module
 from fourbar_validation.lab.simulators.findings import FIELDS, FOLDER, MENDED, find_interpreter, read, read_findings
 
@@ -81,5 +81,5 @@ def test_the_command_says_what_could_not_run(monkeypatch: pytest.MonkeyPatch, tm
 
 @pytest.mark.parametrize("arguments", [["--release", "1.0"], [__file__], ["no_such.py"]])
 def test_bad_input_is_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert status(["standing", "--findings", *arguments]) == 2
+    assert status(["findings", *arguments]) == 2
     assert capsys.readouterr().err.count("\n") == 1

@@ -11,8 +11,8 @@ import fourbar
 from fourbar.effects import SpringEnd
 from fourbar.scene import Scene, command
 from fourbar.studies.keys import is_left_out, list_entries
+from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
-from fourbar_validation.lab.stress.mutation.fault_scenes import FAULT_SCENES
 from fourbar_validation.run import judge
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped import files

@@ -1,4 +1,4 @@
-"""`python -m validation standing --findings`: each finding's script where its simulator is, or under given releases."""
+"""`findings`: each finding's script where its simulator is, or under given releases."""
 
 import ast
 import re

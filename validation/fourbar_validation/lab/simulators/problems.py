@@ -1,4 +1,4 @@
-"""`python -m validation write --problems`: the problems with their answers, as JSON that needs nothing of ours."""
+"""`problems`: the problems with their answers, as JSON that needs nothing of ours."""
 
 import json
 from typing import Any
@@ -102,7 +102,7 @@ def _measure_period(time: Array, theta: Array, omega: Array, alpha: Array) -> fl
 @click.command()
 def command() -> None:
     """Write the problems of models/problems and their answers as JSON."""
-    find_checkout("write --problems")
+    find_checkout("problems")
     for name in list_problems():
         write_text((PROBLEMS / name).with_suffix(".json"), write_json(collect_problem(name)))
         click.echo(f"wrote {name}.json")

@@ -1,4 +1,4 @@
-"""`python -m validation standing`: what simulators say of one closed loop, on one page."""
+"""`standing`: what simulators say of one closed loop, on one page."""
 
 import math
 import sys

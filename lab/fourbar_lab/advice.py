@@ -1,0 +1,159 @@
+"""How good the advice is, on linkages that it has never seen: met, and how near the cheapest."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import click
+import numpy as np
+
+from fourbar.errors import LimitError
+from fourbar.formulas.mobility import turns_fully
+from fourbar.scene import Scene, command
+from fourbar.scene.motion import Motion, Sweep
+from fourbar_lab.exhaustive import find_cheapest, time_relative_costs
+from fourbar_validation.advise.advise import advise
+from fourbar_validation.advise.matters import judge_trial
+from fourbar_validation.engines.mujoco.trial import TrialSetup
+from fourbar_validation.report.machine import name_code
+from fourbar_validation.run.store import Store
+from fourbar_validation.scenes.random import DrawnType, draw_random_scene
+
+LAB = Path(__file__).parent
+TYPES = tuple(kind for kind in DrawnType if kind is not DrawnType.ROCKER_CRANK)
+SPEEDS = (-1.0, 3.0)
+"""log10 of rad/s."""
+ERRORS = (-7.0, -2.0)
+"""log10 of the required error."""
+WINDOW = 0.8
+"""Part of the range of a rocker that is run through: away from its limits."""
+GENTLE = 0.02
+"""|alpha_2| / omega_2^2: over a turn the speed changes by an eighth and never vanishes."""
+POSITIONS, DENSER, SEARCHED = 36, 4, 2
+"""Intervals of the scene; the answer is judged at so many times more, the search decides at so many times more."""
+NEEDED_MET, NEEDED_CHEAP, CHEAP = 0.95, 0.80, 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class AdviceCase:
+    """One linkage, one required error."""
+
+    index: int
+    asked: float
+    """The required error."""
+    reached: bool
+    """The advice says that it serves."""
+    error: float
+    """Judged at the denser positions."""
+    cost: float
+    """RK4 steps per run of the advice."""
+    cheapest: float
+    """Of the exhaustive search; NaN where it found nothing."""
+
+    @property
+    def met(self) -> bool:
+        """Within the required error, or rightly called unreachable."""
+        return self.error <= self.asked if self.reached else math.isnan(self.cheapest)
+
+    @property
+    def cheap(self) -> bool:
+        """Within CHEAP times the cheapest; rightly unreachable counts."""
+        if not self.reached:
+            return self.met
+        return not self.cost > CHEAP * self.cheapest
+
+
+def draw_scene(seed: int, index: int) -> tuple[Scene, float]:
+    """Draw a linkage away from its limits, at a random speed, and the error required of it."""
+    scene = draw_random_scene(seed, index, TYPES)
+    rng = np.random.default_rng([seed, index, 1])
+    omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(*SPEEDS))
+    alpha = float(rng.choice([0.0, omega**2 * rng.uniform(-GENTLE, GENTLE)]))
+    sweep = scene.motion.theta_2
+    assert isinstance(sweep, Sweep)
+    start, stop = sweep.start, sweep.stop
+    if not turns_fully(scene.linkage):
+        middle, half = (start + stop) / 2.0, WINDOW * (stop - start) / 2.0
+        start, stop = middle - half, middle + half
+    motion = Motion(Sweep(start, stop, POSITIONS), omega, alpha, scene.motion.branch)
+    return replace(scene, motion=motion), float(10.0 ** rng.uniform(*ERRORS))
+
+
+def make_denser(scene: Scene, times: int) -> Scene:
+    """Divide the same motion into more positions."""
+    sweep = scene.motion.theta_2
+    assert isinstance(sweep, Sweep)
+    return replace(scene, motion=replace(scene.motion, theta_2=replace(sweep, steps=sweep.steps * times)))
+
+
+def measure_case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceCase:
+    """Ask for advice, judge it at denser positions, and search exhaustively."""
+    scene, required = draw_scene(seed, index)
+    advice = advise(scene, required)
+    dense, searched = make_denser(scene, DENSER), make_denser(scene, SEARCHED)
+    error = judge_trial(dense, TrialSetup(dense, command(dense)).try_out(advice.best.settings)).worst
+    cheapest = find_cheapest(TrialSetup(searched, command(searched)), required, costs)
+    cost = float(advice.best.steps)
+    return AdviceCase(index, required, advice.reached, error, cost, math.nan if cheapest is None else cheapest)
+
+
+def compute_wilson(successes: int, n: int) -> float:
+    """Compute the lower bound of the Wilson score interval of a proportion, at 95 %."""
+    from scipy.stats import binomtest
+
+    return float(binomtest(successes, n).proportion_ci(0.95, "wilson").low) if n else 0.0
+
+
+def find_enough(missed: int) -> int:
+    """Find the least number of cases whose bound is the needed one where so many are not met."""
+    n = missed + 1
+    while compute_wilson(n - missed, n) < NEEDED_MET:
+        n += 1
+    return n
+
+
+def measure(seed: int, count: int, out: Path) -> Iterator[AdviceCase]:
+    """Yield the cases, each kept as it comes; those that an interrupted run left are read."""
+    with Store(out, {"seed": seed, **name_code(LAB)}).held() as store:
+        done, first = store.done(), draw_scene(seed, 0)[0]
+        costs: dict[tuple[str, bool], float] = {}
+        for index in range(count):
+            if index not in done:
+                costs = costs or time_relative_costs(TrialSetup(first, command(first)))
+                try:
+                    store.put(index, [asdict(measure_case(seed, index, costs))])
+                except LimitError as error:
+                    raise LimitError(f"linkage {index} of seed {seed}: {error}") from None
+            yield AdviceCase(**store.read(index)[0])
+
+
+@click.command()
+@click.option("--count", type=click.IntRange(min=1), default=400, show_default=True, help="Random linkages.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
+@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/advise-study"))
+def study(count: int, seed: int, out: Path) -> int:
+    """Measure the advice on random linkages; exit 1 where it is not met or not cheap often enough.
+
+    That it is met often enough is a statement on all linkages, which few of them cannot prove: the count that it
+    needs is stated.
+    """
+    from rich.console import Console
+    from rich.progress import track
+
+    cases = list(track(measure(seed, count, out), "advising", total=count, console=Console(stderr=True)))
+    met, cheap = sum(each.met for each in cases), sum(each.cheap for each in cases)
+    unreachable = sum(not each.reached for each in cases)
+    ratios = sorted(each.cost / each.cheapest for each in cases if each.reached and each.cheapest == each.cheapest)
+    bound = compute_wilson(met, len(cases))
+    click.echo(f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed {NEEDED_MET})")
+    if bound < NEEDED_MET and (more := find_enough(len(cases) - met)) > len(cases):
+        click.echo(f"undecided: with {len(cases) - met} not met the bound is reached from --count {more} on")
+    wrongly = sum(not each.met for each in cases if not each.reached)
+    click.echo(f"called unreachable: {unreachable}, of which the search reached {wrongly}")
+    share = cheap / len(cases)
+    click.echo(f"within {CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f} (needed {NEEDED_CHEAP})")
+    if ratios:
+        median, high = ratios[len(ratios) // 2], ratios[int(0.95 * (len(ratios) - 1))]
+        click.echo(f"cost over the cheapest: median {median:.2f}, 95 % below {high:.2f}, most {ratios[-1]:.2f}")
+    return 0 if bound >= NEEDED_MET and share >= NEEDED_CHEAP else 1

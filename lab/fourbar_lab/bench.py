@@ -1,0 +1,260 @@
+"""Speed side by side in one process: stages, the 13x13 system, C, a judged scene; ratios that hold."""
+
+import os
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import BROKEN, FAILED, HOLDS
+from fourbar.evaluation.case import BLOCK
+from fourbar.formulas.mobility import choose_range
+from fourbar.linkage import Bar, FourBar
+from fourbar.quantities import ANGLES, UNKNOWNS
+from fourbar.show.plot.style import format_of
+from fourbar.solve import solve
+from fourbar_lab.contenders import (
+    POSITIONS,
+    STUDY,
+    Times,
+    allocate,
+    collect_loops,
+    draw_bench,
+    make_command,
+    make_example,
+    time_interleaved,
+    time_linkages,
+    time_positions,
+)
+from fourbar_validation.cost.formulas import make_bodies
+from fourbar_validation.cost.study import time_call
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.published.thirteen import solve_thirteen
+from fourbar_validation.report.machine import name_machine
+from fourbar_validation.report.terminal import make_table
+from fourbar_validation.run.judge import judge_for_report
+from fourbar_validation.scenes.random import DrawnType
+from fourbar_validation.scenes.suites import Random
+
+Array = NDArray[np.float64]
+
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
+"""Its input swings between limit positions: each of its positions has to be looked at."""
+THIRTEEN_BATCH = 20_000
+"""Positions per batch of the 13x13 system: larger batches are slower per position (27 MB of matrices each)."""
+OVER_POSITIONS = "all unknowns of a position, over the number of positions (1e6 at once at most)"
+OVER_LINKAGES = "all forces of a linkage at one position, over the number of linkages"
+SOLVED = 100_000
+"""Positions where every array is allocated, and for the error bars, which evaluate the forces 15 times."""
+ALONE = 20
+"""Calls of one position each."""
+PER_SCENE = 50_000
+"""Positions in whose stead one random scene is judged: twenty of them by default."""
+ALL, ANGLES_ALONE = "formulas, all 11 unknowns", "positions only"
+SYSTEM, FLOOR = "13x13 assembled and solved", "floor: tangent, root, two arctan"
+FORCES, BARS, ONE = "solve to forces, points too", "solve with error bars", "one position to forces"
+JUDGED = "a scene judged by the exact engines"
+
+
+class SpeedLimit(NamedTuple):
+    """Limit of a row of the table, and why; a ratio, which holds with and without AVX-512."""
+
+    sign: str
+    bound: float
+    reason: str
+    of: str = ""
+    over: str = ""
+    """The rows whose ratio it is."""
+
+    def holds(self, measured: float) -> bool:
+        """Compare a measured number with the limit; NaN does not hold."""
+        return measured >= self.bound if self.sign == ">=" else measured <= self.bound
+
+
+LIMITS = {
+    "13x13 / formulas": SpeedLimit(
+        ">=", 5.0, "closed formulas are worth several times the system that they eliminate", SYSTEM, ALL
+    ),
+    "formulas / positions only": SpeedLimit(
+        ">=", 3.0, "who asks for two angles does not pay for nine more unknowns", ALL, ANGLES_ALONE
+    ),
+    "positions only / floor": SpeedLimit(
+        "<=", 6.0, "the rest of two angles is arithmetic on arrays of a block", ANGLES_ALONE, FLOOR
+    ),
+    "solve to forces / formulas": SpeedLimit(
+        "<=", 2.0, "new arrays and the points come on top, no second evaluation", FORCES, ALL
+    ),
+    "solve with error bars / to forces": SpeedLimit(
+        "<=", 25.0, "the forces are evaluated 15 times, all that is computed changed in its last digit", BARS, FORCES
+    ),
+    "one position / its 13x13": SpeedLimit(
+        "<=",
+        6.0,
+        "some hundred steps of Python, where the system is a few calls of LAPACK's",
+        ONE,
+        "13x13 of one position",
+    ),
+    "one position with error bars / to forces": SpeedLimit(
+        "<=", 4.5, "the evaluations run as one batch of short arrays", "one position with error bars", ONE
+    ),
+    "study of linkages / positions": SpeedLimit("<=", 2.0, "a member is a column of the same arrays as a position"),
+    "growth from 1000 positions on": SpeedLimit("<=", 1.3, "the work is linear in the positions: blocks fit the cache"),
+    "memory beyond the result, MB": SpeedLimit("<=", 50.0, "work space is that of a block, not of the sweep"),
+    "a judged scene / one position": SpeedLimit(
+        "<=", 650.0, "65 ms where a position takes 0.1 ms: a million scenes a night on 20 cores", JUDGED, ONE
+    ),
+    "import fourbar / import numpy": SpeedLimit("<=", 1.0, "it loads numpy alone, and less than that of its own"),
+}
+"""By the name of the row."""
+
+
+class Measured(NamedTuple):
+    """What one run found."""
+
+    rows: dict[str, float]
+    over_positions: Times
+    over_linkages: Times
+    not_run: dict[str, str]
+
+
+def import_cost() -> float:
+    """Compare the CPU time that `import fourbar` adds with that of `import numpy`: median over fresh interpreters."""
+    clock = "time.process_time()"
+    code = f"import time; a = {clock}; import numpy; b = {clock}; import fourbar; print(({clock} - b) / (b - a))"
+    runs = [
+        subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True)
+        for _ in range(7)
+    ]
+    return median(float(run.stdout) for run in runs)
+
+
+def measure_memory(n: int) -> float:
+    """Measure the MB allocated at the peak beyond arguments and results."""
+    at = make_command(n)
+    out = allocate(UNKNOWNS, at)
+    tracemalloc.start()
+    solve(make_example(), at=at, out=out)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak / 1e6
+
+
+def make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
+    """Make what no formula for two angles does without: a tangent, a square root and two arctangents, by blocks."""
+
+    def action() -> None:
+        for start in range(0, len(theta_2), BLOCK):
+            part = slice(start, start + BLOCK)
+            t = np.tan(theta_2[part])
+            root = np.sqrt(np.abs(t, out=t), out=t)
+            for angle in out.values():
+                np.arctan(root, out=angle[part])
+
+    return action
+
+
+@click.command()
+@click.option("--positions", default=1_000_000, show_default=True, type=click.IntRange(1000))
+@click.option("--rounds", default=5, show_default=True, type=click.IntRange(1))
+@click.option(
+    "--largest", default=1_000_000, show_default=True, type=click.IntRange(1000, 10**8), help="For the growth, to 1e8."
+)
+@click.option("--picture", type=click.Path(path_type=Path), metavar="FILE", help="Draw the growth: svg, png or pdf.")
+def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> int:
+    """Time NumPy, C and the 13x13 system side by side; ratios that must hold."""
+    if picture is not None:
+        format_of(picture)
+    from rich.console import Console
+
+    if any(os.environ.get(name) != "1" for name in ONE_THREAD):
+        # read when numpy is loaded: too late in this process
+        arguments = ["--positions", positions, "--rounds", rounds, "--largest", largest]
+        arguments += ["--picture", picture] if picture is not None else []
+        line = [sys.executable, "-m", "fourbar_lab", "bench", *map(str, arguments)]
+        status = subprocess.run(line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False).returncode
+        return status if status >= 0 else BROKEN  # below 0: a signal ended it
+    result = measure(positions, rounds, largest)
+    rows: list[tuple[str, ...]] = []
+    broken: list[str] = []
+    for what, measured in result.rows.items():
+        limit = LIMITS.get(what)
+        if limit is None:
+            rows.append((what, f"{1e-6 * measured:.1f} ms" if what == JUDGED else f"{measured:.1f} ns/position"))
+            continue
+        holds = limit.holds(measured)
+        rows.append((what, f"{measured:.2f}", f"{limit.sign} {limit.bound:g}", "holds" if holds else "fails"))
+        broken += [] if holds else [f"{what}: {limit.reason}"]
+    console = Console()
+    title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {name_machine()}"
+    console.print(make_table(("what", "measured", "needed", ""), rows, title=title))
+    for title, times in ((OVER_POSITIONS, result.over_positions), (OVER_LINKAGES, result.over_linkages)):
+        counts = sorted({n for own in times.values() for n in own})
+        head = ["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)]
+        each = [[who, *(f"{own[n]:.4g}" if n in own else "" for n in counts)] for who, own in times.items()]
+        console.print(make_table(head, each, title=title))
+    for who, reason in result.not_run.items():
+        click.echo(f"not run: {who}: {reason}")
+    if picture is not None:
+        draw_bench(result.over_positions, result.over_linkages, picture)
+    for what in broken:
+        click.echo(f"fails: {what}")
+    return FAILED if broken else HOLDS
+
+
+def measure(positions: int, rounds: int, largest: int) -> Measured:
+    """Measure the ratios of LIMITS and ns per position, and the times by how many."""
+    scene, at = make_example(), make_command(positions)
+    limits, swing = make_example(WITH_LIMITS), make_command(positions, *choose_range(WITH_LIMITS))
+    everything, angles = allocate(UNKNOWNS, at), allocate(ANGLES, at)
+    batch, solved = min(positions, THIRTEEN_BATCH), make_command(min(positions, SOLVED))
+    bodies, many = make_bodies(scene, make_command(batch)), len(solved.theta_2)
+    alone, lone = make_example(theta_2=1.0), make_bodies(scene, make_command(1))
+    peers = collect_loops()
+    actions: dict[str, tuple[int, Callable[[], object]]] = {
+        ALL: (positions, lambda: solve(scene, at=at, out=everything)),
+        ANGLES_ALONE: (positions, lambda: solve(scene, at=at, out=angles)),
+        SYSTEM: (batch, lambda: solve_thirteen(bodies, 2)),
+        FLOOR: (positions, make_floor(at.theta_2, angles)),
+        "input between limits: all": (positions, lambda: solve(limits, at=swing, out=everything)),
+        "input between limits: positions only": (positions, lambda: solve(limits, at=swing, out=angles)),
+        FORCES: (many, lambda: solve(scene, "force", at=solved)),
+        BARS: (many, lambda: solve(scene, "error", at=solved)),
+        "13x13 of one position": (ALONE, lambda: [solve_thirteen(lone, 2) for _ in range(ALONE)]),
+        ONE: (ALONE, lambda: [solve(alone) for _ in range(ALONE)]),
+        "one position with error bars": (ALONE, lambda: [solve(alone, "error") for _ in range(ALONE)]),
+    }
+    if "C" in peers.here:
+        actions["C, all"] = (positions, partial(peers.here["C"], at.theta_2, np.zeros((15, positions))))
+    times = time_interleaved({name: action for name, (_, action) in actions.items()}, rounds)
+    rows = {name: 1e9 * times[name] / count for name, (count, _) in actions.items()}
+    by_positions = time_positions(peers.here, largest, rounds)
+    by_linkages = time_linkages(positions, rounds)
+    cost, most = by_positions["NumPy"], max(by_linkages[STUDY])
+    exact = [witness for witness in WITNESSES if not witness.through_time]
+    if not any(witness.missing() for witness in exact):
+        rows[JUDGED] = 1e9 * time_judging(exact, max(1, positions // PER_SCENE))
+    rows |= {name: rows[row.of] / rows[row.over] for name, row in LIMITS.items() if {row.of, row.over} <= rows.keys()}
+    rows |= {
+        "study of linkages / positions": by_linkages[STUDY][most] / by_linkages[POSITIONS][most],
+        "growth from 1000 positions on": max(cost.values()) / cost[min(cost)],
+        "memory beyond the result, MB": measure_memory(min(positions, 1_000_000)),
+        "import fourbar / import numpy": import_cost(),
+    }
+    return Measured(rows, by_positions, by_linkages, peers.not_run)
+
+
+def time_judging(witnesses: list[Witness], scenes: int) -> float:
+    """Time the check of a random scene as `run` does it, nothing drawn: median CPU time in s."""
+    suite = Random(scenes + 1, 0, tuple(DrawnType))
+    each = (partial(judge_for_report, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
+    times = [time_call(action) for action in each]
+    return median(times[1:])  # the first one imports the engines

@@ -1,0 +1,209 @@
+"""Who evaluates the positions of one linkage, and the linkages of one position: their times and their picture."""
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar import Bar, FourBar, Gravity, Motion, Scene, vary
+from fourbar.errors import say_install
+from fourbar.quantities import UNKNOWNS, VECTORS
+from fourbar.scene import Command
+from fourbar.show.plot.style import apply_style, format_of, save
+from fourbar.solve import solve
+from fourbar.studies.function import function
+from fourbar_validation.cost.study import time_call, time_in_turns
+from fourbar_validation.report.machine import name_machine
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+Times = dict[str, dict[int, float]]
+"""ns for each, by who and by how many."""
+Loop = Callable[[Array, Array], None]
+"""Writes theta_3, theta_4, omega_3, omega_4, alpha_3, alpha_4, F12, F32, F43, F14 (two rows each) and the torque at n
+angles into an array (15, n)."""
+SOURCE = Path(__file__).with_name("bench_loop.c")
+FLAGS = ("-O3", "-march=native")
+LOOKS = (("#0072B2", "o"), ("#D55E00", "s"), ("#1a1a1a", "^"), ("#007A5A", "v"), ("#8A3B78", "D"))
+"""Colours and marks in the order of the contenders."""
+AT_ONCE = 1_000_000
+"""Positions of a call: more are evaluated in pieces of this many, so that their memory is bounded (150 MB)."""
+SHORTEST = 200_000
+"""Positions of one timing: fewer are evaluated as often as makes so many."""
+MOST_LINKAGES = 100_000
+MOST_LOOPED = 1000
+"""Linkages that are solved one after the other: beyond them the cost of one no longer changes."""
+STUDY, POSITIONS, LOOPED = "study, NumPy", "one linkage, as many positions", "one after the other"
+LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
+"""Crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m, uniform bars."""
+
+
+class Peers(NamedTuple):
+    """What there is, and why the others are not."""
+
+    here: dict[str, Loop]
+    not_run: dict[str, str]
+
+
+def make_example(linkage: FourBar = LINKAGE, theta_2: float | None = 0.0) -> Scene:
+    """Build the scene that is timed: crank at 10 rad/s, gravity, drive on the input; theta_2 None: its full range."""
+    return Scene(linkage, Motion(theta_2, 10.0), 2, (), (Gravity(),))
+
+
+def make_command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Command:
+    """Command n positions, over a revolution unless specified otherwise."""
+    return Command(np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
+
+
+def allocate(names: Iterable[str], at: Command) -> dict[str, Array]:
+    """Allocate arrays as `solve` lays them out, touched so that no page is faulted in while the clock runs."""
+    first = solve(make_example(), at=at)
+    return {name: getattr(first, name) for name in names}
+
+
+def time_interleaved(actions: Mapping[str, Callable[[], object]], rounds: int, calls: int = 1) -> dict[str, float]:
+    """Time a call of each action in turn, in CPU seconds: the median, the first round apart."""
+    clocks = {name: partial(time_call, action, calls) for name, action in actions.items()}
+    return {name: median(times[1:]) for name, times in time_in_turns(clocks, rounds + 1).items()}
+
+
+def collect_loops() -> Peers:
+    """Collect the closed formulas by several hands: each writes into arrays that are there."""
+    result: dict[str, Loop | str] = {"NumPy": _make_solve_loop(), "C": compile_loop()}
+    result |= {name: _make_library_loop(name) for name in ("JAX", "PyTorch")}
+    reasons = {name: each for name, each in result.items() if isinstance(each, str)}
+    return Peers({name: each for name, each in result.items() if not isinstance(each, str)}, reasons)
+
+
+def _make_solve_loop() -> Loop:
+    scene = make_example()
+
+    def call(theta_2: Any, out: Any) -> None:
+        rows, into = iter(range(len(out))), {}
+        for name in UNKNOWNS:
+            row = next(rows)
+            into[name] = out[row : next(rows) + 1].T if name in VECTORS else out[row]
+        solve(scene, at=make_command(len(theta_2))._replace(angle=theta_2), out=into)
+
+    return call
+
+
+def _make_library_loop(name: str) -> Loop | str:
+    """Evaluate the scene's function, by JAX compiled, by PyTorch as it stands, on the CPU in doubles."""
+    try:
+        if name == "JAX":
+            import jax
+        else:
+            import torch
+        import array_api_compat  # noqa: F401
+    except ModuleNotFoundError as error:
+        extra = "jax" if name == "JAX" else "torch"
+        return f"{error.name} is not installed: {say_install(extra)}"
+    f = function(make_example(), ["motion.theta_2"], UNKNOWNS)
+    run = jax.jit(f) if name == "JAX" else f
+
+    def call(theta_2: Any, out: Any) -> None:
+        if name == "JAX":
+            with jax.enable_x64(True):
+                found = run(jax.numpy.asarray(theta_2))
+        else:
+            found = run(torch.from_numpy(theta_2))
+        row = 0
+        for unknown in UNKNOWNS:
+            values = np.atleast_2d(np.asarray(found[unknown]).T)
+            out[row : row + len(values)] = values
+            row += len(values)
+
+    return call
+
+
+def compile_loop() -> Loop | str:
+    """Compile the loop; the reason where that fails."""
+    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    if compiler is None:
+        return "no C compiler is installed"
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder) / "loop.so"
+        line = [compiler, *FLAGS, "-fPIC", "-shared", str(SOURCE), "-o", str(library), "-lm"]
+        made = subprocess.run(line, capture_output=True, encoding="utf-8", errors="replace", check=False)
+        if made.returncode != 0:
+            return f"{compiler} fails: {(made.stderr.strip().splitlines() or ['without a word'])[0]}"
+        loop = ctypes.CDLL(str(library)).loop
+    pointer = ctypes.POINTER(ctypes.c_double)
+
+    def call(theta_2: Array, out: Array) -> None:
+        loop(ctypes.c_long(len(theta_2)), theta_2.ctypes.data_as(pointer), out.ctypes.data_as(pointer))
+
+    return call
+
+
+def time_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
+    """Time a position, in ns, for 1000, 10 000, ... of them, into arrays that are there."""
+    times: Times = {name: {} for name in peers}
+    for n in [10**k for k in range(3, 9) if 10**k <= largest]:
+        at_once, calls = min(n, AT_ONCE), max(1, SHORTEST // n, n // AT_ONCE)
+        theta_2, out = make_command(at_once).theta_2, np.zeros((15, at_once))
+        own = {name: partial(loop, theta_2, out) for name, loop in peers.items()}
+        for name, value in time_interleaved(own, rounds if n <= AT_ONCE else 1, calls).items():
+            times[name][n] = 1e9 * value / at_once
+    return times
+
+
+def time_linkages(largest: int, rounds: int) -> Times:
+    """Time a linkage at one position, in ns, for 1, 10, ... of them: solved as a study, and one after the other."""
+    scene = make_example(theta_2=1.0)
+    times: Times = {STUDY: {}, POSITIONS: {}, LOOPED: {}}
+
+    def study(lengths: Any) -> None:
+        solve(vary(scene, {"lengths.coupler": lengths}))
+
+    def looped(lengths: Any) -> None:
+        for length in lengths.tolist():
+            linkage = replace(scene.linkage, coupler=replace(scene.linkage.coupler, length=length))
+            solve(replace(scene, linkage=linkage))
+
+    for m in [10**k for k in range(6) if 10**k <= min(largest, MOST_LINKAGES)]:
+        lengths = np.linspace(0.24, 0.26, m)
+        actions: dict[str, Callable[[], object]] = {
+            STUDY: partial(study, lengths),
+            POSITIONS: partial(solve, scene, at=make_command(m)),
+        }
+        if m <= MOST_LOOPED:
+            actions[LOOPED] = partial(looped, lengths)
+        for name, value in time_interleaved(actions, rounds, max(1, MOST_LOOPED // m)).items():
+            times[name][m] = 1e9 * value / m
+    return times
+
+
+def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
+    """Draw both growths on logarithmic axes into a file."""
+    kind = format_of(path)
+    with apply_style():
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(8.4, 4.0), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        _draw_panel(left, over_positions, "ns per position, every unknown", "positions")
+        _draw_panel(right, over_linkages, "ns per linkage, every force at one position", "linkages")
+        figure.supxlabel(f"One core: {name_machine()}", size=6.8, x=0.012, ha="left", parse_math=False)
+        save(figure, path, kind)
+
+
+def _draw_panel(axes: "Axes", times: Times, title: str, over: str) -> None:
+    for (who, own), (colour, mark) in zip(times.items(), LOOKS, strict=False):
+        axes.loglog(list(own), list(own.values()), color=colour, marker=mark, ms=3.5, lw=1.1, label=who)
+    axes.set_title(title)
+    axes.set_xlabel(over)
+    axes.set_ylabel("ns")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.2), ncols=2)

@@ -1,0 +1,192 @@
+"""`python -m fourbar_lab effects`: what each effect, and each flag of MuJoCo, costs in each engine, in time."""
+
+import math
+import re
+from collections.abc import Callable, Iterable
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+import numpy as np
+
+from fourbar import effects as kinds
+from fourbar.errors import DependencyError, InputError
+from fourbar.linkage import Bar, FourBar
+from fourbar.mjcf import write_mjcf
+from fourbar.mjcf.effects import NO_MJCF
+from fourbar.scene import Scene, command
+from fourbar.scene.motion import Motion, Sweep
+from fourbar.solve import solve
+from fourbar.writing import write_text
+from fourbar_validation.cost.study import time_call, time_in_turns
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.report.machine import describe_setup
+from fourbar_validation.report.templating import render
+from fourbar_validation.report.terminal import make_table
+
+EFFECTS: dict[str, kinds.Effect | None] = {
+    "none": None,
+    "gravity": kinds.Gravity(9.81),
+    "viscous": kinds.Viscous.at(O2=0.01, A=0.01, O4=0.01),
+    "viscous at pin B": kinds.Viscous.at(B=0.01),
+    "friction": kinds.Friction.at(O2=0.01, A=0.01, O4=0.01),
+    "friction at pin B": kinds.Friction.at(B=0.01),
+    "pin_friction": kinds.PinFriction.at(O2=(0.1, 0.01), A=(0.1, 0.01), B=(0.1, 0.01), O4=(0.1, 0.01)),
+    "torsion": kinds.Torsion.at(O4=(2.0, 1.9, 0.1)),
+    "springs": kinds.Springs(
+        (kinds.Spring(kinds.SpringEnd(1, 0.1, -1.5), kinds.SpringEnd(4, 0.08, 0.0), 200.0, 0.05, 3.0),)
+    ),
+    "flywheel": kinds.Flywheel(0.02),
+    "load": kinds.Load(4, (3.0, 0.7), (0.05, 1.0), 0.2),
+    "load over theta_2": kinds.Load(
+        4, (3.0, 0.7), (0.05, 1.0), 0.2, "world", kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))
+    ),
+}
+"""By name, each by itself on the same linkage."""
+SIMULATION = "mujoco-simulated"
+NO_COUNTERPART = {(SIMULATION, name) for name in (*NO_MJCF, "load over theta_2")}
+DEFAULT_FLAGS = "none, MuJoCo's default flags"
+LEFT_ON = "none, {} left on"
+"""One flag of MuJoCo as it is by default, the others as the generated MJCF has them."""
+POSITIONS = 1000
+"""Of the formulas in one unit of work: they take arrays."""
+ROUNDS = 31
+"""Pairs of runs, first one ahead and then the other."""
+AMOUNTS = {"formulas": 40, SIMULATION: 1000, "mujoco-inverse": 100, "pinocchio-inverse": 100}
+"""Of one run: 10 to 20 ms, long against the clock's resolution and short against what disturbs it."""
+ABOUT = (
+    "Processor time of a position, of a step of the simulation (RK4), in us without effects; with an effect relative "
+    "to that: the median of the ratios of neighbouring runs and their middle half."
+)
+
+
+def make_scene(effect: str, positions: int) -> Scene:
+    """Build a crank-rocker of uniform bars with one effect."""
+    linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
+    acting = EFFECTS[effect]
+    loads = (acting,) if isinstance(acting, kinds.Load) else ()
+    effects = () if acting is None or loads else (acting,)
+    return Scene(linkage, Motion(Sweep(0.13, 0.13 + math.tau, positions - 1), 10.0), loads=loads, effects=effects)
+
+
+def prepare_formulas(effect: str) -> Callable[[int], Any]:
+    """Prepare pin forces and torque at POSITIONS positions, a given number of times."""
+    given = make_scene(effect, POSITIONS)
+    return lambda amount: [solve(given, "force") for _ in range(amount)]
+
+
+def prepare_simulation(effect: str) -> Callable[[int], Any]:
+    """Prepare a given number of steps of the generated MJCF."""
+    from fourbar_validation.engines.mujoco.closed_loop import make_stepper
+
+    text = write_mjcf(make_scene(effect if effect in EFFECTS else "none", 91))
+    if effect == DEFAULT_FLAGS:
+        text = re.sub(r"<flag [^>]*/>", "", text)
+    elif effect not in EFFECTS:
+        text = text.replace(f' {list_flags()[effect]}="disable"', "")
+    return make_stepper(text)
+
+
+@cache
+def list_flags() -> dict[str, str]:
+    """List the flags that the MJCF of a bare scene switches off, by the name of the workload that leaves one on."""
+    result = re.findall(r'(\w+)="disable"', write_mjcf(make_scene("none", 91)))
+    return {LEFT_ON.format(flag): flag for flag in result}
+
+
+def prepare_answers(witness: str, effect: str) -> Callable[[int], Any]:
+    """Prepare the answers of an inverse engine at a given number of positions."""
+    engine = next(each for each in WITNESSES if each.name == witness).engine()
+
+    def work(amount: int) -> None:
+        given = make_scene(effect, amount)
+        engine.answer(given, command(given))
+
+    return work
+
+
+ENGINES: dict[str, Callable[[str], Callable[[int], Any]]] = {
+    "formulas": prepare_formulas,
+    SIMULATION: prepare_simulation,
+    **{name: partial(prepare_answers, name) for name in ("mujoco-inverse", "pinocchio-inverse")},
+}
+
+
+class EffectCost(NamedTuple):
+    """Time of one effect, or one flag, in one engine by that of the bare scene, of pairs of neighbouring runs."""
+
+    engine: str
+    effect: str
+    seconds: float
+    """Of the bare scene, per position or step."""
+    low: float
+    median: float
+    high: float
+    """The middle half of the pairs lies between low and high."""
+
+
+def measure(engine: str, effect: str, rounds: int = ROUNDS) -> EffectCost:
+    """Time neighbouring runs with and without an effect: both meet the same disturbances."""
+    amount = AMOUNTS[engine]
+    works = {which: partial(ENGINES[engine](name), amount) for which, name in enumerate(("none", effect))}
+    for work in works.values():
+        work()
+    clocks = {which: partial(time_call, work) for which, work in works.items()}
+    bare, own = map(np.array, time_in_turns(clocks, rounds).values())
+    units = amount * (POSITIONS if engine == "formulas" else 1)
+    return EffectCost(engine, effect, float(np.median(bare)) / units, *np.percentile(own / bare, [25, 50, 75]).tolist())
+
+
+def list_rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[str]]]:
+    """List the engines, and for each effect its name and a cell for each engine."""
+    by_name = {(one.engine, one.effect): one for one in costs}
+    engines = list(dict.fromkeys(engine for engine, _ in by_name))
+    table = []
+    for effect in dict.fromkeys(effect for _, effect in by_name):
+        cells = [effect]
+        for engine in engines:
+            one = by_name.get((engine, effect))
+            if one is None:
+                cells.append("no counterpart" if effect in EFFECTS else "")
+            elif effect == "none":
+                cells.append(f"{1e6 * one.seconds:.3g} us")
+            else:
+                low, median, high = (f"{100.0 * (each - 1.0):+.0f}" for each in one[3:])
+                cells.append(f"{median} % [{low}, {high}]")
+        table.append(cells)
+    return engines, table
+
+
+def list_pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Pair each engine with each effect that it has, the simulation with each flag that the bare scene switches off."""
+    chosen = [(engine, effect) for engine in engines for effect in effects if (engine, effect) not in NO_COUNTERPART]
+    return chosen + [(SIMULATION, name) for name in (DEFAULT_FLAGS, *list_flags()) if SIMULATION in engines]
+
+
+@click.command()
+@click.option("--engines", metavar="NAMES", default=",".join(ENGINES), show_default=True, help="Comma-separated.")
+@click.option("--only", metavar="NAMES", help="Comma-separated; left out: all.")
+@click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table as Markdown too.")
+def effects(engines: str, only: str | None, out: Path | None) -> int:
+    """Time each effect in each engine, and each flag of MuJoCo; a minute."""
+    from rich.console import Console
+    from rich.progress import track
+
+    wanted = tuple(name.strip() for name in engines.split(","))
+    chosen = tuple(EFFECTS) if only is None else tuple(dict.fromkeys(["none", *only.split(",")]))
+    for option, names, allowed in (("--engines", wanted, ENGINES), ("--only", chosen, EFFECTS)):
+        for name in names:
+            if name not in allowed:
+                raise InputError(option, name, "must be among " + ", ".join(allowed))
+    for witness in WITNESSES:
+        if witness.name in wanted and (reason := witness.missing()):
+            raise DependencyError(f"{witness.name}: {reason}")
+    costs = [measure(*pair) for pair in track(list_pairs(wanted, chosen), description="timing", transient=True)]
+    columns, rows = list_rows(costs)
+    Console().print(make_table(["effect", *columns], rows, caption=ABOUT))
+    if out is not None:
+        what = {"about": ABOUT, "head": ["", *columns], "rows": rows, "setup": describe_setup()}
+        write_text(out, render("fourbar_lab", "effects.md.j2", **what))
+        click.echo(f"written to {out}")
+    return 0

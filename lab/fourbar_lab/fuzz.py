@@ -1,0 +1,143 @@
+"""The command: random scenes through files, formulas and exact engines, or bounds; findings are shrunk and kept."""
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import click
+import numpy as np
+
+from fourbar.files import dump, loads
+from fourbar.scene import Command, Scene, command
+from fourbar.solution import Solution
+from fourbar_lab import outside
+from fourbar_lab.fuzz_scenes import draw_fuzz_scene
+from fourbar_lab.shrink import keep, shrink_scene
+from fourbar_validation.compare.compare import Comparison
+from fourbar_validation.compare.rows import FAILS, say_error
+from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, find_margin
+from fourbar_validation.engines import workers as processes
+from fourbar_validation.engines.hard_suite import hold_fully
+from fourbar_validation.engines.witnesses import WITNESSES, make_prediction
+from fourbar_validation.report.machine import name_code
+from fourbar_validation.run.answers import check_statements
+from fourbar_validation.run.identities import check_identities
+from fourbar_validation.run.question import Question
+from fourbar_validation.run.store import Store
+
+LAB = Path(__file__).parent
+EXACT = tuple(hold_fully(w) for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body"))
+"""The exact engines, held to full accuracy or to what was predicted for the position."""
+CHUNK, CHUNK_OF_PROOFS = 200, 10
+"""Scenes per task: some seconds, which is what an interruption costs."""
+SHOWN = 20
+LOST = "worker:"
+"""How the discrepancy of a scene begins that killed its worker, or never came back."""
+
+
+def list_findings(scene: Scene) -> list[str]:
+    """List what is wrong with a scene, in one line each; exceptions and warnings too."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            at = command(scene)
+            question = Question("", scene, at)
+            return [*_check_file(scene), *_check_assembly(scene, at, question.solution), *_check_engines(question)]
+    except Exception as error:  # a traceback is what fuzzing looks for
+        return [f"{type(error).__name__}: {error}".splitlines()[0]]
+
+
+def _check_file(scene: Scene) -> list[str]:
+    """Write a scene file and read it again: it must be the same scene to the last digit."""
+    again = dump(loads(dump(scene)))
+    return [] if again == dump(scene) else ["file: a scene that was written and read is another one"]
+
+
+def _check_assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
+    """Compare by ball arithmetic: no position where the loop does not close, none missing where it does."""
+    from fourbar_validation.engines.balls import closure, make_balls
+
+    result = []
+    margin = np.abs(find_margin(scene.linkage, at.theta_2))
+    for i, theta_2 in enumerate(at.theta_2):
+        closes = closure(make_balls(scene, float(theta_2)), int(at.branch[i])) is not None
+        if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
+            result.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
+        angles = (solution.theta_3[i], solution.theta_4[i])
+        if np.isfinite(angles).any() and not solution.assembled[i]:
+            result.append(f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}")
+    return result
+
+
+def _check_engines(question: Question) -> list[str]:
+    scene, at, solution, rows = question.scene, question.at, question.solution, list(check_identities(question))
+    for witness in EXACT:
+        answer = witness.engine().answer(scene, at)
+        predicted = make_prediction(witness, scene, at, answer)
+        rows += Comparison("", scene, answer, solution, witness.tolerance, witness.expected, predicted).rows()
+        if witness.name == "pinocchio-inverse" and answer.refusal is None:  # of two exact engines the quicker one
+            rows += check_statements("", scene, witness.engine(), answer, predicted=predicted)
+    # half of the scenes are drawn where doubles have few digits: that they are undecided is no fault
+    failed = [row for row in rows if row.verdict == FAILS and row.quantity != "undecided"]
+    return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]
+
+
+def examine(seed: int, bounds: bool, index: int) -> list[str]:
+    """Examine the scene of a number, or the bounds that are proven of it."""
+    return (
+        outside.list_findings(outside.draw_scene(seed, index))
+        if bounds
+        else list_findings(draw_fuzz_scene(seed, index))
+    )
+
+
+def _find_lost(_: int, error: Exception, __: object) -> list[str]:
+    return [f"{LOST} {say_error(error)}"]
+
+
+def run(count: int, seed: int, out: Path, workers: int, bounds: bool = False) -> Iterator[dict[str, list[str]]]:
+    """Examine the scenes chunk by chunk, what is wrong by number; chunks of an interrupted run are read."""
+    size = CHUNK_OF_PROOFS if bounds else CHUNK
+    with Store(out, {"seed": seed, "bounds": bounds, **name_code(LAB)}).held() as store:
+        chunks = {min(start + size, count): range(start, min(start + size, count)) for start in range(0, count, size)}
+        done = store.done() & chunks.keys()
+        yield from (store.read(stop)[0] for stop in sorted(done))
+        todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
+        of, longest = partial(examine, seed, bounds), None if bounds else processes.SECONDS
+        for stop, result in processes.apply_over_processes(of, todo, workers, seconds=longest, instead=_find_lost):
+            wrong = {str(number): each for number, each in zip(chunks[stop], result, strict=True) if each}
+            store.put(stop, [wrong])
+            yield wrong
+
+
+@click.command()
+@click.option("--scenes", default=100_000, show_default=True, type=click.IntRange(1), help="Half of them adversarial.")
+@click.option("--bounds", is_flag=True, help="Search for values outside proven extremes instead; two seconds a scene.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0))
+@click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results/fuzz"), show_default=True
+)
+def fuzz(scenes: int, bounds: bool, seed: int, workers: int, out: Path) -> int:
+    """Put random scenes through files, formulas and exact engines; every failure is shrunk and kept."""
+    from rich.console import Console
+    from rich.progress import track
+
+    console = Console(stderr=True)
+    wrong: dict[str, list[str]] = {}
+    chunks = -(-scenes // (CHUNK_OF_PROOFS if bounds else CHUNK))
+    for result in track(run(scenes, seed, out, workers, bounds), "fuzzing", total=chunks, console=console):
+        wrong |= result
+    for number in sorted(wrong, key=int)[:SHOWN]:
+        source, name = wrong[number][0], "bounds_seed" if bounds else "seed"
+        scene = (outside.draw_scene if bounds else draw_fuzz_scene)(seed, int(number))
+        if not bounds and not source.startswith(LOST):  # a proof at each step, or the end of this process
+            scene = shrink_scene(scene, lambda candidate: bool(list_findings(candidate)))
+            source = list_findings(scene)[0]
+        title = f"found by fuzzing, seed {seed}, scene {number}"
+        path = keep(replace(scene, title=title, source=source), f"{name}_{seed}_scene_{number}")
+        console.print(f"scene {number}: {wrong[number][0]}\n  kept as {path.name}")
+    print(f"{len(wrong)} of {scenes} scenes fail (seed {seed}{'' if bounds else ', half of them adversarial'})")
+    return 1 if wrong else 0

@@ -1,0 +1,99 @@
+"""`python -m fourbar_lab fuzz-files`: mutated scene files must end in a scene or in one clear line."""
+
+import time
+from collections.abc import Iterator, Sequence
+
+import click
+import numpy as np
+
+from fourbar.errors import FourBarError
+from fourbar.files import loads
+from fourbar.scene import command
+from fourbar.solve import find_last_stage, solve
+from fourbar_validation.scenes.suites import list_model_files
+
+HANG = 5.0
+"""Seconds; a scene file takes milliseconds."""
+MOST_POSITIONS = 10_000
+"""A mutated file may ask for 10^8 positions, and may have them; here only the reading of it is tried."""
+PIECES = (
+    *('"', "'", "[", "]", "{", "}", "=", "\n", "#", ",", ".", "\\", "\x00", "\ud7ff", "é", "∞", "--", "1e999", "nan"),
+    *("-0.0", "1e308 m", "1e-320 m", "0 m", "inf m", "48 kg", "deg", "m^99", "m/s/s/s", "9**9**9", "(((((", "0x10 m"),
+    *("true", "[[loads]]", "[effects]", '"""', "'''", "1979-05-27", "__import__('os')", "../../etc/passwd"),
+    *("<script>alert(1)</script>", "</mujoco>", "${x}", "{{x}}", "%s%n", "steps = 99999999999999999999"),
+)
+"""What is put into files: the syntax itself, numbers at the edge, and text that other formats would run."""
+
+
+def mutate_files(seed: int, indices: Sequence[int], originals: Sequence[str]) -> Iterator[tuple[int, str]]:
+    """Mutate scene files; each depends on (seed, index) alone."""
+    for index in indices:
+        rng = np.random.default_rng([seed, index])
+        text = originals[int(rng.integers(len(originals)))]
+        for _ in range(int(rng.integers(1, 6))):
+            text = _mutate(text, rng, originals)
+        yield index, text
+
+
+def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> str:
+    if not text:
+        return PIECES[int(rng.integers(len(PIECES)))]
+    at, length = int(rng.integers(len(text))), int(rng.geometric(0.1))
+    lines = text.splitlines(keepends=True)
+    line = int(rng.integers(len(lines)))
+    match int(rng.integers(7)):
+        case 0:  # a piece put in
+            return text[:at] + PIECES[int(rng.integers(len(PIECES)))] + text[at:]
+        case 1:  # a piece in place of a value
+            head, _, _ = lines[line].partition("=")
+            return "".join([*lines[:line], f"{head}= {PIECES[int(rng.integers(len(PIECES)))]}\n", *lines[line + 1 :]])
+        case 2:  # something cut out
+            return text[:at] + text[at + length :]
+        case 3:  # one character changed
+            return text[:at] + chr(int(rng.integers(1, 0xD7FF))) + text[at + 1 :]
+        case 4:  # a line twice
+            return "".join([*lines[:line], lines[line], *lines[line:]])
+        case 5:  # two files in one
+            other = originals[int(rng.integers(len(originals)))]
+            return text[:at] + other[int(rng.integers(len(other))) :]
+        case _:  # a digit changed
+            digits = [i for i, character in enumerate(text) if character.isdigit()]
+            at = digits[int(rng.integers(len(digits)))] if digits else 0
+            return text[:at] + str(int(rng.integers(10))) + text[at + 1 :]
+
+
+def try_out(text: str) -> str:
+    """Read a mutated file and evaluate what it describes: what it ended in but a scene or one line, or nothing."""
+    start = time.perf_counter()
+    try:
+        scene = loads(text, "mutant.toml")
+        if scene.motion.free is None:
+            at = command(scene)
+            if len(at.theta_2) <= MOST_POSITIONS:
+                solve(scene, find_last_stage(scene), at=at)
+    except FourBarError as error:
+        if "\n" in str(error):
+            return f"more than one line: {error}"
+    except MemoryError:
+        pass  # more positions than there is memory for: stated as such by the command line
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    took = time.perf_counter() - start
+    return f"took {took:.1f} s" if took > HANG else ""
+
+
+@click.command()
+@click.option("--count", type=click.IntRange(min=1), default=100_000, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+def fuzz_files(count: int, seed: int) -> int:
+    """Read mutated scene files; any traceback or hang is printed with its text, and fails."""
+    from rich.progress import track
+
+    originals = [file.read_text(encoding="utf-8") for file in list_model_files()]
+    failed = 0
+    for index, text in track(mutate_files(seed, range(count), originals), total=count, description="mutants"):
+        if what := try_out(text):
+            failed += 1
+            click.echo(f"mutant {index}: {what}\n{text!r}")
+    click.echo(f"{count} mutated scene files, {failed} of them ended in a traceback or a hang")
+    return 1 if failed else 0

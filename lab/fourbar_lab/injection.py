@@ -1,0 +1,116 @@
+"""Inject faults, one after another: a module is loaded with another text, then the harness checks the test scenes.
+
+Run by its path, with the packages on PYTHONPATH: `python -P injection.py NUMBER...` prints what failed as JSON, a line
+for each fault; without a number nothing is injected and every test scene must hold. As a module it would import the
+project before the fault stands.
+"""
+
+import importlib.abc
+import importlib.machinery
+import json
+import sys
+import tomllib
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+FAULTS = Path(__file__).parent / "faults.toml"
+PACKAGES = ("fourbar", "fourbar_validation")
+"""Packages that an entry may change, in the checkout or as they are installed."""
+
+
+def read_faults() -> list[dict[str, Any]]:
+    """Read the list: the keys of an entry are fault, file, old, new, scenes, caught_by and perhaps harmless."""
+    entries: list[dict[str, Any]] = tomllib.loads(FAULTS.read_text(encoding="utf-8"))["injected"]
+    return entries
+
+
+def inject_fault(entry: dict[str, Any]) -> dict[str, str]:
+    """Change the text of modules, by their names; ValueError where the entry no longer fits one."""
+    texts = {}
+    for change in (entry, *([entry["also"]] if "also" in entry else [])):
+        text = _find_file(change["file"]).read_text(encoding="utf-8")
+        if text.count(change["old"]) != 1:
+            count = text.count(change["old"])
+            raise ValueError(f"{entry['fault']}: {count} places in {change['file']} read {change['old']!r}")
+        name = change["file"].removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        texts[name] = text.replace(change["old"], change["new"])
+    return texts
+
+
+def _find_file(name: str) -> Path:
+    """Find a file of a package that is not imported."""
+    package, _, rest = name.partition("/")
+    spec = importlib.machinery.PathFinder.find_spec(package)
+    assert package in PACKAGES and spec is not None and spec.origin is not None, name
+    return Path(spec.origin).parent / rest
+
+
+class FaultFinder(importlib.abc.MetaPathFinder):
+    """Finds a module that has a fault, and no other."""
+
+    def __init__(self, entry: dict[str, Any]) -> None:
+        self.texts = inject_fault(entry)
+        self.left = set(self.texts)
+        """Modules that are not loaded yet."""
+
+    def find_spec(self, fullname: str, path: Any, target: Any = None) -> importlib.machinery.ModuleSpec | None:
+        """Find a module with the fault, or None."""
+        if fullname not in self.texts:
+            return None
+        spec = importlib.machinery.PathFinder.find_spec(fullname, path)
+        assert spec is not None and spec.origin is not None
+        self.left.discard(fullname)
+        spec.loader = _Text(fullname, spec.origin, self.texts[fullname])
+        return spec
+
+
+class _Text(importlib.machinery.SourceFileLoader):
+    """Loads a module from a text in place of its file's."""
+
+    def __init__(self, fullname: str, path: str, text: str) -> None:
+        super().__init__(fullname, path)
+        self.text = text
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Compile the text: the cache is of the file."""
+        code: CodeType = self.source_to_code(self.text.encode(), self.path)
+        return code
+
+
+def list_failing(names: list[str]) -> dict[str, list[str]]:
+    """Check test scenes: by their names the rows that fail, as "engine quantity: reason"."""
+    from fourbar_lab.fault_scenes import FAULT_SCENES
+    from fourbar_validation.engines.hard_suite import HARD_WITNESSES
+    from fourbar_validation.engines.witnesses import WITNESSES
+    from fourbar_validation.run.judge import judge
+
+    result = {}
+    for name in names or FAULT_SCENES:
+        simulated = name.startswith("simulated")
+        own = HARD_WITNESSES if name.startswith("to full accuracy") else WITNESSES
+        witnesses = [witness for witness in own if simulated or not witness.through_time]
+        rows = judge(name, FAULT_SCENES[name], witnesses, shipped=name.startswith("shipped")).rows
+        result[name] = [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
+    return result
+
+
+def main() -> None:
+    """Inject the fault of each number, check its test scenes, print what fails."""
+    if len(sys.argv) == 1:
+        print(json.dumps(list_failing([])))
+    for number in map(int, sys.argv[1:]):
+        for name in [name for name in sys.modules if name.partition(".")[0] in (*PACKAGES, "fourbar_lab")]:
+            del sys.modules[name]  # of the fault before; the engines' libraries stay
+        entry = read_faults()[number]
+        finder = FaultFinder(entry)
+        sys.meta_path.insert(0, finder)
+        result = list_failing(entry["scenes"])
+        sys.meta_path.remove(finder)
+        if finder.left:
+            raise RuntimeError(f"the scenes use no {', '.join(finder.left)}")
+        print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()

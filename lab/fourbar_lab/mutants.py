@@ -1,0 +1,199 @@
+"""The harness against mutants of the formulas: no unit test takes part.
+
+A mutant counts where it changes a number that `solve` returns, or that is specified of the linkage, by more than 1e-9
+of its scale (or what assembles, or which numbers exist, or raises); it is caught where a comparison then fails.
+"""
+
+import math
+import signal
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import click
+import numpy as np
+
+from fourbar.errors import FAILED, HOLDS, FourBarError
+from fourbar.formulas import mobility, transmission
+from fourbar.formulas.path import compute_state as state_of
+from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.quantities import UNITS
+from fourbar.scene import Command, Scene
+from fourbar.scene import command as command_of
+from fourbar.solve import solve
+from fourbar_lab.code_mutants import Mutant, compile_mutants
+from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.compare import Comparison
+from fourbar_validation.compare.rows import FAILS
+from fourbar_validation.compare.scales import make_reference
+from fourbar_validation.engines.free_body import NAME as FREE_BODY
+from fourbar_validation.engines.witnesses import WITNESSES, Witness, make_prediction
+from fourbar_validation.run.answers import check_statements
+from fourbar_validation.run.identities import check_identities, compare_status
+from fourbar_validation.run.question import Question
+
+CHANGES = 1e-9
+SECONDS = 20
+"""A mutant that computes longer than this hangs: the run would be stopped, which is a failure too."""
+LEAST = 0.95
+"""Share of the mutants that must be caught."""
+MODULES = ("arithmetic", "position", "motion", "pin_forces", "torque", "path", "mobility", "transmission")
+SCENES = 10
+EXACT = ("pinocchio-inverse", "mujoco-inverse", FREE_BODY)
+
+
+class HangError(Exception):
+    """A mutant did not come back."""
+
+
+def choose_scenes() -> list[Scene]:
+    """Choose random linkages of every type, drive and branch, and a parallelogram near its change point."""
+    from fourbar_validation.scenes.hard_families import approach_change_point, sweep_turn
+    from fourbar_validation.scenes.hard_linkages import dress
+    from fourbar_validation.scenes.random import DrawnType, draw_random_scene
+
+    chosen = [draw_random_scene(0, index, tuple(DrawnType)) for index in range(SCENES)]
+    chosen.append(sweep_turn(dress((0.3, 0.1, 0.25, 0.22)), 12))
+    chosen += [
+        scene for name, scene in approach_change_point(distances=(1e-2, 1e-4)) if name.startswith(("par", "kite a = d"))
+    ]
+    return chosen
+
+
+def compute_numbers(scene: Scene, at: Command) -> dict[str, Any]:
+    """Compute every number that the formulas state of a scene and of its linkage."""
+    solution = solve(scene, "force", at=at)
+    result = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
+    result["status"] = solution.status_code.astype(float)
+    return result | collect_stated(scene.linkage) | collect_stated_of_motion(scene, at)
+
+
+def collect_stated(linkage: FourBar) -> dict[str, Any]:
+    """Collect what the formulas state of a linkage whatever its motion."""
+    result: dict[str, Any] = {
+        "default_range": mobility.choose_range(linkage),
+        "change_points": mobility.change_points(linkage),
+        "time_ratio": mobility.time_ratio(linkage) or math.nan,
+        "extremes": [*transmission.transmission_extremes(linkage), transmission.transmission_extremes(linkage).worst],
+    }
+    for bar in MOVING_BARS:
+        result[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
+        result[f"intervals_{bar}"] = mobility.find_intervals(linkage, bar)
+        result[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
+        result[f"swing_{bar}"] = mobility.swing(linkage, bar)
+    sweep = linkage.ground_angle + np.array([-0.5, 0.5, 4.0, 2.0])  # through both change points, and back
+    result["through"] = mobility.follow_smooth_path(linkage, sweep, 1)
+    return {name: np.array(value, dtype=float) for name, value in result.items()}
+
+
+def collect_stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
+    """Compute how well the positions of a motion transmit."""
+    state = state_of(scene.linkage, at.theta_2, at.branch)
+    branch = at.branch.astype(float)
+    return {
+        "transmission_angle": transmission.transmission_angle(state),
+        "speed_ratio": transmission.speed_ratio(state),
+        "mechanical_advantage": transmission.mechanical_advantage(state, 0.2, 0.3),
+        "to_singular": transmission.distance_to_singular(scene.linkage, at.theta_2, scene.drive_bar, branch),
+    }
+
+
+def is_changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
+    """Compare numbers: whether any differs by more than 1e-9 of its scale."""
+    for name, old in before.items():
+        new = after.get(name)
+        if new is None or np.shape(old) != np.shape(new):
+            return True
+        scale = float(np.max(np.abs(old), initial=0.0, where=np.isfinite(old))) or 1.0
+        if not np.allclose(new, old, rtol=0.0, atol=CHANGES * scale, equal_nan=True):
+            return True
+    return False
+
+
+def is_caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> bool:
+    """Check a scene: whether any comparison or identity fails."""
+    question = Question("", scene, at)
+    solution, rows = question.solution, list(check_identities(question))
+    for witness, answer in answers:
+        predicted = make_prediction(witness, scene, at, answer)
+        rows += Comparison("", scene, answer, solution, witness.tolerance, witness.expected, predicted).rows()
+        if witness.name == FREE_BODY and (reference := make_reference(scene, answer)) is not None:
+            rows.append(compare_status(question, reference))
+    if not any(row.verdict == FAILS for row in rows):
+        rows += [row for witness, answer in answers for row in check_statements("", scene, witness.engine(), answer)]
+    return any(row.verdict == FAILS for row in rows)
+
+
+class Baseline(NamedTuple):
+    """A scene, and what engines and formulas say of it without a mutant."""
+
+    scene: Scene
+    at: Command
+    answers: list[tuple[Witness, Answer]]
+    before: dict[str, Any]
+
+
+def make_baselines() -> list[Baseline]:
+    """Solve the scenes; RuntimeError where the harness fails on one of them."""
+    made = []
+    for scene in choose_scenes():
+        at = command_of(scene)
+        answers = [(w, w.engine().answer(scene, at)) for w in WITNESSES if w.name in EXACT]
+        if is_caught(scene, at, answers):
+            raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
+        made.append(Baseline(scene, at, answers, compute_numbers(scene, at)))
+    return made
+
+
+def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
+    """Return whether a mutant is caught, or None where it changes nothing."""
+    differs = False
+    signal.alarm(SECONDS)
+    try:
+        with np.errstate(all="ignore"), mutant.active():
+            for scene, at, answers, before in tried:
+                if is_changed(before, compute_numbers(scene, at)):
+                    differs = True
+                    if is_caught(scene, at, answers):
+                        return True
+    except Exception:  # a mutant that raises or hangs ends the run: that is noticed
+        return True
+    finally:
+        signal.alarm(0)
+    return False if differs else None
+
+
+@click.command()
+@click.option("--module", type=click.Choice(MODULES), help="Only this one.")
+@click.option("--most", default=0, type=click.IntRange(0), help="At most this many of each module.")
+def command(module: str | None, most: int) -> int:
+    """Change operators and numbers of the formulas, one at a time; 95 % of those that matter must fail the harness.
+
+    A change matters that alters a number by more than 1e-9. Those that are not caught are listed.
+    """
+    from rich.console import Console
+    from rich.progress import track
+
+    if not hasattr(signal, "SIGALRM"):
+        raise FourBarError("mutants ends what hangs by SIGALRM, which Windows does not have")
+
+    def alarm(*_: object) -> None:
+        raise HangError
+
+    before = signal.signal(signal.SIGALRM, alarm)
+    tried, shown = make_baselines(), Console(stderr=True)
+    changing, missed = 0, list[str]()
+    for name in [module] if module else MODULES:
+        chosen = list(compile_mutants(import_module(f"fourbar.formulas.{name}")))
+        if most and len(chosen) > most:
+            chosen = [chosen[i] for i in np.random.default_rng(0).choice(len(chosen), most, replace=False)]
+        verdicts = [judge_mutant(mutant, tried) for mutant in track(chosen, name, console=shown)]
+        own = [mutant.name for mutant, each in zip(chosen, verdicts, strict=True) if each is False]
+        count = sum(each is not None for each in verdicts)
+        click.echo(f"{name}: {count - len(own)} of {count} caught, of {len(chosen)} mutants tried")
+        changing, missed = changing + count, missed + own
+    signal.signal(signal.SIGALRM, before)
+    for line in missed:
+        click.echo(f"not caught: {line}")
+    click.echo(f"the harness catches {changing - len(missed)} of {changing} mutants that change a number")
+    return HOLDS if changing and len(missed) <= (1.0 - LEAST) * changing else FAILED

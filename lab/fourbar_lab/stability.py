@@ -1,0 +1,197 @@
+"""The command: forward error of every output of `solve` against ball arithmetic, per family of hard cases."""
+
+import math
+import warnings
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import click
+import numpy as np
+
+from fourbar.errors import FAILED, HOLDS
+from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.quantities import OK, PIN_FORCES, UNITS
+from fourbar.scene import Scene
+from fourbar.scene.motion import Motion
+from fourbar.solution import Solution
+from fourbar.solve import solve
+from fourbar_lab.families import FAMILIES
+from fourbar_lab.libraries import LIBRARIES, evaluate
+from fourbar_lab.slopes import judge_slopes
+from fourbar_lab.tally import (
+    HALF_A_DIGIT,
+    TOO_LARGE,
+    Tally,
+    compute_allowed,
+    compute_ratio,
+    is_untold,
+    list_components,
+)
+from fourbar_validation.compare.tolerance import find_used
+from fourbar_validation.engines.balls import compute_reference
+from fourbar_validation.engines.workers import apply_each
+from fourbar_validation.report.terminal import make_table
+
+FULL = 10_000
+"""Samples per family of the full set."""
+CHUNK = 250
+"""Samples per task: about a second."""
+
+
+def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
+    """Solve one position with error bars; `solve` evaluates one in plain numbers, two in arrays."""
+    times = 1 + hash(angle) % 2  # as good as random, and the same on every run
+    commanded = np.full(times, angle)
+    scene = replace(scene, motion=replace(scene.motion, **{scene.motion.names[0]: commanded}))  # type: ignore[arg-type]
+    solution = solve(scene, "error")
+    return {name: array[0] for name in UNITS if (array := getattr(solution, name)) is not None}
+
+
+def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> None:
+    """Compare one position with the reference."""
+    tally.samples += 1
+    motion, angle = scene.motion, float(np.asarray(scene.motion.angle))
+    drive = "torque" if scene.drive is None else "drive_force"
+    internal = scene.drive is not None and 1 not in (scene.drive.start.bar, scene.drive.end.bar)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = solve_position(scene, angle) if library == "numpy" else evaluate(scene, library)
+    tally.warned += [f"{sample}: {warning.message}" for warning in caught]
+    exact = compute_reference(scene, motion.branch, angle)
+    if exact is None:
+        tally.not_assembled += 1
+        if math.isfinite(found[drive]):
+            tally.worst["assembled"] = (math.inf, sample)
+        return
+    values, sensitivity = exact
+    if library != "numpy" and math.isnan(found["sin_mu"]) and is_untold(values["sin_mu"], sensitivity["sin_mu"]):
+        tally.untold += 1
+        return
+    errors: dict[str, float] = {}
+    for name in found:
+        for component, index in list_components(name):
+            if component not in values or name == motion.names[0] or name.endswith("_error"):
+                continue
+            own, rate = np.ravel(found[name])[index], sensitivity[component]
+            if internal and name in PIN_FORCES:  # a component that the drive has no part in is left of larger ones
+                rate = max(sensitivity[other] for other, _ in list_components(name))
+            if library != "numpy":  # whose lengths are no constants: no bar rests or stays parallel exactly
+                rate += max(compute_allowed(0.0, sensitivity[other]) for other, _ in list_components(name))
+            part, errors[component] = compute_ratio(name, own, values[component], rate)
+            tally.note(component, part, sample)
+    if drive not in values:
+        tally.no_torque += 1
+        return
+    if f"{drive}_error" not in found:
+        return
+    force = max(math.hypot(errors[f"{name}_x"], errors[f"{name}_y"]) for name in PIN_FORCES)
+    strongest = max(math.hypot(*found[name]) for name in PIN_FORCES)
+    for name, error, size in (
+        (f"{drive}_error", errors[drive], abs(found[drive])),
+        ("force_error", force, strongest),
+    ):
+        bar = float(found[name])
+        tally.too_small[name] = max(tally.too_small.get(name, 0.0), float(find_used(error, bar)))
+        tally.too_large[name] = tally.too_large.get(name, 0) + (bar > TOO_LARGE * max(error, HALF_A_DIGIT * size))
+
+
+def run(
+    family: str, samples: range, seed: int = 0, bar: int = 2, library: str = "numpy", *, derivatives: bool = False
+) -> Tally:
+    """Judge some samples of a family; each depends on the family, the seed and its number alone.
+
+    Parameters
+    ----------
+    bar : whose motion is commanded, as it comes out where the input is.
+    library : whose arrays evaluate the scene as a function of all its numbers; NumPy's do it by `solve`.
+    derivatives : judge those instead, NumPy's by `sensitivity`.
+    """
+    tally = Tally()
+    for number in samples:
+        rng = np.random.default_rng([seed, list(FAMILIES).index(family), number])
+        scene = feed_back(FAMILIES[family](rng), bar)
+        if scene is not None:
+            (judge_slopes if derivatives else judge)(scene, tally, f"{family} {number}", library)
+    return tally
+
+
+def feed_back(scene: Scene, bar: int) -> Scene | None:
+    """Command bar 2, 3 or 4 to move as it does under the scene's own command; None where that has no motion."""
+    if bar == 2:
+        return scene
+    found = solve(scene, "acceleration")
+    theta, omega, alpha, sine = read_commanded(found, bar)
+    if found.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
+        return None
+    numbers = {f"theta_{bar}": theta, f"omega_{bar}": omega, f"alpha_{bar}": alpha}
+    return replace(scene, motion=Motion(branch=1 if sine > 0.0 else -1, **numbers))  # type: ignore[arg-type]
+
+
+def read_commanded(found: Solution, bar: int) -> tuple[float, float, float, float]:
+    """Return angle, speed and acceleration of a bar at the first position, and the sine whose sign its branch is."""
+    theta, omega, alpha = (float(getattr(found, f"{name}_{bar}")[0]) for name in ("theta", "omega", "alpha"))
+    first, second = {2: (3, 4), 3: (2, 4), 4: (2, 3)}[bar]
+    one, other = (float(getattr(found, f"theta_{each}")[0]) for each in (first, second))
+    return theta, omega, alpha, math.sin(other - one)
+
+
+def _run(seed: int, bar: int, library: str, derivatives: bool, task: tuple[str, range]) -> Tally:
+    return run(*task, seed, bar, library, derivatives=derivatives)
+
+
+@click.command()
+@click.option("--samples", default=FULL, show_default=True, type=click.IntRange(1), help="Samples per family.")
+@click.option("--family", "families", multiple=True, type=click.Choice(list(FAMILIES)), help="Only these (repeatable).")
+@click.option("--seed", default=0, show_default=True)
+@click.option("--bar", default=2, show_default=True, type=click.IntRange(2, 4), help="Whose motion is commanded.")
+@click.option(
+    "--library",
+    default="numpy",
+    show_default=True,
+    type=click.Choice(["numpy", *LIBRARIES]),
+    help="Whose arrays: jax and torch by `fourbar.function`, jax compiled.",
+)
+@click.option("--derivatives", is_flag=True, help="Judge those by every number of a scene; numpy: `sensitivity`.")
+@click.option("--jobs", default=2, show_default=True, help="Processes.")
+def stability(
+    samples: int, families: tuple[str, ...], seed: int, bar: int, library: str, derivatives: bool, jobs: int
+) -> int:
+    """Measure the error of every output against 50-digit arithmetic, and whether the error bars hold."""
+    from rich.console import Console
+    from rich.progress import track
+
+    chosen = families or tuple(FAMILIES)
+    parts = [range(start, min(start + CHUNK, samples)) for start in range(0, samples, CHUNK)]
+    tasks = [(family, part) for family in chosen for part in parts]
+    results = apply_each(partial(_run, seed, bar, library, derivatives), tasks, jobs, seconds=None)
+    tallies = {family: Tally() for family in chosen}
+    for (family, _), tally in track(zip(tasks, results, strict=True), "samples", total=len(tasks)):
+        tallies[family].add(tally)
+    rows = []
+    for name in dict.fromkeys(name for tally in tallies.values() for name in tally.worst):
+        cells = [tallies[family].worst.get(name, (math.nan, ""))[0] for family in chosen]
+        rows.append((name, *("-" if math.isnan(cell) else f"{cell:.3f}" + " fails" * (cell > 1.0) for cell in cells)))
+    bars = ("torque_error", "drive_force_error", "force_error")
+    for name in (name for name in bars if any(name in tally.too_small for tally in tallies.values())):
+        rows.append((f"error / {name}", *(f"{tallies[family].too_small.get(name, math.nan):.2f}" for family in chosen)))
+        shares = (100.0 * tallies[family].too_large.get(name, 0) / tallies[family].samples for family in chosen)
+        rows.append((f"% {name} > {TOO_LARGE:.0f} x error", *(f"{share:.2f}" for share in shares)))
+    rows.append(("not assembled", *(str(tallies[family].not_assembled) for family in chosen)))
+    rows.append(("no torque", *(str(tallies[family].no_torque) for family in chosen)))
+    if library != "numpy" or derivatives:
+        rows.append(("no digit tells", *(str(tallies[family].untold) for family in chosen)))
+    console = Console()
+    of = ", of derivatives by every number" if derivatives else ""
+    title = f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}, {library}{of}"
+    console.print(make_table(("output", *chosen), rows, title=title))
+    for family, tally in tallies.items():
+        for name, (part, sample) in tally.worst.items():
+            if part > 1.0:
+                console.print(f"{name}: {part:.3g} at sample {sample}")
+        for line in tally.warned[:5]:
+            console.print(f"{family} warned: {line}")
+    for family, tally in tallies.items():
+        if not tally.worst:
+            console.print(f"{family}: nothing was compared")
+    return HOLDS if all(tally.holds() for tally in tallies.values()) else FAILED

@@ -1,0 +1,51 @@
+"""`python -m fourbar_lab write`: write the MJCF of every scene in models/ next to it."""
+
+import math
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import click
+
+from fourbar.files import load
+from fourbar.mjcf import write_mjcf
+from fourbar.writing import write_text
+from fourbar_validation.places import find_checkout
+from fourbar_validation.scenes.suites import list_model_files
+
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+ROUND_OFF = 1e-12
+"""The assembled state is computed, and another processor's sine may end it in another digit."""
+
+
+def find_stale(files: Iterable[Path]) -> list[Path]:
+    """Find the scene files whose MJCF is missing or differs from what they generate now, round-off apart."""
+    result = []
+    for file in files:
+        xml = file.with_suffix(".xml")
+        if not xml.is_file() or not _is_same(xml.read_text(encoding="utf-8"), write_mjcf(load(file))):
+            result.append(file)
+    return result
+
+
+def _is_same(one: str, other: str) -> bool:
+    if NUMBER.split(one) != NUMBER.split(other):
+        return False
+    numbers = zip(NUMBER.findall(one), NUMBER.findall(other), strict=True)
+    return all(a == b or math.isclose(float(a), float(b), rel_tol=ROUND_OFF, abs_tol=ROUND_OFF) for a, b in numbers)
+
+
+def write_models(files: Iterable[Path]) -> list[Path]:
+    """Write the MJCF of the scenes for which it is stale; those scenes."""
+    written = find_stale(files)
+    for file in written:
+        write_text(file.with_suffix(".xml"), write_mjcf(load(file)))
+    return written
+
+
+@click.command()
+def command() -> None:
+    """Write the MJCF of every scene in models/ for which it is stale."""
+    find_checkout("write")
+    for file in write_models(list_model_files()):
+        click.echo(f"wrote {file.with_suffix('.xml').name}")

@@ -1,0 +1,68 @@
+"""How good the advice is: on linkages that it has never seen, against an exhaustive search."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import fourbar
+from fourbar.scene import command
+from fourbar_lab import advice
+from fourbar_lab.cli import status as ended
+from fourbar_lab.exhaustive import find_cheapest
+from fourbar_validation.advise import advise
+from fourbar_validation.engines.mujoco.trial import TrialSetup
+from tests.validation.cost.test_cost import turning
+
+
+def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> None:
+    """A few of those of the study `advice`, of every type, judged between the positions that the advice saw."""
+    costs = {("RK4", True): 1.0}
+    for index in range(2):
+        case = advice.measure_case(99, index, costs)
+        assert case.met and case.cheap, case
+
+
+def test_the_search_knows_when_nothing_serves() -> None:
+    scene = turning(positions=12)
+    setup = TrialSetup(scene, command(scene))
+    assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is not None
+    trials: list[object] = []
+    setup.try_out = lambda settings, build=None: trials.append(settings) or hopeless(scene)  # type: ignore[method-assign,func-returns-value]
+    assert find_cheapest(setup, 1e-3, {("RK4", True): 1.0}) is None and len(trials) > 50
+
+
+def hopeless(scene: fourbar.Scene) -> object:
+    made = TrialSetup(scene, command(scene)).try_out(advise.make_settings(10.0, 3.0))
+    made.broken = "lost"
+    return made
+
+
+def test_a_count_that_cannot_decide_says_which_one_can(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = advice.AdviceCase(0, 1e-3, True, 5e-4, 20.0, 19.0)
+    monkeypatch.setattr(advice, "measure_case", lambda seed, index, costs: replace(case, index=index))
+    monkeypatch.setattr(advice, "time_relative_costs", lambda setup: {})
+    for count, status in ((40, 1), (73, 0)):
+        assert ended(["advice", "--count", str(count), "--out", str(tmp_path / str(count))]) == status
+        stated = "undecided: with 0 not met the bound is reached from --count 73 on" in capsys.readouterr().out
+        assert stated == (status == 1)
+
+
+def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+
+    def case(seed: int, index: int, costs: object) -> advice.AdviceCase:
+        made.append(index)
+        return advice.AdviceCase(index, 1e-3, True, 5e-4, 20.0, 19.0)
+
+    monkeypatch.setattr(advice, "measure_case", case)
+    monkeypatch.setattr(advice, "time_relative_costs", lambda setup: {})
+    out = tmp_path / "study"
+    list(advice.measure(3, 2, out))
+    cases = list(advice.measure(3, 4, out))
+    assert made == [0, 1, 2, 3] and [each.index for each in cases] == made and all(each.met for each in cases)
+    made.clear()
+    list(advice.measure(4, 1, out))  # another seed starts over
+    assert made == [0]

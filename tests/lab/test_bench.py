@@ -1,0 +1,93 @@
+"""The limits of speed: each is of a row that is measured, is reported with its reason, and costs the run."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from fourbar.errors import HOLDS
+from fourbar.quantities import UNKNOWNS
+from fourbar.solve import solve
+from fourbar_lab import bench, contenders
+from fourbar_lab.contenders import make_command, make_example
+
+ROUNDING = 1e-11
+"""Relative to the largest of each unknown: a few hundred roundings."""
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counts at which the times mean nothing, but everything runs."""
+    monkeypatch.setattr(bench, "import_cost", lambda: 0.5)
+    for name, count in (("SHORTEST", 1), ("MOST_LOOPED", 10)):
+        monkeypatch.setattr(contenders, name, count)
+
+
+@pytest.mark.usefixtures("quick")
+def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
+    found = bench.measure(1000, 1, 10_000)
+    assert bench.LIMITS.keys() - found.not_run.keys() <= found.rows.keys()
+    numbers = [found.rows, *found.over_positions.values(), *found.over_linkages.values()]
+    assert all(math.isfinite(value) and value > 0.0 for own in numbers for value in own.values())
+    assert set(found.over_positions["NumPy"]) == {1000, 10_000}
+    assert set(found.over_linkages["study, NumPy"]) == {1, 10, 100, 1000}
+    assert set(found.over_linkages["one after the other"]) == {1, 10}
+    contenders.draw_bench(found.over_positions, found.over_linkages, tmp_path / "bench.svg")
+    picture = (tmp_path / "bench.svg").read_text()
+    assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 15
+
+
+def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, at = make_example(), make_command(500)
+    own = solve(scene, at=at)
+    expected = np.concatenate([np.atleast_2d(getattr(own, name).T) for name in UNKNOWNS])
+    peers = contenders.collect_loops()
+    assert {"NumPy", "C"} <= set(peers.here) or "C" in peers.not_run
+    for name, loop in peers.here.items():
+        out = np.full((15, 500), np.nan)
+        loop(at.theta_2, out)
+        off = out - expected
+        off[:2] = np.remainder(off[:2] + np.pi, 2 * np.pi) - np.pi
+        assert (np.abs(off).max(axis=1) <= ROUNDING * np.abs(expected).max(axis=1)).all(), name
+
+
+def test_more_positions_than_fit_are_evaluated_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(contenders, "AT_ONCE", 1000)
+    monkeypatch.setattr(contenders, "SHORTEST", 1)
+    sizes: list[int] = []
+    times = contenders.time_positions({"it": lambda theta_2, out: sizes.append(len(theta_2))}, 10_000, 1)
+    assert set(times["it"]) == {1000, 10_000} and sizes == [1000] * (2 + 2 * 10)
+
+
+def test_what_is_missing_is_named_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    for library in ("jax", "torch"):
+        monkeypatch.setitem(sys.modules, library, None)
+    peers = contenders.collect_loops()
+    assert set(peers.here) == {"NumPy"} and set(peers.not_run) == {"C", "JAX", "PyTorch"}
+    rows = {"growth from 1000 positions on": 1.0}
+    monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, peers.not_run))
+    for variable in bench.ONE_THREAD:
+        monkeypatch.setenv(variable, "1")
+    result = CliRunner().invoke(bench.bench, standalone_mode=False)
+    assert result.return_value == HOLDS and "not run: C: no C compiler is installed\n" in result.output
+
+
+@pytest.mark.parametrize("name", bench.LIMITS)
+@pytest.mark.parametrize("spoiled", [math.nan, "beyond", None])
+def test_what_is_beyond_its_limit_fails_with_the_reason(
+    name: str, spoiled: float | str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = {what: limit.bound for what, limit in bench.LIMITS.items()} | {"all, 1000 positions": 100.0}
+    limit = bench.LIMITS[name]
+    if spoiled is not None:
+        rows[name] = math.nan if spoiled != "beyond" else limit.bound * (0.99 if limit.sign == ">=" else 1.01)
+    monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, {}))
+    for variable in bench.ONE_THREAD:
+        monkeypatch.setenv(variable, "1")
+    result = CliRunner().invoke(bench.bench, standalone_mode=False)
+    assert result.return_value == (0 if spoiled is None else 1)
+    assert (f"fails: {name}: {limit.reason}" in result.output) == (spoiled is not None)

@@ -1,0 +1,73 @@
+"""A harness that cannot catch an injected fault is none: the list fits the tree, and some of its faults are tried."""
+
+import numpy as np
+import pytest
+
+import fourbar_validation.run.question
+from fourbar.solution import Solution
+from fourbar_lab.fault_scenes import FAULT_SCENES
+from fourbar_lab.faults import explain_survival, try_faults
+from fourbar_lab.injection import inject_fault, read_faults
+from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.run.judge import judge
+from tests.support.scenes import thesis
+
+ENTRIES = {entry["fault"]: number for number, entry in enumerate(read_faults())}
+IN_FORCES = (
+    *("with the drive on the output F43 of the wrong sense", "F23 in place of F32", "a load on the wrong bar"),
+    *("inertia about the mass centre in place of the pin", "gravity points upwards"),
+    "alpha_3 in place of the x-component of a_G4",
+)
+IN_TORQUE = (
+    *("J'/2 q'^2 dropped", "the torque off by 1e-9", "the centripetal part of a point outwards"),
+    "the other branch is closed",
+)
+ELSEWHERE = (
+    *("a third of all positions is called singular", "MuJoCo's loop without the drift of its Jacobian"),
+    *("what no torque balances is called an overflow", "dry friction that holds a released linkage loads no pin"),
+)
+"""Some of each kind; `python -m fourbar_lab faults` tries them all."""
+EXACT = {"pinocchio-inverse", "mujoco-inverse", "free-body"}
+
+
+def test_every_entry_fits_its_module_and_is_tried_on_a_scene() -> None:
+    assert len(ENTRIES) == len(read_faults()) >= 70
+    for entry in read_faults():
+        for name, text in inject_fault(entry).items():
+            compile(text, name, "exec")
+        assert entry["scenes"] and set(entry["scenes"]) <= FAULT_SCENES.keys(), entry["fault"]
+        assert entry["caught_by"] or entry["harmless"], entry["fault"]
+
+
+@pytest.mark.parametrize("chosen", [IN_FORCES, IN_TORQUE, ELSEWHERE], ids=["forces", "torque", "elsewhere"])
+def test_an_injected_fault_fails_the_harness_where_its_entry_says(chosen: tuple[str, ...]) -> None:
+    """A fault of the formulas is noticed by every exact engine by itself."""
+    found = try_faults([ENTRIES[fault] for fault in chosen])
+    assert not isinstance(found, str), found
+    for fault, failing in zip(chosen, found, strict=True):
+        assert explain_survival(read_faults()[ENTRIES[fault]], failing) is None, fault
+        noticed = {row.partition(" ")[0] for rows in failing.values() for row in rows}
+        assert chosen is ELSEWHERE or noticed >= EXACT, (fault, noticed)
+
+
+def test_what_does_not_fail_or_fails_elsewhere_survives() -> None:
+    entry = {"caught_by": ["torque"]}
+    assert "nothing fails" in (explain_survival(entry, {"crank": []}) or "")
+    assert "none of torque" in (explain_survival(entry, {"crank": ["free-body F12: equivalence"]}) or "")
+    assert "raises" in (explain_survival(entry, "NameError") or "")
+    assert explain_survival(entry, {"crank": ["free-body torque: equivalence"]}) is None
+
+
+def test_positions_outside_the_range_fail_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    true = fourbar_validation.run.question.solve
+
+    def pretend(*arguments: object, **keywords: object) -> Solution:
+        solution: Solution = true(*arguments, **keywords)  # type: ignore[arg-type]
+        solution.status_code[:] = 0
+        return solution
+
+    monkeypatch.setattr(fourbar_validation.run.question, "solve", pretend)
+    scene = thesis(np.radians([80.0, 135.0]))  # the range starts at 84.6 deg
+    failing = {(row.engine, row.quantity) for row in judge("", scene, [w for w in WITNESSES if w.name in EXACT]).rows
+               if not row.passed}  # fmt: skip
+    assert {(engine, "assembled") for engine in EXACT} <= failing

@@ -1,0 +1,214 @@
+"""Fuzzing: counter-examples stay fixed, the fuzzer itself notices what it must, a stretch of scenes holds."""
+
+import os
+import signal
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fourbar.formulas.mobility
+from fourbar.effects import spring
+from fourbar.files import loads
+from fourbar.studies.enclosure import Extreme, Extremes
+from fourbar.studies.sloped import Sloped
+from fourbar_lab import fuzz as examine
+from fourbar_lab import outside
+from fourbar_lab.fuzz import LAB, run
+from fourbar_lab.fuzz_scenes import draw_fuzz_scene
+from fourbar_lab.shrink import KEPT, keep, shrink_scene
+from fourbar_validation.report.machine import name_code
+from fourbar_validation.run.store import Store
+from tests.fourbar.studies.test_enclosure import meeting
+from tests.support.here import judge_here
+from tests.support.scenes import crank_rocker
+
+SEED = 0
+
+
+@pytest.mark.parametrize("path", sorted(KEPT.glob("*.toml")), ids=lambda path: path.stem)
+def test_a_kept_counterexample_holds(path: Path) -> None:
+    findings = (outside if path.stem.startswith("bounds") else examine).list_findings
+    assert findings(loads(path.read_text(encoding="utf-8"))) == []
+
+
+def test_a_stretch_of_scenes_holds() -> None:
+    assert not [number for number in range(60) if examine.examine(SEED, False, number)]
+
+
+def test_a_scene_depends_on_its_number_alone() -> None:
+    assert (
+        fourbar.dump(draw_fuzz_scene(3, 17))
+        == fourbar.dump(draw_fuzz_scene(3, 17))
+        != fourbar.dump(draw_fuzz_scene(3, 19))
+    )
+
+
+def test_half_are_adversarial() -> None:
+    """Odd scenes reach where even ones never go: bars in a ratio beyond 100, or positions that barely close."""
+    spread = [max(s.linkage.lengths) / min(s.linkage.lengths) for s in (draw_fuzz_scene(SEED, i) for i in range(200))]
+    assert max(spread[0::2]) < 20.0
+    assert max(spread[1::2]) > 1e3
+
+
+def small_error(true: object) -> object:
+    """One part in 1e9 of the moment of bar 3."""
+
+    def wrong(lengths, at, drive_bar, w, *others):  # type: ignore[no-untyped-def]
+        return true(lengths, at, drive_bar, w._replace(M3=(1.0 + 1e-9) * w.M3), *others)  # type: ignore[operator]
+
+    return wrong
+
+
+def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    solving = import_module("fourbar.evaluation.case")
+    monkeypatch.setattr(solving, "pin_forces", small_error(solving.pin_forces))
+    scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
+    assert examine.list_findings(scene)
+    small = shrink_scene(scene, lambda candidate: bool(examine.list_findings(candidate)))
+    assert len(small.loads) + len(small.effects) < 3 and examine.list_findings(small)
+    kept = keep(small, "billionth", tmp_path)
+    assert examine.list_findings(loads(kept.read_text(encoding="utf-8")))
+
+
+def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = replace(crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0))
+    assert examine.list_findings(scene) == []
+    true = fourbar.formulas.mobility.limit_positions
+    monkeypatch.setattr(
+        fourbar.formulas.mobility,
+        "limit_positions",
+        lambda *of: tuple(limit._replace(theta_4=limit.theta_4 + 1e-9) for limit in true(*of)),
+    )
+    found = {finding.split(":")[0] for finding in examine.list_findings(scene)}
+    assert found == {"pinocchio-inverse range", "pinocchio-inverse limit_positions"}
+
+
+@pytest.mark.parametrize(("times", "found"), [(9.0, False), (11.0, True)])
+def test_a_force_that_vanishes_is_held_to_its_prediction(
+    monkeypatch: pytest.MonkeyPatch, times: float, found: bool
+) -> None:
+    """Relative to 0 no error has a size: it is judged in newtons, and not left unjudged."""
+    scene = loads((KEPT / "bar_with_all_mass_stands_for_an_instant.toml").read_text(encoding="utf-8"))
+    witness = next(witness for witness in examine.EXACT if witness.name == "pinocchio-inverse")
+    solution = fourbar.solve(scene, "force")
+    assert solution.F12 is not None and not solution.F12.any()
+    answer = witness.engine().answer(scene, examine.command(scene))
+    wrong = np.array([[times, 0.0]])
+    answer.quantities["F12"] = wrong
+    rows = examine.Comparison(
+        "", scene, answer, solution, witness.tolerance, ("F12",), lambda quantity, where: np.ones(1)
+    ).rows()
+    assert [row.verdict == "fails" for row in rows if row.quantity == "F12"] == [found]
+
+
+def test_a_traceback_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("oops")
+
+    monkeypatch.setattr(examine, "_check_file", broken)
+    assert examine.list_findings(crank_rocker()) == ["ZeroDivisionError: oops"]
+
+
+def test_a_position_that_does_not_close_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = replace(crank_rocker(), linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
+    scene = replace(scene, motion=fourbar.Motion(np.array([3.0]), 1.0), loads=())
+    true = fourbar.solve
+
+    def pretend(*arguments: object, **keywords: object) -> object:
+        solution = true(*arguments, **keywords)  # type: ignore[arg-type]
+        solution.status_code[:] = 0
+        return solution
+
+    assert examine.list_findings(scene) == []
+    monkeypatch.setattr("fourbar_validation.run.question.solve", pretend)
+    assert any(line.startswith("assembled") for line in examine.list_findings(scene))
+
+
+def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fourbar_lab.fuzz.CHUNK", 4)
+    first = run(12, 1, tmp_path, 1)
+    next(first)
+    first.close()
+    with Store(tmp_path, {"seed": 1, "bounds": False, **name_code(LAB)}).held() as store:
+        assert store.done() >= {4}
+        store.put(4, [{"0": ["left by the run before"]}])
+    found = list(run(12, 1, tmp_path, 1))
+    assert len(found) == 3 and found[0] == {"0": ["left by the run before"]}
+
+
+def test_a_scene_that_kills_its_worker_costs_itself_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(examine, "examine", dies_in_scene_2)
+    (found,) = run(4, 1, tmp_path, 1)
+    assert found.keys() == {"2"} and found["2"][0].startswith(examine.LOST)
+
+
+def dies_in_scene_2(seed: int, bounds: bool, index: int) -> list[str]:
+    if index == 2:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return []
+
+
+def watched(monkeypatch: pytest.MonkeyPatch, change: Any = lambda found: found) -> list[Extremes]:
+    """The proofs that the search is held against, each changed."""
+    proven, true = [], outside.extremes
+
+    def proof(*arguments: Any) -> Extremes:
+        proven.append(change(true(*arguments)))
+        return proven[-1]
+
+    monkeypatch.setattr(outside, "extremes", proof)
+    return proven
+
+
+def test_no_value_lies_outside_what_is_proven(monkeypatch: pytest.MonkeyPatch) -> None:
+    proven = watched(monkeypatch)
+    assert not [number for number in range(45, 48) if examine.examine(SEED, True, number)]
+    assert len(proven) == 3 and any(found.nominal for found in proven)
+
+
+def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def within(extremes: dict[str, Extreme], part: float) -> dict[str, Extreme]:
+        return {
+            name: x._replace(low=x.low + part * abs(x.low), high=x.high + part * abs(x.high))
+            for name, x in extremes.items()
+        }
+
+    def narrower(found: Extremes) -> Extremes:
+        return found._replace(least=within(found.least, 1e-6), greatest=within(found.greatest, -1e-6))
+
+    watched(monkeypatch, narrower)
+    found = outside.list_findings(outside.draw_scene(SEED, 45))
+    assert [line.split(":")[0] for line in found if "beyond" in line] == ["extremes torque"] * 2 + [
+        "extremes |F12|"
+    ] * 2
+
+
+def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A distance that may be 0 had 1 m added."""
+
+    def silent(of: spring.Spring, across: Any, _: object) -> Any:
+        distance = np.abs(across)
+        if isinstance(distance, Sloped):
+            distance.values += np.array([float(ball.contains(0)) for ball in distance.values], dtype=object)
+        return of.stiffness + of.slack / distance
+
+    assert outside.list_findings(meeting(0.1005)) == []
+    monkeypatch.setattr(spring, "_divide_by_distance", silent)
+    assert any("beyond" in line for line in outside.list_findings(meeting(0.1005)))
+
+
+def test_a_scene_with_a_value_outside_is_kept_as_it_is(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = fourbar.dump(outside.draw_scene(3, 1))
+    judge_here(monkeypatch)
+    monkeypatch.setattr(outside, "list_findings", lambda of: ["outside"] if fourbar.dump(of) == scene else [])
+    monkeypatch.setattr(examine, "keep", lambda of, name: keep(of, name, tmp_path))
+    assert examine.fuzz.callback(2, True, 3, 1, tmp_path / "out") == 1
+    assert capsys.readouterr().out == "1 of 2 scenes fail (seed 3)\n"
+    (kept,) = tmp_path.glob("bounds_seed_3_scene_1.toml")
+    assert fourbar.dump(replace(loads(kept.read_text(encoding="utf-8")), title="", source="")) == scene

@@ -1,0 +1,112 @@
+"""Mutants of the formulas: how they are made, what counts as a changed number, and what the harness catches."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fourbar.errors import FAILED, HOLDS
+from fourbar.formulas import torque
+from fourbar.scene import command as command_of
+from fourbar_lab import code_mutants
+from fourbar_lab import mutants as harness
+from fourbar_lab.cli import status as ended
+from fourbar_lab.code_mutants import compile_mutants
+from fourbar_lab.mutants import compute_numbers, is_caught, is_changed
+from tests.support.scenes import crank_rocker
+
+SCENE = crank_rocker()
+
+
+def test_a_number_counts_as_changed_from_a_billionth_on() -> None:
+    at = command_of(SCENE)
+    before = compute_numbers(SCENE, at)
+    assert not is_changed(before, compute_numbers(SCENE, at))
+    for part, counts in ((1e-12, False), (1e-8, True)):
+        after = {**before, "torque": before["torque"] * (1.0 + part)}
+        assert is_changed(before, after) == counts
+    assert is_changed(before, {**before, "torque": np.where(np.arange(61) == 3, np.nan, before["torque"])})
+    assert is_changed(before, {**before, "F12": None})
+
+
+def test_without_a_mutant_the_harness_holds() -> None:
+    """Near change points too, where the engines lose as many digits as they are expected to."""
+    for scene in harness.choose_scenes()[-3:]:
+        at = command_of(scene)
+        answers = [(w, w.engine().answer(scene, at)) for w in harness.WITNESSES if w.name in harness.EXACT]
+        assert not is_caught(scene, at, answers)
+
+
+def test_the_harness_alone_catches_a_wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
+    at = command_of(SCENE)
+    answers = [(w, w.engine().answer(SCENE, at)) for w in harness.WITNESSES if w.name in harness.EXACT]
+    assert not is_caught(SCENE, at, answers)
+    true = harness.solve
+
+    def wrong(*arguments: object, **keywords: object) -> object:
+        solution = true(*arguments, **keywords)  # type: ignore[arg-type]
+        solution.F14 *= -1.0
+        return solution
+
+    monkeypatch.setattr("fourbar_validation.run.question.solve", wrong)
+    assert is_caught(SCENE, at, answers)
+
+
+def test_a_mutant_acts_wherever_its_function_was_imported_and_while_it_is_active_alone() -> None:
+    at = command_of(SCENE)
+    before = compute_numbers(SCENE, at)
+    tried = list(compile_mutants(torque))
+    assert len(tried) > 40 and len({mutant.name for mutant in tried}) == len(tried)
+    chosen = next(mutant for mutant in tried if mutant.function is torque.inertia)
+    with chosen.active():
+        assert is_changed(before, compute_numbers(SCENE, at))
+    assert not is_changed(before, compute_numbers(SCENE, at))
+
+
+def test_every_operator_and_number_of_functions_methods_and_properties_is_changed(tmp_path: Path) -> None:
+    source = "A = 3\ndef f(x):\n    return -x if 0 < x <= 1.5 and x is not None else x**2\n"
+    source += "class C:\n    @property\n    def p(self):\n        return [self + k for k in (True,)]\n"
+    (tmp_path / "small.py").write_text(source)
+    spec = importlib.util.spec_from_file_location("small", tmp_path / "small.py")
+    assert spec is not None and spec.loader is not None
+    small = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(small)
+    names = sorted(mutant.name.partition(", line ")[2] for mutant in compile_mutants(small))
+    assert names == sorted([
+        *("3: -x -> +x", "3: 0 -> 1", "3: 1.5 -> 2.5", "3: 2 -> 3", "3: x ** 2 -> x * 2"),
+        *("3: 0 < x <= 1.5 -> 0 <= x <= 1.5", "3: 0 < x <= 1.5 -> 0 < x < 1.5", "3: x is not None -> x is None"),
+        *("3: 0 < x <= 1.5 and x is not None -> 0 < x <= 1.5 or x is not None", "7: self + k -> self - k"),
+        "7: True -> False",
+    ])  # fmt: skip
+
+
+@pytest.mark.posix
+@pytest.mark.parametrize(
+    ("verdicts", "status"),
+    [([], FAILED), ([None], FAILED), ([True] * 94 + [False] * 6, FAILED), ([True] * 95 + [False] * 5 + [None], HOLDS)],
+)
+def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
+    verdicts: list[bool | None], status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    some = [code_mutants.Mutant(str(n), lambda: None, (lambda: None).__code__) for n, _ in enumerate(verdicts)]  # type: ignore[arg-type]
+    each = iter(verdicts)
+    monkeypatch.setattr(harness, "make_baselines", list)
+    monkeypatch.setattr(harness, "compile_mutants", lambda _: some)
+    monkeypatch.setattr(harness, "judge_mutant", lambda *_: next(each))
+    assert ended(["mutants", "--module", "torque"]) == status
+    assert capsys.readouterr().out.count("not caught: ") == verdicts.count(False)
+
+
+@pytest.mark.posix
+def test_a_mutant_that_hangs_or_raises_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = [harness.Baseline(SCENE, at := command_of(SCENE), [], compute_numbers(SCENE, at))]
+    mutant = next(compile_mutants(torque))
+
+    def raises(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(harness, "compute_numbers", raises)
+    assert harness.judge_mutant(mutant, tried) is True
+    monkeypatch.setattr(harness, "compute_numbers", lambda *_: tried[0].before)
+    assert harness.judge_mutant(mutant, tried) is None

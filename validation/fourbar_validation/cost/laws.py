@@ -1,0 +1,198 @@
+"""Laws behind the points, of each quantity by itself: exponents with their uncertainty, floors, jumps."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fourbar_validation.advise.worst_errors import QUANTITIES
+from fourbar_validation.cost.study import STEPPED, CostPoint
+
+TOO_LARGE = 0.1
+"""A larger error is not small enough for its law: the motion itself is another."""
+FLOORED = 0.8
+"""An error that twice the steps leave above this part of what it was has met its floor."""
+ABOVE_FLOOR = 3.0
+"""Points within this factor of the floor carry part of it and are not fitted."""
+WITHIN = 0.35
+"""An exponent may miss the expected one by this much, or by twice its own uncertainty: over two decades of
+a ladder the next order of the error's series moves a fitted slope by about a quarter."""
+FEWEST = 3
+"""Points of a fit."""
+JUMP = 10.0
+"""An error so many times larger than at either of the two coarser settings is no part of a law, where it has met no
+floor: between neighbours of a ladder the laws here change it by 10 or less, and downwards."""
+FIRST_ORDER, FOURTH_ORDER = 1.0, 4.0
+EXPECTED_ORDER = dict.fromkeys(("Euler", "implicit", "implicitfast", "discrete"), FIRST_ORDER) | {"RK4": FOURTH_ORDER}
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorLaw:
+    """error ~ setting_value^exponent of one quantity over the points used."""
+
+    name: str
+    quantity: str
+    exponent: float
+    sigma: float
+    """Standard error of the fit."""
+    expected: float
+    points: int
+    jumps: tuple[str, ...] = ()
+    """Where the error jumps up as the steps get finer: no law then, whatever the other points fit."""
+
+    @property
+    def decided(self) -> bool:
+        """Whether enough points are left for a fit with an uncertainty, or a jump denies it."""
+        return self.points >= FEWEST or bool(self.jumps)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the exponent is the expected one throughout; False where it is not decided."""
+        return self.decided and not self.jumps and abs(self.exponent - self.expected) <= max(2.0 * self.sigma, WITHIN)
+
+    def __str__(self) -> str:
+        if self.jumps:
+            return f"FAILS, {'; '.join(self.jumps)}"
+        if not self.decided:
+            return f"no fit, {self.points} points above the floor and below {TOO_LARGE:g}"
+        return f"{'holds' if self.holds else 'FAILS'}, {self.exponent:.2f} +- {self.sigma:.2f}"
+
+
+def write_laws(found: Sequence[ErrorLaw]) -> list[str]:
+    """Each law in one line, quantity by quantity."""
+    shown = []
+    for name in dict.fromkeys(law.name for law in found):
+        each = [law for law in found if law.name == name]
+        texts = _group([(law.quantity, str(law)) for law in each])
+        shown.append(f"{name}, expected {each[0].expected:g}: {'; '.join(texts)}")
+    return shown
+
+
+def _group(pairs: Sequence[tuple[str, str]]) -> list[str]:
+    """Quantities with the same text, together."""
+    texts = dict.fromkeys(text for _, text in pairs)
+    return [f"{', '.join(quantity for quantity, other in pairs if other == text)}: {text}" for text in texts]
+
+
+def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
+    """Slope of log y over log x by least squares, and its standard error."""
+    from scipy.stats import linregress
+
+    result = linregress(np.log(x), np.log(y))
+    return float(result.slope), float(result.stderr) if len(x) > 2 else math.inf
+
+
+def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
+    """Find the error that more steps no longer lessen; None where it still falls at the end of the ladder."""
+    result = [getattr(point, quantity) for point in _list_by_steps(points)]
+    if len(result) < 2 or not math.isfinite(result[-1]) or result[-1] < FLOORED * result[-2]:
+        return None
+    return float(result[-1])  # before it two sources may cancel: a dip is not a floor
+
+
+def find_steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint | None:
+    """Find the first point of a ladder beyond which more steps buy nothing."""
+    least = find_floor(points, quantity)
+    if least is None:
+        return None
+    return next(point for point in _list_by_steps(points) if getattr(point, quantity) <= least / FLOORED)
+
+
+def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
+    return sorted(points, key=lambda point: point.steps_per_revolution)
+
+
+def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
+    """Where an error leaps up on a ladder from coarse to fine, once the motion is the scene's."""
+    result = []
+    for i, point in enumerate(points[1:], 1):
+        value, before = getattr(point, quantity), [getattr(each, quantity) for each in points[max(i - 2, 0) : i]]
+        # two sources that cancel make a dip, and its far side is no jump; a motion that is lost again is one
+        if before[-1] < TOO_LARGE and not value <= JUMP * (max(before) if value < TOO_LARGE else before[-1]):
+            result.append(point)
+    return result
+
+
+def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
+    """Every law that the study was laid out for, of each quantity, as far as its curves are there."""
+    result = []
+    one_state = [point for point in curves.get("one state", ()) if point.setting_value > 0.0]
+    ladders = [
+        ("softness in (1-d)", curves.get("softness d", ()), 1.0),
+        ("sag at 0.1 rad/s in (1-d)", curves.get("sag d, slow", ()), 1.0),
+        ("sag at 0.1 rad/s in tc", curves.get("sag tc, slow", ()), 2.0),
+        ("MuJoCo at one state in (1-d)/d", one_state, 1.0),
+    ]
+    for integrator, order in EXPECTED_ORDER.items():
+        points, name = curves.get(f"{integrator}, tc held", ()), f"order of {integrator} in the timestep"
+        result += [_fit_law(name, quantity, points, order, by_steps=True) for quantity in QUANTITIES if points]
+    result += [_fit_law(name, quantity, points, n) for name, points, n in ladders for quantity in QUANTITIES if points]
+    return result + [law for quantity in QUANTITIES if (law := _fit_stiff(curves, quantity)).points > 0]
+
+
+def _fit_law(
+    name: str, quantity: str, points: Sequence[CostPoint], expected: float, *, by_steps: bool = False
+) -> ErrorLaw:
+    least = (find_floor(points, quantity) or 0.0) if by_steps else 0.0
+    ordered = sorted(
+        (p for p in points if p.setting_value > 0.0), key=lambda p: p.setting_value if by_steps else -p.setting_value
+    )
+    leaps = tuple(_measure_leap(p, ordered, quantity) for p in find_jumps(ordered, quantity))
+    used = [p for p in ordered if ABOVE_FLOOR * least < getattr(p, quantity) < TOO_LARGE]
+    if len(used) < FEWEST:
+        return ErrorLaw(name, quantity, math.nan, math.inf, expected, len(used), leaps)
+    x = [1.0 / p.setting_value if by_steps else p.setting_value for p in used]
+    slope, sigma = fit(x, [getattr(p, quantity) for p in used])
+    return ErrorLaw(name, quantity, slope, sigma, expected, len(used), leaps)
+
+
+def _measure_leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) -> str:
+    before = getattr(ladder[ladder.index(point) - 1], quantity)
+    setting = point.setting.removeprefix(f"{point.curve}, ")
+    return f"jumps from {before:.1e} to {getattr(point, quantity):.1e} at {setting}"
+
+
+def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
+    """RK4's floor at a time constant of k steps goes as k^-4, whatever the timestep."""
+    ladders = ((tc, curves.get(f"RK4, pads, tc = {tc:g} h", ())) for tc in (3.0, 10.0, 30.0, 100.0))
+    floors = {tc: least for tc, points in ladders if (least := find_floor(points, quantity)) is not None}
+    name = "floor of RK4 in tc/h"
+    if len(floors) < FEWEST:
+        return ErrorLaw(name, quantity, math.nan, math.inf, -FOURTH_ORDER, len(floors))
+    slope, sigma = fit(list(floors), list(floors.values()))
+    return ErrorLaw(name, quantity, slope, sigma, -FOURTH_ORDER, len(floors))
+
+
+def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
+    """Where a quantity jumps towards finer steps, and where it has passed its floor."""
+    result = []
+    for name, points in curves.items():
+        ladder = _list_by_steps(
+            [p for p in points if p.kind == STEPPED and p.setting_value == p.setting_value and p.setting_value >= 2.0]
+        )
+        if name == "recommended" or len(ladder) < 4 or ladder[0].setting_value == ladder[-1].setting_value:
+            continue
+        if len({round(p.steps_per_revolution) for p in ladder}) < 4:
+            continue
+        leaps = [(q, _measure_leap(p, ladder, q)) for q in QUANTITIES for p in find_jumps(ladder, q)]
+        result += [f"{name}: {line}" for line in _group(leaps)]
+        floored = [(q, p) for q in QUANTITIES if (p := find_steps_at_floor(ladder, q)) is not None]
+        if floored:
+            beyond = (f"{q} beyond {p.steps_per_revolution:.0f} ({find_floor(ladder, q):.1e})" for q, p in floored)
+            result.append(f"{name}: more steps per revolution buy nothing: {', '.join(beyond)}")
+        never = [q for q in QUANTITIES if not any(getattr(p, q) < TOO_LARGE for p in ladder)]
+        if never:
+            result.append(f"{name}: no timestep of the ladder brings {', '.join(never)} below {TOO_LARGE:g}")
+    return result
+
+
+def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
+    """Points that no other beats in both error and cost, from cheap to accurate."""
+    front: list[CostPoint] = []
+    for point in sorted(points, key=lambda p: (p.seconds_per_revolution, getattr(p, quantity))):
+        if math.isfinite(getattr(point, quantity)) and (
+            not front or getattr(point, quantity) < getattr(front[-1], quantity)
+        ):
+            front.append(point)
+    return front

@@ -1,1 +1,0 @@
-"""What is stressed: forward error, fuzzing, mutation, speed."""

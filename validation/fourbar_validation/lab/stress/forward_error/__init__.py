@@ -1,1 +1,0 @@
-"""Forward error of the formulas against ball arithmetic, per family of hard cases."""

@@ -1,1 +1,0 @@
-"""Random and mutated scenes through everything."""

@@ -1,1 +1,0 @@
-"""Mutants of the formulas, and who catches them."""
