@@ -246,7 +246,7 @@ def test_the_pattern_of_a_suite_does_not_take_the_suite_itself(tmp_path: Path) -
 
 def test_a_worker_carries_only_its_own_scenes(tmp_path: Path) -> None:
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
-    (job,) = pool.make_jobs(suite, [1], (), False)
+    (job,) = pool.make_jobs(suite, [1], (), draw=False)
     assert job.name == "b" and len(job.suite) == 1
 
 

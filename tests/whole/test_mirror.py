@@ -20,7 +20,7 @@ JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
     "fourbar/cli/test_cli.py": "fourbar/cli: edit evaluate export given; fourbar/show: progress tables words",
     "whole/test_exits.py": "fourbar: errors; validation: cli; validation/report: terminal; lab: cli fuzz_files",
-    "whole/test_kills.py": "validation/run: pool run selection store; validation/scenes: suites",
+    "whole/test_kills.py": "validation/run: pool run selection store",
     "whole/test_results_format.py": "validation/compare: columns",
     "whole/test_package.py": "validation: places",
     # one table or one evaluation, whose rows are no use alone

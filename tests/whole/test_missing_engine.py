@@ -61,6 +61,7 @@ def without(library: str, folder: Path, *arguments: str, **settings: str) -> sub
             "--workers",
             "1",
             "--no-pictures",
+            "--sample-shipped=0",
             "--out",
             "out",
             *arguments,

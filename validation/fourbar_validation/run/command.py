@@ -17,7 +17,7 @@ from fourbar_validation.regression.record import find_baseline, open_run
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run.elsewhere import run_elsewhere
-from fourbar_validation.run.run import WORKERS, Collected, Pictured, RunOptions, run
+from fourbar_validation.run.run import SAMPLE, WORKERS, Collected, Pictured, RunOptions, run
 from fourbar_validation.run.selection import choose_witnesses, find_askable, select_scenes
 from fourbar_validation.scenes.random import DrawnType
 
@@ -80,10 +80,15 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
     help="End what takes longer on one scene; left out: a minute, and more for many positions.",
 )
 @click.option(
-    "--no-pictures",
-    is_flag=True,
-    help="Draw nothing, measure no observed order, and judge studies, derivatives, bounds, SDF and USD of few scenes.",
+    "--sample-shipped",
+    "sample",
+    type=click.IntRange(min=0),
+    default=SAMPLE,
+    show_default=True,
+    metavar="N",
+    help="Judge studies, derivatives, bounds, equilibria, SDF and USD in this many scenes, evenly chosen.",
 )
+@click.option("--no-pictures", is_flag=True, help="Draw nothing and measure no observed order; no verdict changes.")
 @click.option("--mjcf", "--name", multiple=True, hidden=True, expose_value=False, is_eager=True, callback=refuse_moved)
 @add_output_options
 def command(
@@ -101,10 +106,11 @@ def command(
     python: Path | None,
     adapters: tuple[str, ...],
     time_limit: float | None,
+    sample: int,
     no_pictures: bool,
     **forms: Path | None,
 ) -> int:
-    """Judge scenes (default: all of models/); write results.csv, timings.csv, report.md and report.html."""
+    """Judge scenes (default: models/ and capabilities/); write results.csv, timings.csv, report.md, report.html."""
     from fourbar_validation.report.terminal import print_table
 
     of_random: dict[str, Any] = {"--random": count, "--seed": seed, "--type": types}
@@ -127,14 +133,14 @@ def command(
 
         witnesses = adjust_witnesses(witnesses, wanted)
     if python is not None:
-        the_same = of_random | {"--workers": workers, "--engines": engines}
+        the_same = of_random | {"--workers": workers, "--engines": engines, "--sample-shipped": sample}
         the_same |= {"--error": wanted, "--time-limit": time_limit}
         the_same["--suite"] = named if named in (None, "hard") else os.path.abspath(named)
         passed_on = [*map(os.path.abspath, scenes), "--no-pictures", *(f"--witness={adapter}" for adapter in adapters)]
         passed_on += [f"{option}={value}" for option, value in the_same.items() if value is not None]
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
     present, missing = find_askable(choose_witnesses(engines, witnesses, adapters), by_name=engines is not None)
-    options = RunOptions(workers, scheduler, time_limit, drawn=not no_pictures)
+    options = RunOptions(workers, scheduler, time_limit, not no_pictures, sample)
     result = show_progress(len(suite), run(suite, out, present, options, missing))
     print_table(result, out)
     worse = _report_differences(against, out, forms, result.verdict)

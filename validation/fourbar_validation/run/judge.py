@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
-from zlib import crc32
 
 import numpy as np
 
@@ -57,19 +56,22 @@ CHECKS = (
     *(Check(rows, shipped=True, theta_2=f"{rows.__name__}: the file opens at theta_2") for rows in (sdf, usd)),
 )
 """All that is checked of a scene; one that raises costs its own rows."""
-OF_MANY = 500
-"""Of so many scenes of a long suite one has what else is shipped judged, which takes as long as judging thirty."""
 OUTPUT = "output.txt"
 """In the folder of a run: what the engines printed."""
 
 
-def judge_for_report(name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, draw: bool = True) -> Record:
+def judge_for_report(
+    name: str,
+    scene: Scene,
+    witnesses: Sequence[Witness] = WITNESSES,
+    *,
+    draw: bool = True,
+    shipped: bool = False,
+) -> Record:
     """Judge a scene and keep what the report needs of it.
 
-    `draw`: with its pictures and observed orders, and with what else is shipped; otherwise, in a long suite, that is
-    judged of one scene in OF_MANY, by its name.
+    `draw`: with its pictures and observed orders. `shipped`: with what else is shipped.
     """
-    shipped = draw or crc32(name.encode(errors="replace")) % OF_MANY == 0
     record = judge(name, scene, witnesses, order=draw, shipped=shipped)
     for i, row in enumerate(record.rows):
         if row.failed and row.engine in record.output:

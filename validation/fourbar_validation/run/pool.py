@@ -20,12 +20,13 @@ SECONDS_PER_POSITION = 0.03
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One scene for a worker: its place in a suite, by whom it is judged, whether it is drawn."""
+    """One scene for a worker: its place in a suite, its witnesses, whether it is drawn, and judged as shipped too."""
 
     suite: Suite
     scene: int
     witnesses: Sequence[Witness]
     draw: bool
+    shipped: bool
 
     @property
     def name(self) -> str:
@@ -33,11 +34,22 @@ class Job:
         return make_plain(self.suite.name(self.scene))
 
 
-def make_jobs(suite: Suite, scenes: Iterable[int], witnesses: Sequence[Witness], draw: bool) -> list[Job]:
-    """Make the jobs of some scenes; one of a file carries its own text alone."""
-    if isinstance(suite, Files):
-        return [Job(replace(suite, texts=(suite.texts[i],)), 0, witnesses, draw) for i in scenes]
-    return [Job(suite, i, witnesses, draw) for i in scenes]
+def make_jobs(
+    suite: Suite, scenes: Iterable[int], witnesses: Sequence[Witness], draw: bool, sample: int = 0
+) -> list[Job]:
+    """Make the jobs of some scenes; one of a file carries its own text alone.
+
+    `sample`: of so many scenes of the suite, evenly chosen, what else is shipped is judged too.
+    """
+    jobs = []
+    for i in scenes:
+        shipped = (i + 1) * sample // len(suite) > i * sample // len(suite)
+        if isinstance(suite, Files):
+            drawn = draw and suite.name(i) not in suite.not_drawn
+            jobs.append(Job(replace(suite, texts=(suite.texts[i],)), 0, witnesses, drawn, shipped))
+        else:
+            jobs.append(Job(suite, i, witnesses, draw, shipped))
+    return jobs
 
 
 def find_longest(suite: Suite) -> float:
@@ -47,7 +59,8 @@ def find_longest(suite: Suite) -> float:
 
 def judge_job(job: Job) -> Record:
     """Judge one scene; runs in a worker."""
-    return judge_for_report(job.name, job.suite.scene(job.scene), job.witnesses, draw=job.draw)
+    scene = job.suite.scene(job.scene)
+    return judge_for_report(job.name, scene, job.witnesses, draw=job.draw, shipped=job.shipped)
 
 
 def judge_by_engine(job: Job, _: Exception, attempt: processes.Attempt) -> Record:
@@ -72,9 +85,10 @@ def judge_chunks(
     workers: int,
     seconds: float | None = None,
     cluster: "Cluster | None" = None,
+    sample: int = 0,
 ) -> Iterator[tuple[int, list[Record]]]:
     """Judge chunks of scenes, each as it is done; `seconds`: after which a scene is taken to hang."""
-    made = ((number, make_jobs(suite, scenes, witnesses, draw)) for number, scenes in chunks)
+    made = ((number, make_jobs(suite, scenes, witnesses, draw, sample)) for number, scenes in chunks)
     seconds = find_longest(suite) if seconds is None else seconds
     if cluster is not None:
         return cluster.over(judge_job, made, seconds, judge_by_engine)

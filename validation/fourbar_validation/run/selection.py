@@ -8,7 +8,7 @@ from fourbar_validation.engines import added
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard, hold_fully
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, Witness
 from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
-from fourbar_validation.scenes.suites import Random, Suite, list_model_files, read_scene_files, read_suite
+from fourbar_validation.scenes.suites import Random, Suite, read_default_suite, read_scene_files, read_suite
 
 
 def select_scenes(
@@ -24,7 +24,7 @@ def select_scenes(
         return read_suite(Path(named)), witnesses
     if count:
         return Random(count, seed, read_linkage_types(types)), witnesses
-    return read_scene_files(scenes or list_model_files()), witnesses
+    return (read_scene_files(scenes) if scenes else read_default_suite()), witnesses
 
 
 def _find_added(adapters: Sequence[str], own: tuple[Witness, ...]) -> tuple[Witness, ...]:

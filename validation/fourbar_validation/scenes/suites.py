@@ -5,7 +5,7 @@ import math
 import tomllib
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -49,6 +49,8 @@ class Files:
     """(name, text of the file), sorted by name."""
     positions: int = 0
     """The most that any of them asks for, or what takes as long."""
+    not_drawn: frozenset[str] = frozenset()
+    """Names of the scenes of which no pictures are made."""
 
     def __len__(self) -> int:
         return len(self.texts)
@@ -94,6 +96,13 @@ class Random:
 def list_model_files() -> list[Path]:
     """List the scene files of `models/`, sorted."""
     return sorted(MODELS.glob("*.toml"))
+
+
+def read_default_suite() -> Files:
+    """Read the scene files of `models/` and the suite of small scenes that together use every capability."""
+    capabilities = sorted((MODELS / "capabilities").glob("*.toml"))
+    suite = read_scene_files([*list_model_files(), *capabilities])
+    return replace(suite, not_drawn=frozenset(file.stem for file in capabilities))
 
 
 def read_scene_files(paths: Iterable[Path]) -> Files:

@@ -24,6 +24,7 @@ from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, WELL_CONDITIONE
 from fourbar_validation.engines.description import find_centre, find_inertia
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import FIRST_ORDER
+from fourbar_validation.engines.witnesses import find_missing
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import make_row
 
@@ -54,6 +55,8 @@ class Derived(NamedTuple):
 def equilibria(question: Question) -> Iterator[Row]:
     """Judge the torque, its slope and the frequency at every equilibrium, and that there are no others."""
     scene = _at_rest(question.scene)
+    if missing := find_missing("flint"):
+        raise NotAskedError(missing)
     theta_2, result = _list_samples(question), fourbar.equilibrium(question.scene)
     if result.indifferent:
         raise NotAskedError("the linkage is indifferent")

@@ -1,0 +1,74 @@
+"""The suite of a run without arguments uses every capability, and how much is judged of a suite does not depend on
+pictures."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fourbar.scene import Scene
+from fourbar_validation.engines.effects import TERM_OF
+from fourbar_validation.run import pool
+from fourbar_validation.run.run import RunOptions, run
+from fourbar_validation.scenes.random import DrawnType
+from fourbar_validation.scenes.suites import Files, Random, read_default_suite
+
+
+def scenes() -> list[Scene]:
+    suite = read_default_suite()
+    return [suite.scene(i) for i in range(len(suite))]
+
+
+def uses(scene: Scene) -> Iterator[Any]:
+    motion, drive = scene.motion, scene.drive
+    yield from (effect.key for effect in scene.effects)
+    yield f"command of {motion.names[0]}"
+    yield "drive", (drive.start.bar, drive.end.bar) if drive else scene.drive_bar
+    yield from (f"load in {load.frame} axes" for load in scene.loads)
+    if any(load.table for load in scene.loads):
+        yield "load over a table"
+    if motion.law is not None:
+        yield f"law with ends {motion.law.ends}"
+        if motion.law.ends == "periodic" and motion.law.time[0] != 0.0:
+            yield "periodic law that begins late"
+    if motion.free is not None and any(effect.key == "flywheel" for effect in scene.effects):
+        yield "released with a flywheel"
+    for effect in scene.effects:
+        if effect.key == "torsion":
+            yield from (("torsion", pin) for pin, *_ in effect.springs)  # type: ignore[attr-defined]
+    if scene.tolerances:
+        yield "tolerances"
+    if scene.points:
+        yield "points"
+
+
+def test_the_default_suite_uses_every_capability() -> None:
+    used = {use for scene in scenes() for use in uses(scene)}
+    wanted: set[Any] = TERM_OF.keys() - {"load"}
+    wanted |= {f"command of {name}" for name in ("theta_2", "theta_3", "theta_4", "stroke")}
+    wanted |= {("drive", pair) for pair in itertools.combinations((1, 2, 3, 4), 2)}
+    wanted |= {("drive", bar) for bar in (2, 3, 4)} | {("torsion", pin) for pin in ("O2", "A", "B", "O4")}
+    wanted |= {"load in world axes", "load in bar axes", "load over a table", "tolerances", "points"}
+    wanted |= {"law with ends rest", "periodic law that begins late", "released with a flywheel"}
+    assert wanted <= used
+
+
+@pytest.mark.parametrize(("count", "sample", "shipped"), [(6, 30, 6), (60, 30, 30), (1000, 30, 30), (6, 0, 0)])
+def test_of_a_sample_what_else_is_shipped_is_judged(count: int, sample: int, shipped: int) -> None:
+    suite = Random(count, 0, tuple(DrawnType))
+    jobs = pool.make_jobs(suite, range(count), (), True, sample)
+    assert sum(job.shipped for job in jobs) == shipped
+    assert [job.shipped for job in pool.make_jobs(suite, range(count), (), False, sample)] == [j.shipped for j in jobs]
+
+
+def test_pictures_change_nothing_that_is_judged(tmp_path: Path) -> None:
+    suite = replace(read_default_suite(), texts=read_default_suite().texts[:1])
+    assert isinstance(suite, Files)
+    tables = []
+    for drawn in (True, False):
+        list(run(suite, tmp_path / str(drawn), (), RunOptions(workers=1, drawn=drawn)))
+        tables.append((tmp_path / str(drawn) / "results.csv").read_text())
+    assert tables[0] == tables[1] and "equilibria" in tables[0]
