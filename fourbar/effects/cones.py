@@ -6,6 +6,7 @@ is a quadratic, and decides at any K. For several pins beyond that radius soluti
 for from many starts: what is not found there is taken not to exist.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,11 @@ STEPS = 200
 """Each halves the error where the spectral radius is 1/2; Newton's steps end it long before."""
 SAME = 1e-6
 """Two solutions found by the search are the same if they differ by less, relative."""
+SETTLED = 1e-12
+"""Relative change by which a start of the search has settled; the last two steps take back what that leaves."""
 STARTS = 64
+SEARCHED = 256
+"""Problems of which those that are the same are searched once, as where many ranges are cut at one dead point."""
 
 
 class Sliding(NamedTuple):
@@ -50,8 +55,13 @@ def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
         radius[known] = np.abs(np.linalg.eigvals(K[known])).max(axis=1)
         sure = np.flatnonzero(known & (radius < 1.0))
         x[sure] = _iterate(F[sure], C[sure], k[sure], np.zeros((len(sure), p)))
-        for index in np.flatnonzero(known & ~(radius < 1.0)):
-            x[index], count[index] = _search(F[index], C[index], k[index])
+        unsure = np.flatnonzero(known & ~(radius < 1.0))
+        for start in range(0, len(unsure), SEARCHED):
+            some = unsure[start : start + SEARCHED]
+            numbers = np.concatenate([of[some].reshape(len(some), math.prod(of.shape[1:])) for of in (F, C, k)], axis=1)
+            _, first, same = np.unique(numbers, axis=0, return_index=True, return_inverse=True)
+            first = some[first]
+            x[some], count[some] = (of[same.ravel()] for of in _search(F[first], C[first], k[first]))
     with np.errstate(invalid="ignore"):
         for _ in range(2):  # takes back the rounding of the search and of the quadratic
             right, slope = _compute_right_side(F, C, k, x)
@@ -121,25 +131,25 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
     return x
 
 
-def _search(F: Array, C: Array, k: Array) -> tuple[Array, int]:
-    """Find the least solution of one problem, and whether it has others, from starts over many magnitudes."""
-    p = len(k)
-    size = float(np.max(k * np.hypot(F[:, 0], F[:, 1])))
-    if size == 0.0:
-        return np.zeros(p), ONE
+def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
+    """Find the least solution of each problem, and how many there are, from starts over many magnitudes."""
+    n, p = k.shape
+    size = np.max(k * np.hypot(F[..., 0], F[..., 1]), axis=1)
     directions = np.vstack([np.ones(p), np.eye(p) + 0.01, np.random.default_rng(0).uniform(0.0, 1.0, (STARTS // p, p))])
-    starts = (size * np.logspace(-2, 3, 11)[:, None, None] * directions).reshape(-1, p)
-    x = np.vstack([np.zeros((1, p)), starts])
-    all_F, all_C, all_k = (np.broadcast_to(one, (len(x), *one.shape)) for one in (F, C, k))
+    starts = np.vstack([np.zeros((1, p)), (np.logspace(-2, 3, 11)[:, None, None] * directions).reshape(-1, p)])
+    x = (size[:, None, None] * starts).reshape(-1, p)
+    problem, moving, before = np.repeat(np.arange(n), len(starts)), np.arange(len(x)), np.full_like(x, np.inf)
     for _ in range(60):
-        right, slope = _compute_right_side(all_F, all_C, all_k, x)
-        x = np.clip(x + compute_step(right - x, slope), 0.0, 1e12 * size)
-    right, _ = _compute_right_side(all_F, all_C, all_k, x)
-    found = x[np.abs(right - x).max(axis=1) <= 1e-9 * np.maximum(x.max(axis=1), size)]
-    distinct: list[Array] = []
-    for each in found[np.argsort(found.sum(axis=1))]:
-        if all(np.abs(each - other).max() > SAME * max(each.max(), other.max()) for other in distinct):
-            distinct.append(each)
-    if not distinct:
-        return np.full(p, np.nan), NONE
-    return distinct[0], ONE if len(distinct) == 1 else SEVERAL
+        of, last = problem[moving], x[moving]
+        right, slope = _compute_right_side(F[of], C[of], k[of], last)
+        new = np.clip(last + compute_step(right - last, slope), 0.0, 1e12 * size[of, None])
+        least_change = np.minimum(np.abs(new - last).max(axis=1), np.abs(new - before[moving]).max(axis=1))
+        x[moving], before[moving] = new, last
+        moving = moving[least_change > SETTLED * new.max(axis=1)]  # the others stand still or alternate
+    right, _ = _compute_right_side(F[problem], C[problem], k[problem], x)
+    solves = np.abs(right - x).max(axis=1) <= 1e-9 * np.maximum(x.max(axis=1), size[problem])
+    x, solves = x.reshape(n, -1, p), solves.reshape(n, -1)
+    least = x[np.arange(n), np.argmin(np.where(solves, x.sum(axis=2), np.inf), axis=1)]
+    apart = np.abs(x - least[:, None]).max(axis=2) > SAME * np.maximum(x.max(axis=2), least.max(axis=1)[:, None])
+    count = np.where((solves & apart).any(axis=1), SEVERAL, np.where(solves.any(axis=1), ONE, NONE))
+    return np.where(count[:, None] == NONE, np.nan, least), count

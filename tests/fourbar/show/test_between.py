@@ -1,6 +1,9 @@
 """Jumps and peaks between the steps of a sweep are found where geometry and much finer steps have them."""
 
 import math
+import resource
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +23,30 @@ LOCATED = 1e-7
 PEAK = 1e-6
 """Relative, of a largest value against that of steps of 0.01 degrees: (0.01 deg)^2 times its curvature."""
 WIPER = fourbar.load(Path(__file__).parents[3] / "models" / "gallery" / "wiper.toml")
+BUCKET = """
+[lengths]
+ground = "16.5 in"
+input = "23.6 in"
+coupler = "22 in"
+output = "17.7 in"
+ground_angle = "-65 deg"
+[bars.input]
+mass = "130 lb"
+[bars.output]
+mass = "1650 lb"
+centre = ["26 in", "-75 deg"]
+[motion]
+stroke = { from = "44 in", to = "90.6 in", steps = 120 }
+stroke_speed = "3 in/s"
+side = "left"
+[drive]
+from = { bar = 1, at = ["67 in", "172 deg"] }
+to = { bar = 2, at = ["23.6 in", "0 deg"] }
+[effects]
+gravity = ["1 g_0", "-90 deg"]
+"""
+PIN = '{ coefficient = 0.15, radius = "2 in" }'
+FRICTION = f"pin_friction = {{ O2 = {PIN}, A = {PIN}, B = {PIN} }}\n"
 FINE = fourbar.Sweep(0.0, math.tau, 36000)
 
 
@@ -110,3 +137,17 @@ def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
     assert [pin for _, pin in found.reversals] == ["A"] * len(slips)
     for (place, _), i in zip(found.reversals, slips, strict=True):
         assert fine.at.stroke[i + 1] <= place <= fine.at.stroke[i]
+
+
+def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction(tmp_path: Path) -> None:
+    """From 44 in on the linkage does not assemble at first; many couples jam beside the dead point where it begins."""
+    seconds = []
+    for name, text in (("without", BUCKET), ("with", BUCKET + FRICTION)):
+        (scene := tmp_path / f"{name}.toml").write_text(text)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        done = subprocess.run(
+            [sys.executable, "-m", "fourbar", "analyze", str(scene)], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0 and "drive force" in done.stdout, done.stderr
+        seconds.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
+    assert seconds[1] < 5.0 * seconds[0]
