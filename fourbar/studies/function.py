@@ -144,7 +144,8 @@ def _evaluate(
     stages = set(wanted.values())
     at = path.position(q, half, branch)
     state = case.state(path, q, at, branch, speed, acceleration, moving=stages != {"position"})
-    found = list_kinematics(case, state, wanted.keys()) | name_of_command(case, at, state, q)
+    found = {"theta_2": state.theta_2, **list_kinematics(case, state, wanted.keys())}
+    found |= name_of_command(case, at, state, q)
     if "force" in stages:
         done = case.dynamics(state, acceleration)
         power = xp.where(xp.isfinite(done.drive), done.work * speed, xp.nan)
@@ -214,6 +215,7 @@ def _list_stages(scene: Scene, quantities: Iterable[str], keys: Sequence[str]) -
     others = OF_LINE if scene.drive is None else (COUPLE.value,)
     stages = {name: stage for name, stage in STAGE_OF.items() if name not in {*NEVER, *others}}
     stages |= {start + point.name: stage for point in scene.points for start, stage in OF_POINTS.items()}
+    stages["theta_2"] = "position"
     for name in quantities:
         if name not in stages:
             close = get_close_matches(str(name), stages, 1, 0.0)

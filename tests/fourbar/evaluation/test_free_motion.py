@@ -49,6 +49,17 @@ def test_stops_at_a_limit_unless_set_to_follow(coupler: float) -> None:
     assert np.array_equal(passed.command.theta_2[:n], halted.command.theta_2)
 
 
+@pytest.mark.parametrize("bar", [2, 4])
+def test_a_flywheel_alone_turns_evenly_faster_under_a_constant_couple(bar: int) -> None:
+    """Bars without mass: alpha = M/J."""
+    linkage, times = fourbar.uniform(0.1, 0.25, 0.3, 0.28, per_metre=0.0), np.linspace(0.0, 2.0, 21)  # a drag link
+    m = release(linkage, (fourbar.Flywheel(0.5, bar), fourbar.Load(bar, moment=0.2)), 0.3, 1.0, 1, times)
+    angle = solve(fourbar.Scene(linkage), "position", at=m.command).theta_4 if bar == 4 else m.command.theta_2
+    start = solve(fourbar.Scene(linkage, fourbar.Motion(0.3, 1.0)), "velocity")
+    speed = start.omega_4[0] if bar == 4 else 1.0
+    assert angle - angle[0] == pytest.approx(speed * times + 0.2 * times**2, abs=1e-11)
+
+
 def test_dry_friction_holds() -> None:
     m = release(HANGING, (fourbar.Gravity(), fourbar.Friction.at(O2=0.3)), 0.3, 1.0, 1, np.linspace(0.0, 5.0, 51))
     assert (

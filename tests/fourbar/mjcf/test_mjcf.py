@@ -112,6 +112,16 @@ def sprung() -> fourbar.Scene:
     return crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,))
 
 
+def test_the_joints_count_the_turns_of_every_spring() -> None:
+    """The springs at O4 and B rest three turns up and two down: the joint at A, which none holds, takes the rest."""
+    rests = {"O4": 1.0 + 3 * math.tau, "B": 0.5 - 2 * math.tau}
+    springs = Torsion.at(**{pin: (0.1, rest, 0.0) for pin, rest in rests.items()})
+    _, data = opened(crank_rocker(motion=fourbar.Motion(1.0, 10.0), effects=(springs,)))
+    at_O2, at_A, at_O4 = data.qpos
+    assert gap(data) < OPEN
+    assert abs(at_O4 - rests["O4"]) < math.pi and abs(at_O4 - at_O2 - at_A - rests["B"]) < math.pi
+
+
 def test_opens_assembled_and_moves_without_keyframe_or_control() -> None:
     rng = np.random.default_rng(SEED)
     scenes = [fourbar.load(file) for file in list_model_files()] + [sprung()]

@@ -158,6 +158,42 @@ def test_other_bars_command(library: Library, motion: Motion) -> None:
         assert np.asarray(value) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
 
 
+COMMANDS = [
+    Motion(0.7, 8.0, 3.0),
+    Motion(theta_3=0.6, omega_3=2.0),
+    Motion(theta_4=2.2, omega_4=-1.0, alpha_4=2.0),
+]
+
+
+@pytest.mark.parametrize("drive_bar", [2, 3, 4])
+@pytest.mark.parametrize("motion", COMMANDS, ids=lambda motion: motion.names[0])
+def test_power_and_condition_are_those_of_the_definitions(motion: Motion, drive_bar: int) -> None:
+    """Torque times the speed of the driven bar; the sine between the two bars that are not commanded."""
+    scene = replace(LOADED, motion=motion, drive_bar=drive_bar, loads=())
+    names = ["power", "condition", "torque", "theta_2", "theta_3", "theta_4", *(f"omega_{bar}" for bar in (2, 3, 4))]
+    found = function(scene, ["lengths.output"], names)(0.22)
+    one, other = (found[f"theta_{bar}"] for bar in (2, 3, 4) if f"theta_{bar}" != motion.names[0])
+    assert found["condition"] == pytest.approx(abs(np.sin(other - one)), rel=1e-13)
+    assert found["power"] == pytest.approx(found["torque"] * found[f"omega_{drive_bar}"], rel=1e-13)
+    assert found[motion.names[0]] == motion.angle
+
+
+def test_power_and_condition_of_a_cylinder_are_those_of_the_definitions() -> None:
+    moving = replace(CYLINDER, loads=())
+    found = function(moving, ["lengths.output"], ["power", "condition", "drive_force", "stroke_speed", "sin_mu"])(0.22)
+    assert found["power"] == pytest.approx(found["drive_force"] * found["stroke_speed"], rel=1e-13)
+    assert found["condition"] == abs(found["sin_mu"])
+    line = LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
+    motion = Motion(stroke=0.35, stroke_speed=0.1, side="left")
+    names = ["theta_2", "condition", "power", "drive_force", "sin_mu"]
+    scene = replace(moving, drive=line, motion=motion)
+    found = function(scene, ["lengths.output"], names)(0.22)
+    assert found["theta_2"] == fourbar.solve(scene).theta_2[0]
+    assert found["power"] == pytest.approx(found["drive_force"] * 0.1, rel=1e-13)
+    lever = 0.3 * 0.12 * abs(np.sin(found["theta_2"] + 0.4 - 2.2)) / 0.35  # of the cylinder about O2, at most 0.3 m
+    assert found["condition"] == pytest.approx(abs(found["sin_mu"]) * lever / 0.3, rel=1e-13)
+
+
 @pytest.mark.parametrize(("bar", "side", "length"), [(2, "left", 0.35), (4, "right", 0.5)])
 def test_a_stroke_commands(library: Library, bar: int, side: str, length: float) -> None:
     """The strokes before and after the one are none that this cylinder can have."""
