@@ -14,7 +14,7 @@ import numpy as np
 from fourbar.edit.document import Path, SceneDocument
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.quantities.units import FRACTION, NUMBER, to_si
+from fourbar.quantities.units import FEET, FRACTION, NUMBER, to_si
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 
@@ -163,8 +163,9 @@ def _write_like(old: object, value: float, grain: float, si: str, otherwise: str
 
 def find_unit(text: object, otherwise: str) -> str:
     """Return the unit that a text has; another one where it has none."""
-    found = FRACTION.match(str(text).strip()) or NUMBER.match(str(text).strip())
-    unit = str(text).strip()[found.end() :].strip() if found else ""
+    last = FEET.sub("", str(text).strip())  # the inches of 1'6"
+    found = FRACTION.match(last) or NUMBER.match(last)
+    unit = last[found.end() :].strip() if found else ""
     unit = re.sub('[″”"]', "in", re.sub("[′’']", "ft", unit))
     return unit or otherwise
 

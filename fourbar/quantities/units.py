@@ -33,6 +33,8 @@ RAISED = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
 DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 FRACTION = re.compile(r"(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″])")
 """1/2 or 12 1/2, as inches are written."""
+FEET = re.compile(r"([0-9]{1,6}) ?['′’][ -]?(?=[0-9.][^'′’]*[\"″”]$)")
+"""The feet of 1'6", 1' 6 1/2" or 1'-6.5"."""
 NUMBER = re.compile(r"[+-]?(?:[0-9]{1,100}(?:\.[0-9]{0,100})?|\.[0-9]{1,100})(?:[eE][+-]?[0-9]{1,3})?(?![0-9.])")
 UNIT = re.compile(r"(?:[A-Za-zµμ°_]+(?:_?0(?![0-9]))?(?:(?:\^|\*\*)-?[1-9](?![0-9])|[²³])?|[·*/()]|\s)+")
 """Names, each with at most one small exponent, and operators: nothing else reaches the parser, no tower of powers."""
@@ -50,6 +52,8 @@ def to_si(text: str, unit: str) -> float:
     dimension than `unit`, and where the number does not fit into a double.
     """
     text = text.strip()
+    feet = FEET.match(text)
+    text = text[feet.end() :] if feet else text
     found = FRACTION.match(text) or NUMBER.match(text)
     if found is None:
         raise UnitError("there is no finite number")
@@ -68,6 +72,7 @@ def to_si(text: str, unit: str) -> float:
         raise UnitError(f'"{name}" does not convert to {unit}{_suggest(found[0], name, unit)}')
     try:
         number = Fraction(found[0]) if found.re is NUMBER else int(found[1] or 0) + Fraction(f"{found[2]}/{found[3]}")
+        number += 12 * int(feet[1]) if feet else 0
         value = float(number * factor / wanted)
     except OverflowError:
         value = math.inf

@@ -221,7 +221,7 @@ def test_numbers_get_the_digits_of_a_pixel_and_keep_their_unit() -> None:
     assert write_rounded(123.456, 3.0, "mm") == "123 mm"
     assert write_rounded(1234.0, 300.0, "mm") == "1200 mm"
     assert (
-        find_unit("12 1/2 in", "m") == "in"
+        find_unit("12 1/2 in", "m") == find_unit("1'6 1/2\"", "m") == "in"
         and find_unit("3e-2 kg m^2", "") == "kg m^2"
         and find_unit(None, "deg") == "deg"
     )

@@ -11,7 +11,7 @@ import fourbar
 from fourbar.effects import SpringEnd, Table
 from fourbar.errors import InputError
 from fourbar.files import loads
-from fourbar.quantities.units import DEFINITIONS, to_si
+from fourbar.quantities.units import DEFINITIONS, UnitError, to_si
 
 ENDS = SpringEnd(1, 0.1, 0.0), SpringEnd(4, 0.2, np.pi)
 SAME: list[tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = [
@@ -127,6 +127,20 @@ def test_every_unit_is_its_fraction(name: str) -> None:
     unit, exact = UNITS[name]
     assert to_si(f"1 {name}", unit) == float(exact)
     assert to_si(f"0.7 {name}", unit) == float(exact * Fraction(7, 10))
+
+
+@pytest.mark.parametrize(
+    ("text", "inches"),
+    [("1'6\"", 18), ("1' 6 1/2\"", Fraction(37, 2)), ("1'-6.5\"", Fraction(37, 2)), ("0\u203212\u2033", 12)],
+)
+def test_feet_and_inches_are_one_length(text: str, inches: Fraction | int) -> None:
+    assert to_si(text, "m") == float(inches * FOOT / 12)
+
+
+@pytest.mark.parametrize("text", ["1'6", "1'6'", "6\"1'", "1'6 lb", "1'-\"", '1\'6""', "-1'6\""])
+def test_what_is_no_length_in_feet_and_inches_is_refused(text: str) -> None:
+    with pytest.raises(UnitError):
+        to_si(text, "m")
 
 
 @pytest.mark.parametrize("prefix", PREFIXES)
