@@ -10,8 +10,28 @@ from fourbar.cli.evaluate import analyze, classify, equilibrium, extremes, new, 
 from fourbar.cli.export import animate, mjcf, plot, sdf, usd
 from fourbar.errors import run
 
+SECTIONS = {
+    "Begin": (new, edit),
+    "Look": (classify, analyze, plot, animate),
+    "Export": (mjcf, sdf, usd),
+    "Study": (tolerance, extremes, equilibrium),
+}
+"""Commands by what they are for, in the order of the help."""
+
+
+class SectionedGroup(click.Group):
+    """A group whose help lists its commands in sections, each description whole."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the sections."""
+        for title, commands in SECTIONS.items():
+            with formatter.section(title):
+                rows = [(str(command.name), command.get_short_help_str(limit=200)) for command in commands]
+                formatter.write_dl([(f"{name:<11}", text) for name, text in rows])
+
 
 @click.group(
+    cls=SectionedGroup,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Begin with: fourbar new first.toml --lengths 300mm 100mm 250mm 220mm",
@@ -20,7 +40,7 @@ from fourbar.errors import run
 @click.option("--traceback", is_flag=True, help="Show where an internal error happened.")
 @click.pass_context
 def group(context: click.Context, traceback: bool) -> None:
-    """Evaluate closed formulas of the planar four-bar linkage: from a scene file to driving torque and pin forces.
+    """Evaluate closed formulas of the planar four-bar: from a scene file to torque and pin forces.
 
     The checks against MuJoCo and Pinocchio are fourbar-validation, with the extra "validation".
 
@@ -32,8 +52,9 @@ def group(context: click.Context, traceback: bool) -> None:
         click.echo(context.get_help())
 
 
-for command in (classify, new, analyze, tolerance, extremes, equilibrium, mjcf, sdf, usd, plot, animate, edit):
-    group.add_command(command)
+for commands in SECTIONS.values():
+    for command in commands:
+        group.add_command(command)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -2,25 +2,32 @@
 
 import shutil
 import sys
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import click
 
 from fourbar.cli import given
 from fourbar.errors import InputError, NotAssembledError
-from fourbar.solution import DEGREES, Conversion
+from fourbar.linkage import POSITIVE
+from fourbar.scene import Scene
+from fourbar.solution import DEGREES, Conversion, Solution
 
 
 @click.command()
 @click.argument("lengths", nargs=4, metavar="D A B C")
+@click.option("--all", "everything", is_flag=True, help="The limits of all bars; left out: those of the output.")
 @given.json_option
 @given.text_option(*given.TABLES)
-def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
-    """Name a linkage by its bar lengths (ground, input, coupler, output), and say what turns and how far.
+def classify(lengths: tuple[str, ...], everything: bool, as_json: bool, out: Path | None) -> None:
+    """Name a linkage by its four lengths, and say what turns and how far.
 
-    Four bare numbers are ratios; lengths like 30cm work too.
+    D A B C are ground, input, coupler and output: four bare numbers are ratios; lengths like 30cm work too.
     """
     from fourbar.linkage import Bar, FourBar
+    from fourbar.show.units import suit_units
     from fourbar.show.words import write_type, write_type_json
 
     ratios = [given.is_bare(text) for text in lengths]
@@ -28,8 +35,9 @@ def classify(lengths: tuple[str, ...], as_json: bool, out: Path | None) -> None:
         raise InputError("D A B C", " ".join(lengths), "must be four ratios, or four lengths each with its unit")
     d, a, b, c = given.read_lengths(lengths)
     linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
-    unit = "" if all(ratios) else " m"
-    given.print_to(write_type_json(linkage) if as_json else "\n".join([*write_type(linkage, unit), ""]), out)
+    units = None if all(ratios) else suit_units(lengths[0])
+    lines = write_type(linkage, units, everything=everything)
+    given.print_to(write_type_json(linkage) if as_json else "\n".join([*lines, ""]), out)
 
 
 @click.command()
@@ -61,68 +69,120 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
     click.echo(f"wrote {file}; edit it, then: fourbar analyze {shown}")
 
 
+class Form(NamedTuple):
+    """How `analyze` prints: as "summary", "table", "json" or "csv"."""
+
+    kind: str
+    decimal: str
+    """Decimal sign of CSV."""
+    every: int | None
+    """Show every so many positions of the table; None: as many as suit."""
+
+
+def _form_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options that choose between summary, table, JSON and CSV, of which there is one."""
+
+    @click.option("--table", is_flag=True, help="The positions one by one, in place of the summary.")
+    @click.option("--every", type=click.IntRange(min=1), metavar="N", help="Of the table: show every N-th position.")
+    @click.option("--all", "every", flag_value=1, help="Of the table: show every position, as in a file or a pipe.")
+    @click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
+    @click.option("--csv", "decimal", flag_value=".", help="One line per position, SI, every digit.")
+    @click.option("--csv-comma", "decimal", flag_value=",", help="With decimal commas, and semicolons between.")
+    @wraps(command)
+    def formed(table: bool, every: int | None, as_json: bool, decimal: str | None, **others: Any) -> None:
+        if as_json and decimal:
+            raise click.UsageError("--json and --csv are two forms of the output; give one of them")
+        table = table or every is not None
+        if table and (as_json or decimal):
+            raise click.UsageError("--table, --every and --all are of the table; --json and --csv hold every position")
+        out = others["out"]
+        kind = "json" if as_json else "csv" if decimal else "table" if table else "summary"
+        if kind == "summary" and given.ends_in(out, ".json"):
+            kind = "json"
+        if kind == "summary" and given.ends_in(out, ".csv"):
+            kind = "csv"
+        command(form=Form(kind, decimal or ".", every), **others)
+
+    return formed
+
+
 @click.command()
 @given.scene_argument
-@click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
-@click.option("--csv", "as_csv", flag_value=".", help="One line per position, SI, every digit.")
-@click.option("--csv-comma", "as_csv", flag_value=",", help="The same with decimal commas, and semicolons between.")
-@click.option("--degrees/--radians", default=None, help="Angles theta; left out: degrees in the table, else radians.")
-@given.units_option
+@_form_options
+@click.option("--degrees/--radians", default=None, help="Angles theta; left out: deg, in JSON and CSV rad.")
+@given.own_units_option
+@click.option("--pressure", metavar="P", help='Of a cylinder, like "210 bar": the bore that it takes is added.')
 @click.option("--sensitivity", is_flag=True, help="What the quantities depend on: d(quantity)/d(number).")
-@click.option("--every", type=click.IntRange(min=1), metavar="N", help="Show every N-th position in the table.")
-@click.option("--all", "every", flag_value=1, help="Show every position; a terminal gets some forty at most.")
 @given.text_option(*given.TABLES, ".csv")
 def analyze(
     scene: Path,
-    as_json: bool,
-    as_csv: str | None,
+    form: Form,
     degrees: bool | None,
-    units: Conversion,
+    units: Conversion | None,
+    pressure: str | None,
     sensitivity: bool,
-    every: int | None,
     out: Path | None,
 ) -> None:
-    """Solve a scene: angles, speeds, accelerations, driving torque and pin forces.
+    """Solve a scene: ranges, driving torque, pin forces, what a motor or a cylinder must deliver.
 
     A FILE that ends in .csv or .json asks for that form.
     """
-    if not as_json and not as_csv:
-        as_json, as_csv = given.ends_in(out, ".json"), "." if given.ends_in(out, ".csv") else None
     if sensitivity:
-        if as_csv or degrees or every is not None or units:
+        if form.kind in ("csv", "table") or degrees or units:
             raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")
-        _write_sensitivity(scene, as_json, out)
+        _write_sensitivity(scene, form.kind == "json", out)
         return
-    from fourbar.show.between import locate_between
-    from fourbar.show.duty import write_motor
-    from fourbar.show.tables import print_tables
-    from fourbar.solution import write_csv, write_json
+    from fourbar.show.units import units_of_file
     from fourbar.solve import find_last_stage, solve
 
-    if as_json and as_csv:
-        raise click.UsageError("--json and --csv are two forms of the output; give one of them")
-    if every is not None and (as_json or as_csv):
-        raise click.UsageError("--every and --all are of the table; --json and --csv hold every position")
-    shown = dict(units)
-    if degrees or (degrees is None and "rad" not in shown and not (as_json or as_csv)):
-        shown |= DEGREES
-    elif degrees is False:
-        shown.pop("rad", None)
     with given.open_scene(scene) as described, given.show_waiting(described):
+        bore = _read_pressure(described, pressure)
+        shown = dict(units or {})
+        if form.kind == "table" or (form.kind == "summary" and units is not None):
+            shown = {**DEGREES, **shown}
+        elif form.kind == "summary":
+            shown = dict(units_of_file(scene))
+        if degrees:
+            shown |= DEGREES
+        elif degrees is False:
+            shown.pop("rad", None)
         solution = solve(described, find_last_stage(described))
     if not solution.assembled.any():
         raise NotAssembledError(
             f"{scene}: motion.{described.motion.names[0]}: the linkage assembles at none of the positions requested"
         )
-    if as_json:
-        located = locate_between(described, solution).solution
-        text = write_json(solution, shown, motor=write_motor(solution, shown, located))
-    elif as_csv:
-        text = write_csv(solution, shown, as_csv)
-    else:
+    given.print_to(_write_solution(described, solution, form, shown, bore, out), out)
+
+
+def _write_solution(
+    scene: Scene, solution: Solution, form: Form, units: Conversion, pressure: float | None, out: Path | None
+) -> str:
+    from fourbar.show.between import locate_between
+    from fourbar.show.block import write_block
+    from fourbar.show.duty import write_motor
+    from fourbar.show.tables import print_positions
+    from fourbar.solution import write_csv, write_json
+
+    if form.kind == "json":
+        located = locate_between(scene, solution).solution
+        return write_json(solution, units, motor=write_motor(solution, units, located))
+    if form.kind == "csv":
+        return write_csv(solution, units, form.decimal)
+    if form.kind == "table":
         width = None if out or not sys.stdout.isatty() else shutil.get_terminal_size().columns
-        text = print_tables(described, solution, width, shown, every=every)
-    given.print_to(text, out)
+        return print_positions(solution, width, units, every=form.every)
+    return "\n".join([*write_block(scene, solution, units, pressure=pressure), ""])
+
+
+def _read_pressure(scene: Scene, pressure: str | None) -> float | None:
+    """Read the pressure of a cylinder, Pa; InputError where no cylinder drives."""
+    if pressure is None:
+        return None
+    if scene.drive is None:
+        raise InputError("--pressure", pressure, "is of a cylinder: the scene's [drive] has no from and to")
+    if given.is_bare(pressure):
+        raise InputError("--pressure", pressure, f'the unit is missing; did you mean "{pressure} bar"?')
+    return given.read_number("--pressure", pressure, "Pa", POSITIVE)
 
 
 def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:

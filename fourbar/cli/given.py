@@ -19,10 +19,10 @@ FILE = click.Path(path_type=Path)
 KEYS_OF_A_SCENE = ("motion", "lengths", "bars", "drive", "loads", "effects", "tolerances")
 
 
-def _read_units(context: click.Context, parameter: click.Parameter, text: str) -> Conversion:
+def _read_units(context: click.Context, parameter: click.Parameter, text: str | None) -> Conversion | None:
     from fourbar.show.units import units
 
-    return units(text)
+    return None if text is None else units(text)
 
 
 scene_argument = click.argument("scene", type=FILE)
@@ -34,6 +34,12 @@ units_option = click.option(
     callback=_read_units,
     metavar="UNITS",
     help='"imperial", or a list like "mm N.mm deg"; left out: SI.',
+)
+own_units_option = click.option(
+    "--units",
+    callback=_read_units,
+    metavar="UNITS",
+    help='"SI", "imperial", or a list like "mm N.mm deg"; left out: those of the file.',
 )
 
 

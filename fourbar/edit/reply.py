@@ -13,10 +13,11 @@ import numpy as np
 from fourbar.edit.dragging import list_handles
 from fourbar.errors import NotAssembledError
 from fourbar.scene import Scene
+from fourbar.show.block import write_block
 from fourbar.show.page_data import collect_live_data
-from fourbar.show.tables import write_heading
+from fourbar.show.units import COMMON
 from fourbar.show.words import write_type
-from fourbar.solution import DEGREES, Conversion, Solution
+from fourbar.solution import Conversion, Solution
 from fourbar.solve import find_last_stage, solve
 
 
@@ -37,9 +38,8 @@ def evaluate_scene(scene: Scene, plain: dict[str, Any], units: Conversion, *, se
 
 
 def write_summary(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
-    """Write what `analyze` says above its table and `classify` of the linkage."""
-    shown = units if "rad" in units else {**units, **DEGREES}
-    return [*write_heading(scene, solution, shown), *write_type(scene.linkage)]
+    """Write what `analyze` and `classify` print."""
+    return [*write_block(scene, solution, {**COMMON, **units}), "", *write_type(scene.linkage, everything=True)]
 
 
 def pack_frame(about: dict[str, Any]) -> bytes:

@@ -17,9 +17,9 @@ from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.show.acting import Symbol, list_acting
 from fourbar.show.duty import compute_energies
-from fourbar.show.plot.style import choose_unit
 from fourbar.show.plot.view import is_over_time, list_sweep, set_branch
 from fourbar.show.tolerances import collect_tolerances
+from fourbar.show.units import choose_unit
 from fourbar.solution import SI, Array, Conversion, Solution
 from fourbar.solve import solve
 from fourbar.writing import null_nan

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.show.tables import write_heading
+from fourbar.show.block import write_block
 from fourbar_lab.families import FAMILIES
 from fourbar_lab.families import random as draw_random
 from fourbar_lab.slopes import judge_slopes
@@ -211,11 +211,11 @@ def test_the_command_line_says_how_few_digits_are_left() -> None:
     dead = float(np.arccos((0.3**2 + 0.35**2 - 0.22**2) / (2 * 0.3 * 0.35)))  # bars 2, 3 in line
     for angle, warned in ((dead + 1e-11, True), (dead + 0.5, False)):
         scene = fourbar.Scene(linkage, fourbar.Motion(angle, 10.0), drive_bar=4)
-        lines = write_heading(scene, fourbar.solve(scene, "error"))
+        lines = write_block(scene, fourbar.solve(scene, "error"))
         assert any("digits left of T4" in line and "bars 2 and 3" in line for line in lines) is warned
     nothing = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22))
     scene = fourbar.Scene(nothing, fourbar.Motion(1.0, 5.0))
-    assert not any("digits" in line for line in write_heading(scene, fourbar.solve(scene, "error")))
+    assert not any("digits left" in line for line in write_block(scene, fourbar.solve(scene, "error")))
 
 
 def test_error_bars_grow_towards_a_dead_centre() -> None:

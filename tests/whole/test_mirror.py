@@ -44,6 +44,7 @@ JUDGED_BY = {
     "fourbar/mjcf/test_simulators.py": "fourbar/mjcf: assembly sdf usd",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_notebook.py": "fourbar/files: new",
+    "fourbar/show/test_block.py": "fourbar/show: summary",
     "fourbar/show/test_page.py": "fourbar/show: page_data tolerances",
     "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody hodograph labels linkage mechanism "
     "studies style symbols transmission view",

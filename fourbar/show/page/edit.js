@@ -113,7 +113,7 @@ function show(about, own) {
   byId("computing").hidden = "summary" in about.data;
   if (about.data.summary) byId("summary").replaceChildren(...about.data.summary.map(line => {
     const shown = document.createElement("div");
-    shown.textContent = line;
+    shown.textContent = line || "\u00a0";
     if (line.includes("  ")) shown.className = "columns";
     return shown;
   }));

@@ -23,7 +23,6 @@ from fourbar.show.plot.style import (
     INK,
     MUTED,
     choose_force_line,
-    choose_unit,
     find_greatest,
     place_legend,
     set_degree_ticks,
@@ -31,6 +30,7 @@ from fourbar.show.plot.style import (
     write_quantity,
 )
 from fourbar.show.plot.view import View, collect_point_vectors
+from fourbar.show.units import choose_unit
 from fourbar.solution import Array, Solution
 
 if TYPE_CHECKING:

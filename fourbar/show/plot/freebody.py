@@ -24,12 +24,12 @@ from fourbar.show.plot.style import (
     INK,
     MUTED,
     OPEN,
-    choose_unit,
     write_force_name,
     write_quantity,
 )
 from fourbar.show.plot.symbols import place_of, split_components
 from fourbar.show.plot.view import View, where_in_words
+from fourbar.show.units import choose_unit
 from fourbar.solution import Conversion
 
 if TYPE_CHECKING:

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fourbar.show.plot.curves import break_at_poles, choose_limit, find_poles, list_force_sizes, note
-from fourbar.show.plot.style import MUTED, OPEN, choose_force_line, choose_unit, find_greatest, write_number
+from fourbar.show.plot.style import MUTED, OPEN, choose_force_line, find_greatest, write_number
 from fourbar.show.plot.view import View
+from fourbar.show.units import choose_unit
 from fourbar.solution import Array
 
 if TYPE_CHECKING:

@@ -17,7 +17,6 @@ from fourbar.show.plot.style import (
     INK,
     TITLE,
     apply_style,
-    choose_unit,
     find_greatest,
     format_of,
     save,
@@ -26,6 +25,7 @@ from fourbar.show.plot.style import (
 )
 from fourbar.show.plot.view import View, axis_of
 from fourbar.show.tolerances import describe_parted, find_part_unit, list_shown_parts
+from fourbar.show.units import choose_unit
 from fourbar.solution import SI, Conversion, find_unit
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.spread import BAND, Tolerances

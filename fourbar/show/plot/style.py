@@ -12,7 +12,8 @@ import numpy as np
 
 from fourbar.errors import DependencyError, InputError, clean_line, expect, say_install
 from fourbar.quantities import PIN_FORCES
-from fourbar.solution import SI, Array, Conversion, find_unit_in
+from fourbar.show.units import choose_unit
+from fourbar.solution import SI, Array, Conversion
 from fourbar.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -106,22 +107,6 @@ def shorten_text(text: str, width: int) -> str:
     """Shorten a stranger's text to one line of at most `width` characters."""
     line = clean_line(text)
     return line if len(line) <= width else line[: width - 1].rstrip() + "…"
-
-
-PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-
-
-def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[float, str]:
-    """Choose the factor from SI and the unit given, or the prefix that suits the largest magnitude; a rate has none."""
-    if unit in units or "/" in unit:
-        name, factor = find_unit_in(unit, units)
-        return factor, name.replace("^2", "²")
-    if not math.isfinite(largest) or largest <= 0.0:
-        return 1.0, unit
-    for size, prefix in PREFIXES:
-        if largest >= size:
-            return 1.0 / size, prefix + unit
-    return 1.0 / PREFIXES[-1][0], PREFIXES[-1][1] + unit
 
 
 def find_greatest(*values: Array) -> float:

@@ -11,7 +11,7 @@ from fourbar.evaluation.case import compute_state
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Command, Scene, command, command_at, default_places
-from fourbar.show.plot.style import choose_unit
+from fourbar.show.units import choose_unit
 from fourbar.solution import Array, Conversion, Solution
 from fourbar.solve import solve
 

@@ -184,7 +184,7 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench) -> None:
         for line in (one, other):
             about = await told(line, settled=True)
             assert '"4 in"' in about["text"] and "torque_error" in str(about["columns"]) and about["saved"] is False
-            assert "largest torque" in "".join(about["data"]["summary"])
+            assert "  torque   peak" in "".join(about["data"]["summary"])
         assert "refused" in await told(other, {"do": "set", "path": ["lengths", "input"], "value": "9 ft"})
 
     session = bench(ask)

@@ -31,9 +31,10 @@ from fourbar.show.plot.film import choose_frames
 from fourbar.show.plot.freebody import list_actions
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.mechanism import draw_mechanism
-from fourbar.show.plot.style import INK, choose_unit, shorten_text, write_number
+from fourbar.show.plot.style import INK, shorten_text, write_number
 from fourbar.show.plot.transmission import find_free_place
 from fourbar.show.plot.view import CLEAR, choose_common_position, make_view, set_branch
+from fourbar.show.units import choose_unit
 from tests.support.scenes import crank_rocker, thesis
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}

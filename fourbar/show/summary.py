@@ -1,0 +1,250 @@
+"""What one wants to know of a solved scene: ranges, peaks and where they are, what the drive needs, where it ends.
+
+`summarize` computes the facts; `fourbar.show.block` prints them.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fourbar.formulas.mobility import TURN, find_intervals
+from fourbar.linkage import PIN_FORCE
+from fourbar.quantities import OK, STATUS_NAMES
+from fourbar.scene import Scene, command_at
+from fourbar.scene.motion import Motion
+from fourbar.show.between import CUTS, Between, locate_between
+from fourbar.show.duty import Driving, MotorDuty, bearing_load, is_once_round, motor_duty, read_drive
+from fourbar.solution import Array, Solution
+from fourbar.solve import solve
+
+FINE = 7200
+"""Positions at which ranges are looked for, by the position formula alone."""
+INSET = 1e-9
+"""Part of a range that is left out at its limit positions, which may not assemble as doubles."""
+ROUNDS = 9
+"""Rounds of cutting the interval in which the assembly ends by 40: down to the last digits of a double."""
+IN_LINE = 1e-6
+"""rad. Transmission angle that is zero: at a limit, a place in its last digits leaves some 1e-8."""
+
+
+Stretch = tuple[float | None, float | None]
+"""Places from which and up to which a linkage assembles; None at an end of the motion."""
+
+
+class Peak(NamedTuple):
+    """Largest or smallest value of a quantity, and where it is taken."""
+
+    value: float
+    place: float
+    """What is commanded there, rad or m; of a motion over time the time, s."""
+
+
+class PinLoad(NamedTuple):
+    """Load of one pin over the positions, N."""
+
+    peak: Peak
+    rms: float
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """Facts of a solved scene, SI units and radians."""
+
+    scene: Scene
+    solution: Solution
+    kind: str
+    """"position", "list", "sweep", "turn" (whole turns of what is commanded), "law" or "released"."""
+    counts: dict[str, int]
+    """Number of positions of each status."""
+    commanded: tuple[float, float]
+    """First and last place."""
+    angles: dict[int, tuple[Peak, Peak]]
+    """Smallest and largest angle of bars 2, 3 and 4."""
+    transmission: Peak
+    """Smallest transmission angle."""
+    stretches: list[Stretch]
+    """Places from and up to which the linkage assembles, None at the ends of the motion; empty: everywhere."""
+    drive: Driving | None
+    """What drives; None of a released linkage, and where only positions are known."""
+    peak: Peak | None
+    """Largest torque or force of the drive, signed."""
+    duty: MotorDuty | None
+    held: tuple[float, float] | None
+    """Least and greatest torque or force while dry friction holds a pin that is at rest."""
+    pins: dict[str, PinLoad]
+    stroke: tuple[Peak, Peak] | None
+    """Smallest and largest stroke of the motion."""
+    strokes: tuple[float, float] | None
+    """Smallest and largest stroke that assembles on the branch, and with a stroke commanded on the side."""
+    between: Between
+    """What the steps pass over."""
+    error: float | None
+    """Largest error bar of the drive and of the pin forces, as a part of the value; None where none was computed."""
+
+    @property
+    def linear(self) -> bool:
+        """Whether a cylinder drives."""
+        return self.solution.drive is not None
+
+
+def summarize(scene: Scene, solution: Solution) -> Facts:
+    """Collect the facts of a scene solved up to the forces or the error bars; at least one position assembles."""
+    between, kind = locate_between(scene, solution), _find_kind(scene, solution)
+    places = _list_places(solution)
+    fine, stretches = solution, list[Stretch]()
+    if smooth := kind in ("sweep", "turn", "law"):
+        fine = _solve_positions(scene, np.linspace(places[0], places[-1], FINE + 1), solution)
+        stretches = _list_stretches(scene, fine)
+        ends = np.array([end for stretch in stretches for end in stretch if end is not None])
+        fine = _solve_positions(scene, np.sort(np.concatenate([fine.at.places, ends])), solution)
+
+    def find_range(values: Array) -> tuple[Peak, Peak]:
+        low, high = (_find_extreme(sign * values, _list_places(fine), sign, smooth) for sign in (-1, 1))
+        return low, high
+
+    least, _ = find_range(np.square(fine.sin_mu))
+    mu = math.asin(min(1.0, math.sqrt(max(least.value, 0.0))))
+    drive = None if kind == "released" or solution.F12 is None else read_drive(solution)
+    peak = None
+    if drive is not None and np.isfinite(drive.values).any():  # type: ignore[arg-type]
+        values = read_drive(between.solution).values
+        assert values is not None
+        worst = int(np.nanargmax(np.abs(values)))
+        peak = Peak(float(values[worst]), float(_list_places(between.solution)[worst]))
+    return Facts(
+        scene,
+        solution,
+        kind,
+        {STATUS_NAMES[code]: int(np.sum(solution.status_code == code)) for code in np.unique(solution.status_code)},
+        (float(places[0]), float(places[-1])),
+        {bar: find_range(getattr(fine, f"theta_{bar}")) for bar in (2, 3, 4)},
+        Peak(mu if mu > IN_LINE else 0.0, least.place),
+        stretches,
+        drive if peak is not None else None,
+        peak,
+        motor_duty(solution, between.solution) if peak is not None and kind != "position" else None,
+        None if drive is None else _find_held(solution, drive),
+        _list_pin_loads(solution, between),
+        None if fine.stroke is None else find_range(fine.stroke),
+        None if solution.stroke is None else _find_strokes(scene, solution),
+        between,
+        _find_error(solution, drive),
+    )
+
+
+def _find_kind(scene: Scene, solution: Solution) -> str:
+    motion = scene.motion
+    if motion.free is not None:
+        return "released"
+    if motion.law is not None:
+        return "law"
+    if len(solution) == 1:
+        return "position"
+    if isinstance(motion.angle, np.ndarray):
+        return "list"
+    whole = solution.at.stroke is None and is_once_round(solution) and solution.assembled.all()
+    return "turn" if whole else "sweep"
+
+
+def _list_places(solution: Solution) -> Array:
+    """List what is commanded at each position, of a motion over time the times."""
+    return solution.at.places if solution.time is None else solution.time
+
+
+def _solve_positions(scene: Scene, places: Array, like: Solution) -> Solution:
+    """Solve positions at other places, each on the branch of the nearest of a solution."""
+    own = like.at.places
+    order = np.argsort(own, kind="stable")
+    nearest = np.clip(np.searchsorted(own[order], places), 1, len(own) - 1)
+    nearest -= np.abs(places - own[order][nearest - 1]) < np.abs(places - own[order][nearest])
+    return solve(scene, "position", at=command_at(scene, places, like.at.branch[order][nearest]))
+
+
+def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak:
+    """Find the largest of signed values; of a smooth curve take the top of the parabola through it and neighbours."""
+    i = int(np.nanargmax(values))
+    value, place = float(values[i]), float(places[i])
+    beside, inside = slice(i - 1, i + 2), 0 < i < len(values) - 1
+    if smooth and inside and np.isfinite(values[beside]).all() and np.isclose(*np.diff(places[beside])):
+        rise, bend = values[i + 1] - values[i - 1], values[i + 1] - 2.0 * values[i] + values[i - 1]
+        if bend < 0.0:
+            value -= float(rise * rise / (8.0 * bend))
+            place -= float(0.5 * rise / bend * 0.5 * (places[i + 1] - places[i - 1]))
+    return Peak(sign * value, place)
+
+
+def _list_stretches(scene: Scene, fine: Solution) -> list[Stretch]:
+    """List where the linkage assembles within a sweep; the ends are cut down to by the position formula."""
+    closes, places = fine.assembled, fine.at.places
+    if closes.all():
+        return []
+    if places[0] > places[-1]:  # from the smallest place on
+        closes, places = closes[::-1], places[::-1]
+    ends: list[float | None] = [None] if closes[0] else []
+    for i in np.flatnonzero(closes[1:] != closes[:-1]):
+        low, high = places[i], places[i + 1]
+        for _ in range(ROUNDS):
+            cut = np.linspace(low, high, CUTS + 1)
+            first = int(np.argmax(_solve_positions(scene, cut, fine).assembled != closes[i]))
+            low, high = cut[max(first - 1, 0)], cut[first]
+        ends.append(float(low if closes[i] else high))
+    ends += [None] if closes[-1] else []
+    return list(zip(ends[::2], ends[1::2], strict=True))
+
+
+def _find_held(solution: Solution, drive: Driving) -> tuple[float, float] | None:
+    low, high = (getattr(solution, name) for name in (drive.keys.low, drive.keys.high))
+    if low is None or not (known := np.isfinite(low) & np.isfinite(high) & (low < high)).any():
+        return None
+    return float(low[known].min()), float(high[known].max())
+
+
+def _list_pin_loads(solution: Solution, between: Between) -> dict[str, PinLoad]:
+    if solution.F12 is None or not np.isfinite(solution.F12).any():
+        return {}
+    loads, places = dict[str, PinLoad](), _list_places(between.solution)
+    for pin, name in PIN_FORCE.items():
+        size = np.hypot(*getattr(between.solution, name).T)
+        worst = int(np.nanargmax(np.where(np.isfinite(size), size, np.nan)))
+        loads[pin] = PinLoad(Peak(float(size[worst]), float(places[worst])), bearing_load(solution, pin).rms)
+    return loads
+
+
+def _find_strokes(scene: Scene, solution: Solution) -> tuple[float, float]:
+    """Find the least and the greatest stroke over all that the commanded bar can reach on its branch."""
+    at, first = solution.at, int(np.argmax(solution.assembled))
+    here = float(at.angle[first])
+    intervals = find_intervals(scene.linkage, at.bar)
+    low, high = min(intervals, key=lambda ends: (here - ends[0]) % TURN - (ends[1] - ends[0]))
+    width = high - low
+    low = here - ((here - low) % TURN if width < TURN else 0.5 * TURN)
+    angles = np.linspace(low + INSET * width, low + (1.0 - INSET) * width, FINE + 1)
+    motion = Motion(**{f"theta_{at.bar}": angles}, branch=int(at.branch[first]))  # type: ignore[arg-type]
+    stroke = solve(replace(scene, motion=motion, tolerances=()), "position").stroke
+    assert stroke is not None
+    if at.stroke is not None:  # its side ends where the stroke turns back
+        place = int(np.argmin(np.abs(angles - here)))
+        steps = np.sign(np.diff(stroke))
+        way = steps[min(place, FINE - 1)]
+        turns = np.flatnonzero(steps != way)
+        start = turns[turns < place].max(initial=-1) + 1
+        stroke = stroke[start : turns[turns >= place].min(initial=FINE) + 1]
+    return float(np.nanmin(stroke)), float(np.nanmax(stroke))
+
+
+def _find_error(solution: Solution, drive: Driving | None) -> float | None:
+    """Find the largest error bar as a part of its value, or of the median where the value passes through zero."""
+    if solution.force_error is None:
+        return None
+    loads = np.max([np.hypot(*getattr(solution, name).T) for name in PIN_FORCE.values()], axis=0)
+    pairs = [(solution.force_error, loads)]
+    if drive is not None and drive.error is not None and drive.values is not None:
+        pairs.append((drive.error, np.abs(drive.values)))
+    shares = []
+    for error, size in pairs:
+        known = np.isfinite(error) & np.isfinite(size) & (solution.status_code == OK)
+        if known.any() and size[known].max() > 0.0:
+            shares.append(float((error[known] / np.maximum(size[known], np.median(size[known]))).max()))
+    return max(shares, default=None)
