@@ -110,7 +110,7 @@ class _Block:
         lines += self._write_stretches()
         acted_on = scene.loads or scene.effects or any(bar.mass > 0.0 for bar in scene.linkage.moving)
         if facts.solution.F12 is None and acted_on:
-            lines.append(f"positions only, since {scene.motion.names[1]} is left out; {static(scene)}")
+            lines += [f"positions only, since {scene.motion.names[1]} is left out:", f"    {static(scene)}"]
         return lines
 
     def _write_ranges(self) -> str:
