@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, say_install
+from fourbar.errors import DependencyError, InputError
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -95,7 +95,7 @@ def make_data_frame(columns: Mapping[str, Any]) -> "DataFrame":
     try:
         from pandas import DataFrame
     except ImportError:
-        raise DependencyError(f"to_pandas needs pandas: {say_install('pandas')}") from None
+        raise DependencyError("to_pandas needs pandas: pip install pandas") from None
     return DataFrame(columns)
 
 

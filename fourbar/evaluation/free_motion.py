@@ -272,7 +272,7 @@ class _Run:
             from scipy.integrate import DOP853
             from scipy.optimize import brentq
         except ModuleNotFoundError:
-            raise DependencyError(f"SciPy is needed for free motion: {say_install('dynamics')}") from None
+            raise DependencyError(f"SciPy is needed for free motion: {say_install('studies')}") from None
         rows: list[tuple[float, ...]] = []
         t, end, steps, stopped = 0.0, float(times[-1]), 0, None
         worst, largest = 0.0, self.start_energy

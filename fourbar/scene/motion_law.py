@@ -99,7 +99,7 @@ class Law:
         try:
             from scipy.interpolate import CubicSpline
         except ModuleNotFoundError:
-            raise DependencyError(f"SciPy is needed for a motion law: {say_install('dynamics')}") from None
+            raise DependencyError(f"SciPy is needed for a motion law: {say_install('studies')}") from None
         time = require_numbers("time", time)
         t, angle = np.array(self.time), np.array(self.angle)
         mean = 0.0

@@ -291,7 +291,7 @@ def compute_energies(scene: Scene, motion: Solution) -> Energies:
     try:
         from scipy.interpolate import CubicSpline
     except ModuleNotFoundError:
-        raise DependencyError(f"SciPy is needed for free motion: {say_install('dynamics')}") from None
+        raise DependencyError(f"SciPy is needed for free motion: {say_install('studies')}") from None
     assert motion.time is not None and motion.omega_2 is not None
     state = compute_state(scene, Command(motion.theta_2, motion.branch, motion.omega_2, 0.0))
     groups = {"loads": scene.loads, **{effect.key: (effect,) for effect in scene.effects}}

@@ -107,7 +107,7 @@ def extremes(scene: Scene, quantities: Sequence[str] = ()) -> Extremes:
     try:
         import flint
     except ImportError:
-        raise DependencyError(f"Guaranteed extremes need python-flint: {say_install('exact')}") from None
+        raise DependencyError(f"Guaranteed extremes need python-flint: {say_install('studies')}") from None
     expect("scene", scene, Scene)
     expect("quantities", quantities, list, tuple)
     for name in quantities:

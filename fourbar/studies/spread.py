@@ -183,7 +183,7 @@ def _make_members(scene: Scene, samples: int, seed: int) -> Study:
     try:
         from scipy.stats import norm, qmc
     except ImportError:
-        raise DependencyError(f"SciPy is needed for tolerances: {say_install('dynamics')}") from None
+        raise DependencyError(f"SciPy is needed for tolerances: {say_install('studies')}") from None
     known, numbers = list_entries(scene), dict[str, Any]()
     drawn = qmc.Sobol(len(scene.tolerances), seed=seed).random_base2(max(1, (samples - 1).bit_length()))[:samples]
     for tolerance, column in zip(scene.tolerances, drawn.T, strict=True):

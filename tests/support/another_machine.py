@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
-from threadpoolctl import threadpool_info
+
+from fourbar_validation.report.machine import find_blas
 
 ROOT = Path(__file__).parents[2]
 BEFORE = "MACHINE_BEFORE"
@@ -40,9 +41,7 @@ CORES = {
 
 def here() -> str:
     """What this process calculates with: the BLAS kernel of NumPy and the vectorised functions of NumPy."""
-    blas = next((lib for lib in threadpool_info() if lib["user_api"] == "blas"), {})  # NumPy's is loaded first
-    kernel = f"{blas.get('internal_api', 'unknown BLAS')} {blas.get('architecture', '')}"
-    return " ".join([kernel, *(name for name in __cpu_dispatch__ if __cpu_features__[name])])
+    return " ".join([find_blas() or "unknown BLAS", *(name for name in __cpu_dispatch__ if __cpu_features__[name])])
 
 
 def environment(core: str) -> dict[str, str]:

@@ -77,7 +77,7 @@ def without(library: str, folder: Path, *arguments: str, **settings: str) -> sub
 @pytest.mark.parametrize("library", WITNESSES)
 def test_the_others_run_and_the_missing_named_with_the_reason(library: str, tmp_path: Path) -> None:
     done = without(library, tmp_path)
-    reason = f'{library} is not installed: pip install ".[{library}]" in the checkout'
+    reason = f'{library} is not installed: pip install ".[validation]" in the checkout'
     with (tmp_path / "out" / "results.csv").open() as table:
         rows = list(csv.DictReader(table))
     assert {row["engine"] for row in rows} == {"formulas", *(ALL - WITNESSES[library])}
@@ -93,7 +93,7 @@ def test_the_others_run_and_the_missing_named_with_the_reason(library: str, tmp_
 
 def test_requested_by_name_nothing_is_run(tmp_path: Path) -> None:
     done = without("mujoco", tmp_path, "--engines", "free-body,mujoco-inverse")
-    reason = 'mujoco is not installed: pip install ".[mujoco]" in the checkout'
+    reason = 'mujoco is not installed: pip install ".[validation]" in the checkout'
     assert done.stderr.strip() == f"error: mujoco-inverse: {reason}"
     assert done.returncode == 3
     assert not (tmp_path / "out").exists()

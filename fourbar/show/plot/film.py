@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.errors import DependencyError, InputError, say_install
+from fourbar.errors import DependencyError, InputError
 from fourbar.scene import Scene
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Labels
@@ -45,7 +45,7 @@ def _find_ffmpeg() -> str:
 
         return str(get_ffmpeg_exe())
     except (ImportError, RuntimeError):
-        wanted = f"the program ffmpeg (or {say_install('film')})"
+        wanted = "the program ffmpeg (or pip install imageio-ffmpeg)"
         raise DependencyError(f"an .mp4 film needs {wanted}; .gif and .html do not") from None
 
 

@@ -54,7 +54,7 @@ class Witness:
     stated: bool = True
     """Whether an exact engine is held to what the formulas state of the linkage too, whatever its motion."""
     library: str = ""
-    """The module that its adapter imports, a key of `EXTRA`; nothing: it needs no more than the formulas."""
+    """The module that its adapter imports, nothing: it needs no more than the formulas."""
 
     def fingerprint(self) -> str:
         """Name everything that its answers and verdicts depend on, alike in every process."""
@@ -69,8 +69,10 @@ class Witness:
         return find_missing(self.library) if self.library else None
 
 
-EXTRA = {name: name for name in ("mujoco", "pinocchio", "exudyn", "opensim")} | {"pydrake": "drake", "flint": "exact"}
-"""Module of an engine: the extra that brings it."""
+EXTRA = {"mujoco": "validation", "pinocchio": "validation", "flint": "studies"}
+"""Module of an engine: the extra that brings it; others are installed by the name of their package."""
+PACKAGE_OF = {"pydrake": "drake"}
+"""Module of an engine: its package, where that has another name."""
 
 
 def find_missing(library: str) -> str | None:
@@ -79,7 +81,8 @@ def find_missing(library: str) -> str | None:
         import_module(library)
     except ModuleNotFoundError as error:
         if error.name == library:
-            return f"{library} is not installed: {say_install(EXTRA[library])}"
+            package = f"pip install {PACKAGE_OF.get(library, library)}"
+            return f"{library} is not installed: {say_install(EXTRA[library]) if library in EXTRA else package}"
         return _find_broken(library, error)
     except (Exception, SystemExit) as error:  # whatever a library raises that was built for another machine
         return _find_broken(library, error)

@@ -1,5 +1,6 @@
 """Where a run was made, and with what: versions, machine, this code, and the build of each engine."""
 
+import ctypes
 import hashlib
 import os
 import platform
@@ -59,13 +60,22 @@ def find_kernels() -> dict[str, str]:
     config: dict[str, Any] = np.show_config(mode="dicts")  # type: ignore[assignment]
     simd = config["SIMD Extensions"]
     found = {"cpu_features": " ".join((*simd.get("baseline", ()), *simd.get("found", ())))}
-    try:
-        from threadpoolctl import threadpool_info
-    except ModuleNotFoundError:
-        return found
-    blas = (library for library in threadpool_info() if library["user_api"] == "blas")
-    known = {f"{library['internal_api']} {library.get('architecture') or library['version']}" for library in blas}
-    return found | {"blas_kernel": ", ".join(sorted(known))}
+    kernel = find_blas()
+    return found | ({"blas_kernel": kernel} if kernel else {})
+
+
+def find_blas() -> str:
+    """Kernel that NumPy's OpenBLAS took for this processor, such as "openblas SkylakeX"; nothing for another BLAS."""
+    import numpy as np
+
+    folder = Path(np.__file__).parents[1] / "numpy.libs"  # Windows looks for no symbol in what a library loads
+    for file in (*folder.glob("*openblas*.dll"), Path(np._core._multiarray_umath.__file__)):  # type: ignore[attr-defined]
+        library = ctypes.CDLL(str(file))
+        for name in (f"{prefix}openblas_get_corename{ending}" for prefix in ("scipy_", "") for ending in ("64_", "")):
+            if (get_name := getattr(library, name, None)) is not None:
+                get_name.restype = ctypes.c_char_p
+                return f"openblas {get_name().decode()}"
+    return ""
 
 
 @cache
