@@ -6,7 +6,7 @@ Expected: a flag that changes no result, of a collision stage that is itself swi
 Found: NotImplementedError from put_model.
 Since: 3.5.0 or before
 Until: still in 4.0.0
-Reported: not reported yet
+Reported: stated as unsupported in the project's documentation; a limit, no fault
 """
 
 import sys

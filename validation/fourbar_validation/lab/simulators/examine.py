@@ -22,7 +22,7 @@ SIMULATORS = {
     "mujoco_c": ("MuJoCo", "mujoco"),
     "pinocchio_simulated": ("Pinocchio", "pinocchio"),
     "mujoco_warp": ("MuJoCo Warp", "mujoco_warp"),
-    "mujoco_mjx": ("MJX", "mujoco.mjx"),
+    "mujoco_mjx": ("MJX-JAX", "mujoco.mjx"),
     "newton_mujoco": ("Newton, MuJoCo solver", "newton"),
     "newton_kamino": ("Newton, Kamino", "newton"),
     "genesis_rigid": ("Genesis", "genesis"),
@@ -31,6 +31,12 @@ SIMULATORS = {
     "exudyn_simulated": ("Exudyn", "exudyn"),
 }
 """By module: name, and what must be importable."""
+NOT_EXAMINED = {
+    "Drake, CENIC": "its convex integrator with error control is not read here",
+    "Newton, other solvers": "Featherstone, XPBD, VBD and the rest are not read here",
+    "DART": "dartpy 6.20 gives the joints' wrenches and no force of the closing constraint; not read here",
+}
+"""What could be examined and is not."""
 TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
 
 
@@ -112,6 +118,7 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Ex
         found.changed[name], found.devices[name] = changed, ran_on
         found.made_for[name] = str(answer.get("made_for", ""))
         found.left_out |= not_run
+    found.left_out |= NOT_EXAMINED
     return found
 
 

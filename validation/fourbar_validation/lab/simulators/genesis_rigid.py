@@ -22,7 +22,10 @@ from fourbar_validation.lab.simulators.mujoco_c import text
 VERSION = version("genesis-world")
 DEVICE = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"
 STEPS = (314, 628)
-CHANGED = "precision 64; timestep, gravity and the keyframe's speeds given by hand"
+CHANGED = (
+    "precision 64; timestep, gravity and the keyframe's speeds given by hand; its default armature of 0.1 kg m^2 is "
+    "deliberate, and documented"
+)
 SETTINGS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "enable_mujoco_compatibility": ({}, {"enable_mujoco_compatibility": True}),
     "default_armature=None": ({"default_armature": None}, {}),

@@ -13,7 +13,7 @@ from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 from fourbar_validation.lab.simulators import gradients
 from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through
-from fourbar_validation.lab.simulators.mujoco_c import reading, states_of, text
+from fourbar_validation.lab.simulators.mujoco_c import find_bars, reading, states_of, text
 
 VERSION = version("mujoco-mjx")
 DEVICE = "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
@@ -24,7 +24,12 @@ SETTINGS = {"written for MJX": "mjx", "as for MuJoCo": "mujoco"}
 APART = {"as for MuJoCo": "a closure of ten timesteps, not meant for MJX"}
 """The one written for MJX yields within two timesteps and so makes up for the term that MJX leaves out."""
 jax.config.update("jax_enable_x64", True)
-forward = jax.jit(mjx.forward)
+
+
+@jax.jit  # type: ignore[untyped-decorator]
+def forward(model: Any, state: Any) -> Any:
+    """Evaluate a state, and what every body bears."""
+    return mjx.rne_postconstraint(model, mjx.forward(model, state))
 
 
 @jax.jit  # type: ignore[untyped-decorator]
@@ -60,8 +65,9 @@ def states(scene: Scene, setting: str) -> Readings:
 
 def _evaluated(model: Any, state: Any) -> Instant:
     q, v, a, drive = (np.array(x) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
-    closing = np.array(getattr(state, "_impl", state).efc_force)[:2]
-    return reading(model, q, v, a, drive[model.actuator("drive").id], closing)
+    inner = getattr(state, "_impl", state)
+    closing, on_bodies = np.array(inner.efc_force)[:2], np.array(inner.cfrc_int)
+    return reading(model, q, v, a, drive[model.actuator("drive").id], closing, on_bodies[find_bars(model)])
 
 
 def slopes(scene: Scene) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 from fourbar_validation.lab.simulators import gradients
 from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through
-from fourbar_validation.lab.simulators.mujoco_c import reading, states_of, text
+from fourbar_validation.lab.simulators.mujoco_c import find_bars, reading, states_of, text
 
 VERSION = mjw.__version__ if hasattr(mjw, "__version__") else ""
 DEVICE = str(warp.get_preferred_device().name)
@@ -63,9 +63,11 @@ def states(scene: Scene, setting: str) -> Readings:
 def _evaluated(model: Any, theirs: Any, state: Any, times: int) -> Instant:
     for _ in range(times):
         mjw.forward(theirs, state)
-    q, v, a, drive = (x.numpy()[-1].astype(float) for x in (state.qpos, state.qvel, state.qacc, state.actuator_force))
+    mjw.rne_postconstraint(theirs, state)
+    arrays = (state.qpos, state.qvel, state.qacc, state.actuator_force, state.cfrc_int)
+    q, v, a, drive, on_bodies = (x.numpy()[-1].astype(float) for x in arrays)
     closing = state.efc.force.numpy()[-1, :2].astype(float)
-    return reading(model, q, v, a, drive[model.actuator("drive").id], closing)
+    return reading(model, q, v, a, drive[model.actuator("drive").id], closing, on_bodies[find_bars(model)])
 
 
 def slopes(scene: Scene) -> list[dict[str, Any]]:

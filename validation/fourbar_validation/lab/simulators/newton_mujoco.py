@@ -52,7 +52,10 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
         data = solver.mjw_data
         for _again in range(2):
             mjw.forward(solver.mjw_model, data)
-        q, v, a, drive = (x.numpy()[0].astype(float) for x in (data.qpos, data.qvel, data.qacc, data.actuator_force))
-        return reading(solver.mj_model, q, v, a, drive[0], data.efc.force.numpy()[0, :2].astype(float))
+        mjw.rne_postconstraint(solver.mjw_model, data)
+        arrays = (data.qpos, data.qvel, data.qacc, data.actuator_force, data.cfrc_int)
+        q, v, a, drive, on_bodies = (x.numpy()[0].astype(float) for x in arrays)
+        closing = data.efc.force.numpy()[0, :2].astype(float)
+        return reading(solver.mj_model, q, v, a, drive[0], closing, on_bodies[2:5])
 
     return run_through(scene, steps, setting, advance, read)

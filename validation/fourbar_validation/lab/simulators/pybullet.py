@@ -7,7 +7,7 @@ import pybullet as bullet
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN
 from fourbar.scene import Scene
-from fourbar_validation.engines.description import list_parts
+from fourbar_validation.engines.description import list_parts, rotate
 from fourbar_validation.lab.simulators.motion import (
     Instant,
     Readings,
@@ -58,6 +58,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
             bullet.changeDynamics(body, joint, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0)
             bullet.resetJointState(body, joint, angle, speed)
             bullet.setJointMotorControl2(body, joint, bullet.VELOCITY_CONTROL, force=0.0)
+            bullet.enableJointForceTorqueSensor(body, joint, True)
         bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
         drive = {"targetVelocity": begin.qvel[0], "force": STRONG}
         bullet.setJointMotorControl2(body, 0, bullet.VELOCITY_CONTROL, **drive)
@@ -78,7 +79,10 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
             after, q, speed = bullet.getJointState(body, 0), [state[0] for state in before], before[0][1]
             force = [-part for part in bullet.getConstraintState(ball)[:2]]  # it speaks of the force on the child
             theta = (q[0], q[0] + q[1], q[2])
-            return Instant(theta, speed, (after[1] - speed) / timestep, after[3], {"F43": force})
+            wrenches = [bullet.getJointState(body, joint)[2] for joint in range(3)]  # of the parent, in the link's axes
+            F12, F23, F14 = (rotate(angle, *wrench[:2]) for angle, wrench in zip(theta, wrenches, strict=True))
+            pins = {"F12": F12, "F32": (-F23[0], -F23[1]), "F43": force, "F14": F14}
+            return Instant(theta, speed, (after[1] - speed) / timestep, after[3], pins)
 
         return run_through(scene, steps, setting, advance, read)
     finally:

@@ -26,7 +26,8 @@ PERCENT = 9.5e-4
 EXPLAINED = (
     "Torque and pin forces: the largest error, divided by the largest value in a turn. The simulator is compared with "
     "the formulas at the angle, speed and acceleration that it had itself. 'states': single states; 'N steps': a turn "
-    "at constant speed, without its first quarter. Empty: the simulator does not report it. Gap at B: the largest "
+    "at constant speed, without its first quarter. Empty: not read here (of Genesis no pin force but the closing one "
+    "was found). Gap at B: the largest "
     "distance between the ends of bars 3 and 4, divided by the longest bar. Order: the power of the timestep with "
     "which the torque's error fell from the line above to this one. CPU time is without reading results and without "
     "compilation. This is no ranking: double and single precision, compiled and interpreted loops stand side by side."
