@@ -151,6 +151,8 @@ class Bar:
     def to_centre(self) -> complex:
         """From the first pin to G in the bar's frame: along + i across, m."""
         r, phi = self.mass_centre
+        if not isinstance(r, float):  # a longer number
+            return r * np.cos(phi) + 1j * (r * np.sin(phi))
         return complex(r * math.cos(phi), r * math.sin(phi)) if phi else complex(r, 0.0)
 
 

@@ -1,6 +1,6 @@
 """What loads and effects do to the bars: forces and moments, and the generalised force that they make."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
@@ -24,11 +24,6 @@ def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
     return own[0], own[1], own[2]
 
 
-def keep_number(number: Number, *, turned: bool = False) -> Number:
-    """Return the number itself."""
-    return number
-
-
 class Actions:
     """Sums over everything that acts on bars 2, 3, 4 apart from pins and inertia.
 
@@ -38,14 +33,10 @@ class Actions:
     bodies : of bars 2, 3, 4.
     side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither; between
         them the part of its torque that dry friction holds them with.
-    rounded : what a number becomes when it is rounded otherwise, for the error bars: of terms, and of what cancels in
-        them, as a distance against a spring's length.
     """
 
-    def __init__(
-        self, state: State, bodies: Bodies, side: Number = 0, rounded: Callable[..., Number] = keep_number
-    ) -> None:
-        self.state, self.bodies, self.side, self.rounded = state, bodies, side, rounded
+    def __init__(self, state: State, bodies: Bodies, side: Number = 0) -> None:
+        self.state, self.bodies, self.side = state, bodies, side
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
         self.moments: dict[int, Any] = {}
@@ -61,19 +52,16 @@ class Actions:
         `arm`: from the bar's first pin to where it acts, complex, m, world axes.
         """
         if bar != 1:
-            force = self.rounded(force, turned=True)
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
             self.moment(bar, cross(-force, arm))
 
     def moment(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar, N m; on the ground it does nothing."""
         if bar != 1:
-            moment = self.rounded(moment)
             self.moments[bar] = self.moments[bar] + moment if bar in self.moments else moment
 
     def couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
-        couple = self.rounded(couple)
         self.couples[pin] = self.couples[pin] + couple if pin in self.couples else couple
 
     def pull(self, start: Any, end: Any, force: Number) -> None:
@@ -86,8 +74,8 @@ class Actions:
         if pin is None:
             self.pull_ends(start, end, force)
             return
-        on_second = self.rounded(force if start.bar > end.bar else -force, turned=True)
-        (one, square), (other, other_square) = (p.from_pin(pin, self.state, self.rounded) for p in (start, end))
+        on_second = force if start.bar > end.bar else -force
+        (one, square), (other, other_square) = (point.from_pin(pin, self.state) for point in (start, end))
         by_one, by_other = one * self.state.direction(start.bar), other * self.state.direction(end.bar)
         arm = select(square < other_square, by_one, by_other)
         self.through[pin] = self.through[pin] + on_second if pin in self.through else on_second
@@ -100,11 +88,11 @@ class Actions:
 
     def plus(self, unit: "Actions", size: Number) -> "Actions":
         """Make the sum of these and of what a drive of a size does that does `unit` per newton."""
-        whole = Actions(self.state, self.bodies, self.side, self.rounded)
-        for name, turned in (("forces", True), ("moments", False), ("couples", False), ("through", True)):
+        whole = Actions(self.state, self.bodies, self.side)
+        for name in ("forces", "moments", "couples", "through"):
             sums = dict(getattr(self, name))
             for key, of_one in getattr(unit, name).items():
-                sums[key] = sums.get(key, 0.0) + self.rounded(size * of_one, turned=turned)
+                sums[key] = sums.get(key, 0.0) + size * of_one
             setattr(whole, name, sums)
         return whole
 

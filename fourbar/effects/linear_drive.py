@@ -9,10 +9,9 @@ which is of the same form, with (theta_2', theta_3', theta_4') = (sin(theta_4 - 
 (a/c) sin(theta_2 - theta_3)) for the coefficients h_k, and so is finite where these are not.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from fourbar.effects.actions import Actions, keep_number
+from fourbar.effects.actions import Actions
 from fourbar.effects.spring import COINCIDE, SpringEnd, require_ends
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number, is_any, namespace
@@ -61,11 +60,10 @@ class LinearDrive:
             allowed = f"keeps its distance from `from` at every position: bar {min(common)} holds both"
             raise InputError("drive.to", f"bar {self.end.bar} at {self.end.distance:g} m", allowed)
 
-    def line(self, state: State, rounded: Callable[..., Number] = keep_number) -> tuple[Number, Number]:
+    def line(self, state: State) -> tuple[Number, Number]:
         """Compute the stroke, m, and the unit vector from `start` to `end`, no number where they coincide."""
-        start, end = (rounded(point.place(state)) for _, point in self.ends)
-        across = end - start
-        stroke = rounded(namespace(across).abs(across))
+        across = self.end.place(state) - self.start.place(state)
+        stroke = namespace(across).abs(across)
         return stroke, across / stroke
 
     def gain(self, state: State) -> Number:
@@ -74,11 +72,11 @@ class LinearDrive:
 
     def act(self, actions: Actions, force: Number) -> None:
         """Push its ends apart."""
-        actions.pull(self.end, self.start, force * self.line(actions.state, actions.rounded)[1])
+        actions.pull(self.end, self.start, force * self.line(actions.state)[1])
 
     def per_newton(self, actions: Actions) -> Actions:
-        """Make what 1 N of it does to the bars, with the roundings of other actions."""
-        single = Actions(actions.state, actions.bodies, rounded=actions.rounded)
+        """Make what 1 N of it does to the bars."""
+        single = Actions(actions.state, actions.bodies)
         self.act(single, 1.0)
         return single
 

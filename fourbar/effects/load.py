@@ -10,12 +10,13 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import angle, is_any, make_like, namespace, nearest, polar, split_sum
+from fourbar.formulas.arithmetic import PI_LOW, angle, is_any, make_like, namespace, nearest, polar, split_sum
+from fourbar.formulas.longer import shorten
 from fourbar.formulas.motion import State
 from fourbar.linkage import FourBar, require, require_bar, require_numbers, require_pair
 
 TURN = 2.0 * math.pi
-BEYOND_TURN = 2.4492935982947064e-16
+BEYOND_TURN = 2.0 * PI_LOW
 """2 pi less TURN, rad: what counts after many turns."""
 
 
@@ -55,31 +56,26 @@ class Table:
         return math.isclose(self.theta_2[-1] - self.theta_2[0], TURN, rel_tol=1e-12)
 
     def at(self, theta_2: Any) -> Any:
-        """Interpolate the factor; InputError for a position that the table does not cover."""
-        before, gained = self.from_point(theta_2)
-        return before + gained
+        """Interpolate the factor; InputError for a position that the table does not cover.
 
-    def from_point(self, theta_2: Any) -> tuple[Any, Any]:
-        """Return the factor at the table's last point before an angle, and what it gains from there to the angle.
-
-        The difference is theta_2 less the point and whole turns, of which nothing is rounded but the result.
+        What the angle is beyond the table's last point before it is theta_2 less the point and whole turns, of which
+        nothing is rounded but the result.
         """
         first, xp = self.theta_2[0], namespace(theta_2)
-        place = first + xp.remainder(angle(polar(1.0, theta_2)) - first, TURN)
-        points, factors = np.array(self.theta_2), np.array(self.factor)
-        pieces = (points[:-1], np.diff(points), factors[:-1], np.diff(factors))
+        place = first + xp.remainder(shorten(angle(polar(1.0, theta_2))) - first, TURN)
+        points, factors = make_like(self.theta_2, theta_2), make_like(self.factor, theta_2)
         if xp is np:
             place = self._require_covered(place)
-            k = np.clip(np.searchsorted(points, place, "right") - 1, 0, len(points) - 2)
-            start, width, before, rise = (piece[k] for piece in pieces)
+            k = np.clip(np.searchsorted(np.array(self.theta_2), place, "right") - 1, 0, len(self.theta_2) - 2)
         else:  # what no library lacks, under no transformation of its own
-            k = xp.sum(xp.astype(place[..., None] >= make_like(points, place)[1:-1], xp.int32), axis=-1)[None]
-            start, width, before, rise = (make_like(piece, place)[k][0] for piece in pieces)
+            k = xp.sum(xp.astype(place[..., None] >= points[1:-1], xp.int32), axis=-1)[None]
+        pieces = (points[:-1], points[1:] - points[:-1], factors[:-1], factors[1:] - factors[:-1])
+        start, width, before, rise = (piece[k] if xp is np else piece[k][0] for piece in pieces)
         away, lost = split_sum(theta_2, -start)
         rest = xp.fmod(away, TURN)
         turns = nearest((theta_2 - place) / TURN)
         past = rest + (nearest((away - rest) / TURN) - turns) * TURN + (lost - turns * BEYOND_TURN)
-        return before, rise * (past / width)
+        return before + rise * (past / width)
 
     def _require_covered(self, place: Any) -> Any:
         """Return angles within a turn from the first, or raise an InputError for one that the table does not cover."""
@@ -134,12 +130,11 @@ class Load(Effect):
         """F at its point, and the couple."""
         factor = 1.0
         if self.table is not None:
-            before, gained = self.table.from_point(state.theta_2)
-            factor = before + actions.rounded(gained)
+            factor = self.table.at(state.theta_2)
         if self.force is not None:
             force, arm = polar(*self.force), polar(*self.at)
             u = state.direction(self.bar)
-            to_G = actions.rounded(actions.bodies[self.bar - 2].z * u)
+            to_G = actions.bodies[self.bar - 2].z * u
             if self.frame == "bar":
                 force, arm = force * u, arm * u
             actions.force(self.bar, factor * force, to_G + arm)

@@ -7,11 +7,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fourbar.effects.actions import Actions
-from fourbar.effects.cones import NONE, ONE, solve_sliding
+from fourbar.effects.cones import NONE, ONE, compute_step, solve_sliding
 from fourbar.effects.effect import SolvedFriction
 from fourbar.effects.pins import PinRows
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import is_any
+from fourbar.formulas.arithmetic import is_any, make_like
+from fourbar.formulas.longer import shorten
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import JAMMED, OK, SEVERAL
@@ -63,24 +64,42 @@ class PinFriction(PinRows):
 
         def column(force: Any) -> Any:
             """Components of a force over all positions, (n, 2)."""
-            flat = np.broadcast_to(force, shape).ravel()
+            flat = np.broadcast_to(shorten(force), shape).ravel()
             return np.stack([flat.real, flat.imag], axis=-1)
 
-        k = np.stack([np.broadcast_to(arms[pin], shape).ravel() for pin in names], axis=1)
+        k = np.stack([np.broadcast_to(shorten(arms[pin]), shape).ravel() for pin in names], axis=1)
         F = np.stack([column(getattr(pins, PIN_FORCE[pin])) for pin in names], axis=1)
         C = np.stack(
             [np.stack([column(getattr(per_unit[q], PIN_FORCE[pin])) for q in names], axis=1) for pin in names], axis=1
         )
         found = solve_sliding(F, C, k)
-        for p, pin in enumerate(names):
-            actions.couple(pin, -senses[pin] * found.x[:, p].reshape(shape))
+        couples = {pin: make_like(found.x[:, p].reshape(shape), pins.F12.real) for p, pin in enumerate(names)}
+        if shorten(pins.F12) is not pins.F12:
+            couples = self._polish(couples, pins, per_unit)
+        for pin, couple in couples.items():
+            actions.couple(pin, -senses[pin] * couple)
         done = eliminate(actions)
-        left = [
-            np.abs(found.x[:, p].reshape(shape) - arms[pin] * np.abs(getattr(done, PIN_FORCE[pin])))
-            for p, pin in enumerate(names)
-        ]
+        left = [np.abs(couple - arms[pin] * np.abs(getattr(done, PIN_FORCE[pin]))) for pin, couple in couples.items()]
         status = np.where(found.number == ONE, OK, np.where(found.number == NONE, JAMMED, SEVERAL)).astype(np.uint8)
         return SolvedFriction(done, found.from_jamming.reshape(shape), np.max(left, axis=0), status.reshape(shape))
+
+    def _polish(self, couples: dict[str, Any], pins: PinForces, per_unit: dict[str, PinForces]) -> dict[str, Any]:
+        """Improve couples that were searched for in doubles by Newton's steps whose gaps are longer numbers."""
+        names, arms = list(couples), {pin: mu * r for pin, mu, r in self.pins}
+        for _ in range(2):
+            gaps, slopes = [], []
+            for pin in names:
+                by = [getattr(per_unit[other], PIN_FORCE[pin]) for other in names]
+                force = getattr(pins, PIN_FORCE[pin])
+                for c, couple in zip(by, couples.values(), strict=True):
+                    force = force + c * couple
+                size = np.abs(force)
+                along, k = shorten(force) / shorten(size), shorten(arms[pin])
+                gaps.append(np.ravel(shorten(arms[pin] * size - couples[pin])))
+                slopes.append([np.ravel(k * (along.conjugate() * shorten(c)).real + 0.0 * gaps[-1]) for c in by])
+            steps = compute_step(np.stack(gaps, axis=1), np.moveaxis(np.array(slopes), -1, 0))
+            couples = {pin: couples[pin] + steps[:, p].reshape(np.shape(along)) for p, pin in enumerate(names)}
+        return couples
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
         """Its couples where the pin forces (name: (n, 2), N) are known already."""

@@ -1,17 +1,17 @@
 """Linear springs, each between two points of two bars, the ground included."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, keep_number
+from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import dot, is_any, namespace, polar, select
+from fourbar.formulas.longer import Pair
 from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, SECOND_PIN, FourBar, require, require_whole
 from fourbar.quantities import NO_DIRECTION, OK
@@ -36,15 +36,16 @@ class SpringEnd(NamedTuple):
     @property
     def in_bar(self) -> Any:
         """In the bar's frame, along + i across its line, m; an array, whose products all round alike."""
-        return np.asarray(polar(self.distance, self.angle))
+        point = polar(self.distance, self.angle)
+        return point if isinstance(point, Pair) else np.asarray(point)
 
     def of(self, state: State) -> Any:
         """In the bar's frame, in the numbers of a state's library."""
         return self.in_bar if namespace(state.at.u2) is np else polar(self.distance, self.angle)
 
-    def from_pin(self, pin: str, state: State, rounded: Callable[..., Any] = keep_number) -> tuple[Any, Any]:
+    def from_pin(self, pin: str, state: State) -> tuple[Any, Any]:
         """Return the vector from one of the bar's pins in the bar's frame, complex, m, and the square of its length."""
-        vector = rounded(self.of(state), turned=True)
+        vector = self.of(state)
         if pin != SECOND_PIN[self.bar]:
             return vector, self.distance * self.distance
         vector = vector - state.lengths[self.bar - 1]
@@ -161,9 +162,8 @@ class Springs(Effect):
     def act(self, actions: Actions, state: State) -> None:
         """At `start` the tension along the unit vector to `end`, at `end` its opposite."""
         for spring in self.springs:
-            start, end = (actions.rounded(point.place(state)) for point in (spring.start, spring.end))
-            across = end - start
-            actions.pull(spring.start, spring.end, _divide_by_distance(spring, across, actions) * across)
+            across = spring.end.place(state) - spring.start.place(state)
+            actions.pull(spring.start, spring.end, _divide_by_distance(spring, across) * across)
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
         """NO_DIRECTION where the two points of a spring with slack coincide."""
@@ -178,10 +178,10 @@ class Springs(Effect):
         return codes
 
 
-def _divide_by_distance(spring: Spring, across: Any, actions: Actions) -> Any:
+def _divide_by_distance(spring: Spring, across: Any) -> Any:
     """Tension over distance, N/m."""
     if not is_any(spring.slack != 0.0):
         return spring.stiffness
-    distance = actions.rounded(namespace(across).abs(across))
-    slack = spring.preload - actions.rounded(spring.stiffness * spring.length)
-    return spring.stiffness + slack / distance  # at a distance of 0 no number, which the status says
+    return spring.stiffness + spring.slack / namespace(across).abs(
+        across
+    )  # at a distance of 0 no number, which the status says

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions
 from fourbar.effects.pins import PinRows
 from fourbar.errors import expect
-from fourbar.formulas.arithmetic import Number, conjugate, namespace, nearest
+from fourbar.formulas.arithmetic import Number, conjugate, namespace, wrap_angle
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES
 from fourbar.formulas.position import reorder_lengths
@@ -53,8 +53,8 @@ class Torsion(PinRows):
         for pin, k, rest, preload in self.springs:
             i, j = PINS[pin]
             turned = state.direction(j) * conjugate(state.direction(i))
-            angle = actions.rounded(namespace(turned).atan2(turned.imag, turned.real))
-            actions.couple(pin, -(preload + k * _wrap_angle(actions.rounded(angle - rest))))
+            angle = namespace(turned).atan2(turned.imag, turned.real)
+            actions.couple(pin, -(preload + k * wrap_angle(angle - rest)))
 
     def counted_from(self, start: State, branch: Number) -> "Torsion":
         """Whole turns counted where the motion begins."""
@@ -98,11 +98,11 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     theta_1 = theta_1 + turned
     phi = np.angle(state.at.diagonal if bar == 2 else d * np.exp(1j * theta_1) - a * u2)
     line = np.where(a < d, theta_1, theta_2 + math.pi)
-    phi = line + _wrap_angle(phi - line)
+    phi = line + wrap_angle(phi - line)
 
     def beyond(angle: Number) -> Number:
         """Wrap the angle into half a turn, or as far outside as rounding puts it."""
-        return _wrap_angle(angle - 0.5 * math.pi) + 0.5 * math.pi
+        return wrap_angle(angle - 0.5 * math.pi) + 0.5 * math.pi
 
     own = (
         theta_2,
@@ -110,8 +110,3 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
         phi + math.pi - branch * beyond(branch * (phi + math.pi - theta_4)),
     )
     return {1: np.full_like(theta_2, theta_1 - turned), **dict(zip(ROLES[bar], own, strict=True))}
-
-
-def _wrap_angle(angle: Number) -> Number:
-    """Wrap the angle into [-pi, pi]; an angle that lies there stays as it is."""
-    return angle - math.tau * nearest(angle / math.tau)

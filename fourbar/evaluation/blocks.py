@@ -14,11 +14,7 @@ from fourbar.solution import Array
 
 def choose_block_size(wanted: int) -> int:
     """Of a stage: for the error bars each position is evaluated many times."""
-    if wanted < ERROR:
-        return BLOCK
-    from fourbar.evaluation.error_bars import EVALUATIONS
-
-    return BLOCK // EVALUATIONS
+    return BLOCK if wanted < ERROR else BLOCK // 4
 
 
 def keep(

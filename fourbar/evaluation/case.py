@@ -1,17 +1,15 @@
 """A scene in the numbers of the formulas: positions, motion, and the forces under everything that acts."""
 
-from collections.abc import Callable
-from dataclasses import fields, is_dataclass
-from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, keep_number, list_bodies
+from fourbar.effects.actions import Actions, list_bodies
 from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import LimitError
-from fourbar.formulas.arithmetic import angle, is_any, polar, select, vector
+from fourbar.formulas.arithmetic import angle, is_any, polar, select
+from fourbar.formulas.longer import change_numbers, lengthen
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, prepare_path
 from fourbar.formulas.pin_forces import (
@@ -50,27 +48,6 @@ Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
 """Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
 
 
-def change_numbers(value: Any, change: Callable[[Any], Any]) -> Any:
-    """Change each float and array of a value, in tuples and dataclasses too; all else stays."""
-    if isinstance(value, (float, np.ndarray)):
-        return change(value)
-    if isinstance(value, tuple):
-        parts = [change_numbers(part, change) for part in value]
-        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-    if not (names := _list_fields(value.__class__)):
-        return value
-    other = object.__new__(type(value))  # a constructor checks what a user gives, one number at a time
-    for name in names:
-        object.__setattr__(other, name, change_numbers(getattr(value, name), change))
-    return other
-
-
-@cache
-def _list_fields(of: type) -> tuple[str, ...]:
-    """Of a dataclass whose numbers may be changed."""
-    return tuple(field.name for field in fields(of)) if is_dataclass(of) and not getattr(of, "as_given", False) else ()
-
-
 def find_undecided(factor: Any, constant: Any, size: Any, part: float = UNDECIDED) -> Any:
     """Where doubles cannot decide the sign of a factor of Heron's formula, the constant and 4 a d times a square."""
     return (constant < 0.0) & (abs(factor) < part * (abs(constant) + size))
@@ -104,20 +81,28 @@ class Case(NamedTuple):
     """In which sense pins at rest are about to turn, or the part of its torque that dry friction holds them with."""
     drive: "LinearDrive | None" = None
     """In place of a couple on the driven bar."""
-    stroke: Any = None
-    """Commanded, m: the commanded angle and its rates are rounded from it."""
 
     @classmethod
     def of(cls, scene: Scene, bar: int = 2) -> "Case":
         """Collect the numbers that stay the same over the positions, for a command of bar 2, 3 or 4."""
         terms, linkage = (*scene.loads, *scene.effects), scene.linkage
-        own = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
-        square = own.unit * own.unit
-        lengths = Loop(*linkage.lengths, own.lengths.E1 * square, own.lengths.E2 * square)
+        path = prepare_path(Loop(*linkage.lengths, 0.0, 0.0), linkage.ground_angle, bar)
         points = tuple((point.name, point.bar, polar(*point.from_pin)) for point in scene.points)
-        return cls(
-            linkage, lengths, list_bodies(linkage, terms), terms, scene.drive_bar, own, points, drive=scene.drive
-        )
+        lengths, bodies = _restore_unit(linkage, path), list_bodies(linkage, terms)
+        return cls(linkage, lengths, bodies, terms, scene.drive_bar, path, points, drive=scene.drive)
+
+    def lengthened(self) -> "Case":
+        """Return the same case in longer numbers, all that is computed of the scene's own numbers too."""
+        linkage, terms, drive = change_numbers((self.linkage, self.terms, self.drive), lengthen)
+        d, a, b, c = linkage.lengths
+        path = prepare_path(Loop(d, a, b, c, 0.0, 0.0), linkage.ground_angle, self.path.bar)
+        kept: Any = {  # a change point that is met, as a free motion does where the lengths miss it by rounding
+            name: select(getattr(self.path.lengths, name) == 0.0, 0.0, getattr(path.lengths, name))
+            for name in ("E1", "E2")
+        }
+        path = path._replace(lengths=path.lengths._replace(**kept), may_stay_parallel=self.path.may_stay_parallel)
+        bodies, lengths = list_bodies(linkage, terms), _restore_unit(linkage, path)
+        return self._replace(linkage=linkage, lengths=lengths, bodies=bodies, terms=terms, path=path, drive=drive)
 
     @property
     def names(self) -> DriveNames:
@@ -215,9 +200,7 @@ class Case(NamedTuple):
             others = others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
         return inertial, others
 
-    def dynamics(
-        self, state: State, acceleration: Any, side: Any = 0, rounded: Callable[..., Any] = keep_number
-    ) -> Dynamics:
+    def dynamics(self, state: State, acceleration: Any, side: Any = 0) -> Dynamics:
         """Compute pin forces and the drive under everything that acts; for the parameters see `Actions`.
 
         A couple on one bar leaves the moments of the other two alone, which give the force between them. A force along
@@ -225,19 +208,16 @@ class Case(NamedTuple):
         of the three pairs of bars that whose directions differ most has the digits.
         """
         a, at, k = self.lengths.a, state.at, state.k
-        actions = Actions(state, self.bodies, side, rounded)
+        actions = Actions(state, self.bodies, side)
         for term in self.terms:
             term.act(actions, state)
         own, mass_at_A = inertia_wrenches(a, self.bodies, at, state.moving)
         inertial, others = self._compute_inertial(state, acceleration)
-        if rounded is not keep_number:
-            own, mass_at_A = Wrenches(*map(rounded, own)), vector(rounded(mass_at_A.real), rounded(mass_at_A.imag))
-            inertial, others = rounded(inertial), rounded(others)
         driven = (self.drive_bar,) if self.drive is None else self.drive.apart
-        sines = {bar: rounded(self.path.drive_sine(at, bar)) for bar in driven}
+        sines = {bar: self.path.drive_sine(at, bar) for bar in driven}
         about_B, short = 0.0, is_any(self.lengths.d < self.lengths.a)
         if 4 in sines:
-            about_B = rounded(coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sines[4]))
+            about_B = coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sines[4])
         unit = None if self.drive is None else self.drive.per_newton(actions)
         by = k[self.drive_bar - 2] if unit is None else unit.work()[0]
 
@@ -280,6 +260,12 @@ class Case(NamedTuple):
         jammed = [found.status == JAMMED for found in (ahead, back) if found.status is not None]
         low, high = np.minimum(ahead.drive, back.drive), np.maximum(ahead.drive, back.drive)
         return low, high, np.any(jammed, axis=0) if jammed else None
+
+
+def _restore_unit(linkage: FourBar, path: Path) -> Loop:
+    """Return the lengths in m, and what they decide together in m^2."""
+    square = path.unit * path.unit
+    return Loop(*linkage.lengths, path.lengths.E1 * square, path.lengths.E2 * square)
 
 
 def take_steadiest(sines: dict[int, Any], of: dict[int, PinForces]) -> PinForces:

@@ -70,9 +70,7 @@ def evaluate_command(case: Case, where: Command, part: Part, wanted: int, names:
     if where.lever is not None and "condition" in values:
         values["condition"] = values["condition"] * where.lever[part]
     if wanted >= FORCE:
-        known = exact if wanted == ERROR else None
-        if where.lever is not None and where.stroke is not None:
-            case = case._replace(stroke=where.stroke[part])
+        known = (exact, where.remainder, None if where.lost is None else where.lost[part]) if wanted == ERROR else None
         codes, forces = _evaluate_forces(case, state, acceleration, branch, branch, codes, names, known)
         values |= forces
     return codes, values, state.at
@@ -128,8 +126,8 @@ def evaluate_freely(case: Case, moved: "FreeMotion", part: Part, wanted: int, na
     state = free.state(free.path, q, at, branch, speed, growth)._replace(theta_2=moved.command.angle[part])
     values = list_kinematics(case, state, names)
     if wanted >= FORCE:
-        exact = NOWHERE if wanted == ERROR else None
-        codes, forces = _evaluate_forces(free, state, growth, None, branch, codes, names, exact)
+        known = (NOWHERE, None, None) if wanted == ERROR else None
+        codes, forces = _evaluate_forces(free, state, growth, None, branch, codes, names, known)
         values |= forces
         values |= {name: np.zeros(codes.shape) for name in (*case.names, "power") if name in names}
     return codes, values, None
@@ -143,7 +141,7 @@ def _evaluate_forces(
     sign: Any,
     codes: Any,
     names: KeysView[str],
-    exact: NDArray[np.intp] | None,
+    known: tuple[NDArray[np.intp], Any, Any] | None,
 ) -> tuple[Any, dict[str, Any]]:
     """Evaluate the force stage: the statuses with those of the effects, and its quantities.
 
@@ -151,7 +149,8 @@ def _evaluate_forces(
     ----------
     branch : of each position; None where no effect counts turns by it.
     sign : of the path's root.
-    exact : indices of the positions known in many digits; None: no error bars.
+    known : indices of the positions known in many digits, and what the command leaves out as doubles; None: no error
+        bars.
     """
     found, own = case.dynamics(state, acceleration, case.side), case.names
     values: dict[str, Any] = {**found.pins._asdict(), own.value: found.drive}
@@ -167,10 +166,10 @@ def _evaluate_forces(
         values |= zip(own[2:], ends, strict=True)
         if held is not None and found.status is not None:
             found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
-    if exact is not None:
+    if known is not None:
         from fourbar.evaluation.error_bars import compute_error_bars
 
-        values |= compute_error_bars(case, state, acceleration, sign, found, exact)
+        values |= compute_error_bars(case, state, acceleration, sign, found, *known)
     without: list[Any] = [status for term in case.terms if (status := term.status(state, branch)) is not None]
     if found.status is not None:
         without.append(found.status)

@@ -10,6 +10,10 @@ Number = Any
 """A float, or an array that broadcasts over positions and linkages."""
 PLAIN = (int, np.generic)
 """One truth value or code."""
+NUMPY = (np.ndarray, np.generic)
+DOUBLES = {float, np.float64}
+PI_LOW = 1.2246467991473532e-16
+"""pi less its double: a constant in longer numbers is no double."""
 _OF_TYPE: dict[type, Any] = {float: np, int: np, complex: np, np.ndarray: np}
 
 
@@ -41,11 +45,11 @@ def _find_namespace(number: Number) -> Any:
 
 def make_like(values: Number, other: Number) -> Number:
     """Make plain numbers an array of another's library, kind and device."""
-    xp, where = namespace(other), {}
-    if xp is not np:
-        from array_api_compat import is_jax_array
+    if (xp := namespace(other)) is np:  # Python's own numbers and those with derivatives have no dtype
+        return other.like(values) if hasattr(other, "like") else np.asarray(values, getattr(other, "dtype", float))
+    from array_api_compat import is_jax_array
 
-        where = {} if is_jax_array(other) else {"device": other.device}  # JAX brings plain numbers to the others
+    where = {} if is_jax_array(other) else {"device": other.device}  # JAX brings plain numbers to the others
     return xp.asarray(values, dtype=other.dtype, **where)
 
 
@@ -103,11 +107,12 @@ def vector(x: Number, y: Number) -> Number:
     """Make x + i y, each part written once: over arrays the sum takes three times as long."""
     if type(x) is type(y) is float:
         return complex(x, y)
-    if hasattr(x, "slopes") or hasattr(y, "slopes"):  # numbers that carry their derivatives
+    if not ((type(x) is float or isinstance(x, NUMPY)) and (type(y) is float or isinstance(y, NUMPY))):
         return x + 1j * y
-    if not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray):
-        return np.complex128(complex(x, y)) if namespace(x, y) is np else x + 1j * y
-    z = np.empty(np.broadcast(x, y).shape, dtype=complex)
+    kinds = {number.dtype.type if hasattr(number, "dtype") else float for number in (x, y)}
+    if not isinstance(x, np.ndarray) and not isinstance(y, np.ndarray) and kinds <= DOUBLES:
+        return np.complex128(complex(x, y))
+    z = np.empty(np.broadcast(x, y).shape, dtype=complex if kinds <= DOUBLES else np.result_type(x, y, np.complex64))
     z.real, z.imag = x, y
     return z[()]
 
@@ -144,6 +149,12 @@ def sign(x: Number) -> Number:
 def nearest(x: Number) -> Number:
     """Nearest whole number, the even one of two."""
     return np.rint(x) if (xp := namespace(x)) is np else xp.round(x)
+
+
+def wrap_angle(x: Number) -> Number:
+    """Wrap an angle into [-pi, pi], rad; one that lies there stays as it is."""
+    turns = nearest(x / math.tau)
+    return x - math.tau * turns - 2.0 * PI_LOW * turns
 
 
 def tangent(x: Number) -> Number:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from fourbar.formulas.arithmetic import make_like
 from fourbar.formulas.position import HalfAngle, reorder_lengths
 from fourbar.linkage import FourBar
 
@@ -17,9 +18,15 @@ was itself rounded by up to that, so the linkage meant closes there as well as n
 
 
 def half_angle(
-    linkage: FourBar, theta_2: float, offset: Any = None, unit: Any = 1.0, member: int = 0, bar: int = 2
+    linkage: FourBar,
+    theta_2: float,
+    offset: Any = None,
+    unit: Any = 1.0,
+    member: int = 0,
+    bar: int = 2,
+    lost: float = 0.0,
 ) -> HalfAngle:
-    """Compute the five numbers of `formulas.position.half_angle`, each rounded once.
+    """Compute the five numbers of `formulas.position.half_angle` (mpmath).
 
     Parameters
     ----------
@@ -29,6 +36,7 @@ def half_angle(
     unit : of the lengths, m.
     member : index into numbers of the linkage that are arrays.
     bar : from which the loop is read; theta_2 is its angle.
+    lost : what a theta_2 that was computed leaves out as a double, rad.
     """
     from mpmath import mp, mpf
 
@@ -37,7 +45,7 @@ def half_angle(
 
     with mp.workdps(DIGITS):
         d, a, b, c = (own(length) / own(unit) for length in reorder_lengths(bar, linkage.lengths))
-        h = (mpf(theta_2) - own(linkage.ground_angle) + (0 if offset is None else offset)) / 2
+        h = (mpf(theta_2) + mpf(lost) - own(linkage.ground_angle) + (0 if offset is None else offset)) / 2
         if bar == 4:
             h -= mp.pi / 2
         s, k = mp.sin(h), mp.cos(h)
@@ -45,20 +53,35 @@ def half_angle(
         whole = 2 * (a + b + c + d) * mp.sqrt(e2)
         least, most = (-TOUCHING * whole, 0) if offset is None else (-RESIDUE * whole, RESIDUE * whole)
         factors = ((b + c) ** 2 - e2, e2 - (b - c) ** 2)
-        outer, inner = (0.0 if least <= factor <= most else float(factor) for factor in factors)
-        return HalfAngle(float(s * s), float(k * k), float(s * k), outer, inner)
+        outer, inner = (0 * factor if least <= factor <= most else factor for factor in factors)
+        return HalfAngle(s * s, k * k, s * k, outer, inner)
 
 
 def decide_half_angles(
-    linkage: FourBar, unit: float, half: HalfAngle, index: Any, theta_2: Any, offset: Any = None, bar: int = 2
+    linkage: FourBar,
+    unit: float,
+    half: HalfAngle,
+    index: Any,
+    theta_2: Any,
+    offset: Any = None,
+    bar: int = 2,
+    lost: Any = 0.0,
 ) -> HalfAngle:
-    """Replace the half angles of some positions (an index)."""
+    """Replace the half angles of some positions (an index), each number rounded once to the kind that it has.
+
+    `lost`: what a theta_2 that was computed leaves out as a double, rad; for the others see `half_angle`.
+    """
     flat, shape = np.ravel(theta_2), np.shape(theta_2)
-    numbers = [np.array(np.broadcast_to(number, shape)).ravel() for number in half]
+    left_out = np.broadcast_to(lost, shape).ravel().tolist()
+    mask = np.zeros(flat.shape, dtype=bool)
+    mask[index] = True
+    high, low = np.zeros((2, 5, flat.size))
     for i in index:
-        for number, value in zip(numbers, half_angle(linkage, float(flat[i]), offset, unit, i, bar), strict=True):
-            number[i] = value
-    return HalfAngle(*(number.reshape(shape)[()] for number in numbers))
+        for row, value in enumerate(half_angle(linkage, float(flat[i]), offset, unit, i, bar, left_out[i])):
+            high[row, i] = float(value)
+            low[row, i] = float(value - high[row, i])
+    mask, rows = mask.reshape(shape), zip(half, high.reshape(5, *shape), low.reshape(5, *shape), strict=True)
+    return HalfAngle(*(np.where(mask, make_like(own, number) + rest, number)[()] for number, own, rest in rows))
 
 
 def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: float, bar: int = 2) -> Any:

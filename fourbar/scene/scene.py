@@ -119,6 +119,8 @@ class Command(NamedTuple):
     """(n,), of that cylinder, as a part of the longest that it could be."""
     stroke_speed: float | Array | None = None
     """m/s; None where no stroke is commanded, or positions only."""
+    lost: Array | None = None
+    """What angle, speed and acceleration leave out as doubles, (n, 3), where they follow from a stroke."""
 
     @property
     def commanded(self) -> str:
@@ -182,23 +184,22 @@ def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = No
     `branch`: at each of them; left out: the scene's, which may follow its smooth path.
     """
     motion, bar, time = scene.motion, scene.motion.bar, None
-    angle, stroke, lever, stroke_speed = places, None, None, None
+    angle, stroke, lever, stroke_speed, lost = places, None, None, None, None
     speed: float | Array | None = motion.speed
     acceleration: float | Array = motion.acceleration
     if motion.stroke is not None:
-        from fourbar.scene.stroke import find_triangle
+        from fourbar.scene.stroke import find_triangle, turn_bar
 
-        own = find_triangle(scene.linkage, scene.drive)
-        own.require(places)
+        find_triangle(scene.linkage, scene.drive).require(places)
         stroke, stroke_speed = places, speed
-        angle, speed, acceleration, lever = own.turned(places, speed, acceleration, motion.side)
+        angle, speed, acceleration, lever, lost = turn_bar(scene, places, speed, acceleration)
     elif motion.law is not None:
         time, (angle, speed, acceleration) = places, motion.law.at(places)
     if branch is None:
         branch = np.full(angle.shape, motion.branch, dtype=np.int8)
         if motion.through == "follow":
             branch = follow_smooth_path(scene.linkage, angle, motion.branch, bar)
-    return Command(angle, branch, speed, acceleration, None, time, bar, stroke, lever, stroke_speed)
+    return Command(angle, branch, speed, acceleration, None, time, bar, stroke, lever, stroke_speed, lost)
 
 
 def command(scene: Scene) -> Command:

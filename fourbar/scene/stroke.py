@@ -4,20 +4,20 @@ With l from the pivot to the end on the bar, r to the end on the ground, beta th
     s^2 = l^2 + r^2 - 2 l r cos beta,   ds/dbeta = l r sin beta/s = the lever from the pivot to the line.
 """
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects.actions import keep_number
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import Number, angle, divisor, exact_difference, namespace, polar, select
+from fourbar.formulas.arithmetic import PI_LOW, Number, angle, divisor, exact_difference, namespace, polar, select
+from fourbar.formulas.longer import change_numbers, lengthen, shorten
 from fourbar.linkage import FourBar
 from fourbar.solution import Array
 
 if TYPE_CHECKING:
     from fourbar.effects.linear_drive import LinearDrive
     from fourbar.effects.spring import SpringEnd
+    from fourbar.scene.scene import Scene
 
 SIDES = {"left": 1.0, "right": -1.0}
 """On which side of the line from the bar's pivot to the end on the ground, seen towards that, the other end lies."""
@@ -53,7 +53,6 @@ class Triangle(NamedTuple):
         speed: Any,
         acceleration: Any,
         side: str | None,
-        rounded: Callable[..., Any] = keep_number,
     ) -> tuple[Any, Any, Any, Any]:
         """Compute angle, speed and acceleration of the bar, and the lever as a part of the longer of l and r.
 
@@ -63,40 +62,53 @@ class Triangle(NamedTuple):
         assert side is not None
         length, reach, zero = self.length, self.reach, 0.0 * self.length
         sign, xp = SIDES[side], namespace(stroke, length, reach)
-        near = rounded(exact_difference(stroke, reach, length, zero) * exact_difference(stroke, length, reach, zero))
-        far = rounded(exact_difference(length, reach, stroke, zero) * (length + reach + stroke))
+        near = exact_difference(stroke, reach, length, zero) * exact_difference(stroke, length, reach, zero)
+        far = exact_difference(length, reach, stroke, zero) * (length + reach + stroke)
         inside = xp is np or (near > 0.0) & (far > 0.0)
         near, far, stroke = (divisor(x, inside) for x in (near, far, stroke))
         with np.errstate(all="ignore"):
             near, far = xp.sqrt(near), xp.sqrt(far)
-            beta = rounded(2.0 * xp.atan2(near, far))
-            lever = rounded(near * far / (2.0 * stroke))
+            beta = 2.0 * xp.atan2(near, far)
+            lever = near * far / (2.0 * stroke)
             longer = 0.5 * (length + reach + abs(length - reach))
-            theta, share = rounded(self.angle + sign * beta), select(inside, lever / longer, 0.0)
+            theta, share = self.angle + sign * beta, select(inside, lever / longer, 0.0)
             if speed is None:
                 return theta, None, np.zeros(np.shape(theta)), share
-            rate = rounded(speed / lever)
-            own, along = rounded(speed * speed) + rounded(stroke * acceleration), length * reach * xp.cos(beta)
-            growth = rounded((own - rounded(along * rate * rate)) / (lever * stroke))
+            rate = speed / lever
+            own, along = speed * speed + stroke * acceleration, length * reach * xp.cos(beta)
+            growth = (own - along * rate * rate) / (lever * stroke)
         return theta, sign * rate, sign * growth, share
 
 
-def find_triangle(linkage: FourBar, drive: "LinearDrive | None", rounded: Callable[..., Any] = keep_number) -> Triangle:
+def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
     """Return the triangle of a cylinder between the ground and bar 2 or 4; InputError for any other drive."""
     if drive is None or {drive.start.bar, drive.end.bar} not in ({1, 2}, {1, 4}):
         drives = "no cylinder" if drive is None else f"one from bar {drive.start.bar} to bar {drive.end.bar}"
         raise InputError("motion.stroke", drives, "is of a cylinder ([drive]) between the ground and bar 2 or 4")
     own, other = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
     if own.bar == 2:  # the ground's points are polar about its pin
-        reach, towards = abs(other.distance), rounded(other.angle + linkage.ground_angle) + _reverse(other)
+        reach, towards = abs(other.distance), other.angle + linkage.ground_angle + _reverse(other)
     else:
-        end = polar(other.distance, rounded(other.angle + linkage.ground_angle))
-        across = rounded(end, turned=True) - rounded(polar(linkage.ground, linkage.ground_angle), turned=True)
-        reach, towards = rounded(abs(across)), rounded(angle(across))
-    return Triangle(own.bar, abs(own.distance), reach, rounded(towards - own.angle - _reverse(own)))
+        end = polar(other.distance, other.angle + linkage.ground_angle)
+        across = end - polar(linkage.ground, linkage.ground_angle)
+        reach, towards = abs(across), angle(across)
+    return Triangle(own.bar, abs(own.distance), reach, towards - own.angle - _reverse(own))
+
+
+def turn_bar(scene: "Scene", stroke: Array, speed: Any, acceleration: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """Compute what `Triangle.turned` does, and what angle, speed and acceleration leave out as doubles, (..., 3)."""
+    parts, side = (scene.linkage, scene.drive), scene.motion.side
+    found = find_triangle(*parts).turned(stroke, speed, acceleration, side)
+    if speed is None:
+        return (*found, None)
+    with np.errstate(all="ignore"):
+        longer = find_triangle(*change_numbers(parts, lengthen))
+        exact = longer.turned(lengthen(stroke), lengthen(speed), lengthen(acceleration), side)
+        lost = [shorten(after - before) for before, after in zip(found[:3], exact[:3], strict=True)]
+    return (*found, np.stack(np.broadcast_arrays(*lost), axis=-1))
 
 
 def _reverse(point: "SpringEnd") -> Any:
     """Half a turn for a point at a distance that is negative."""
     forwards = 0.0 * point.distance  # of its kind
-    return select(point.distance >= 0.0, forwards, np.pi + forwards)
+    return select(point.distance >= 0.0, forwards, np.pi + forwards + PI_LOW)

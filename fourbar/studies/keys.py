@@ -138,6 +138,8 @@ class ManyBars(Bar):
         r, phi = self.mass_centre
         if isinstance(phi, NDArrayOperatorsMixin) or namespace(r, phi) is not np:  # with its derivatives, or traced
             return polar(r, phi)
+        if np.ndim(phi) and np.asarray(phi).dtype == np.longdouble:
+            return super().to_centre
         if np.ndim(phi):
             angles = np.asarray(phi).tolist()
             cosine: Any = np.array([math.cos(angle) for angle in angles])

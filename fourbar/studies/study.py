@@ -19,7 +19,7 @@ from fourbar.linkage import convert_to_unit
 from fourbar.quantities import ANGLES, INVALID, NOT_ASSEMBLED
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.stroke import find_triangle
+from fourbar.scene.stroke import turn_bar
 from fourbar.solution import Array, Solution
 from fourbar.solve import find_requested, make_arrays, make_solution, unwrap_angles
 from fourbar.studies.keys import COMMAND_KEYS, command_key, list_entries, refuse_key, replace_numbers, replace_place
@@ -83,6 +83,8 @@ class Study:
         count = columns.stop - columns.start
 
         def flat(value: Any) -> Any:
+            if np.ndim(value) == 3:
+                return value[rows, columns].reshape(-1, value.shape[2])
             if np.ndim(value) != 2:
                 return value
             return _repeat(value[rows, 0], count) if value.shape[1] == 1 else value[rows, columns].ravel()
@@ -178,7 +180,7 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         invalid = invalid | ~known[key].holds(array)
     numbers = {key: np.where(invalid, np.nan, array) for key, array in numbers.items()}
     angle = np.broadcast_to(angles, (m, angles.shape[1]))
-    stroke = lever = stroke_speed = None
+    stroke = lever = stroke_speed = lost = None
     motion: Any = scene.motion if scene.motion.law is None else command(scene)
     speed, acceleration = (
         numbers.pop(f"motion.{name}")[:, None] if f"motion.{name}" in numbers else number
@@ -188,10 +190,10 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         speed, acceleration = (np.broadcast_to(value, angle.shape) for value in (speed, acceleration))
     if scene.motion.stroke is not None:
         varied = replace_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
-        own, stroke, stroke_speed = find_triangle(varied.linkage, varied.drive), angle, speed
-        angle, speed, acceleration, lever = own.turned(stroke, speed, acceleration, scene.motion.side)
+        stroke, stroke_speed = angle, speed
+        angle, speed, acceleration, lever, lost = turn_bar(varied, stroke, speed, acceleration)
     branch = _find_branches(scene, numbers, angles if stroke is None else angle, m)
-    of_stroke = {"stroke": stroke, "lever": lever, "stroke_speed": stroke_speed}
+    of_stroke = {"stroke": stroke, "lever": lever, "stroke_speed": stroke_speed, "lost": lost}
     at = Command(angle, branch, speed, acceleration, bar=scene.motion.bar, **of_stroke)
     return Study(scene, numbers, invalid, at)
 

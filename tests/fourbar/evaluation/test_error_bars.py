@@ -7,11 +7,15 @@ import pytest
 
 import fourbar
 from fourbar.effects import Gravity, Load, Spring, SpringEnd, Springs, Table, Torsion, cones
+from fourbar.formulas import longer
 from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
+from fourbar_lab.families import FAMILIES
 from fourbar_lab.fault_scenes import FAULT_SCENES
+from fourbar_lab.stability import run
+from fourbar_lab.tally import TOO_SMALL
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.run import printed
@@ -55,9 +59,12 @@ SPRINGS = Springs((Spring(SpringEnd(2, 0.1, 0.6), SpringEnd(3, 0.05, -0.4), 80.0
 SCENES |= {f"{effect.key} near a limit": near_a_limit(effect) for effect in (SPRINGS, Torsion.at(B=(0.5, 0.7, 0.1)))}
 
 
+@pytest.mark.parametrize("kind", ["long doubles", "pairs of doubles"])
 @pytest.mark.parametrize("name", SCENES)
-def test_error_bars_are_of_the_size_of_the_error(name: str) -> None:
+def test_error_bars_are_of_the_size_of_the_error(name: str, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = SCENES[name]
+    if kind == "pairs of doubles":
+        monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
     at = command(scene)
     ours, exact = fourbar.solve(scene, "error"), BallArithmetic().answer(scene, at)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
@@ -69,6 +76,15 @@ def test_error_bars_are_of_the_size_of_the_error(name: str) -> None:
         assert (error <= 10.0 * width).all(), name
         assert (width >= half_a_digit).all()
         assert np.median(width / np.maximum(error, half_a_digit)) < 5.0
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_error_bars_hold_with_pairs_of_doubles(family: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The numbers of a machine whose long doubles are no longer than doubles."""
+    monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
+    tally = run(family, range(3))
+    assert tally.too_small and max(tally.too_small.values()) <= TOO_SMALL
+    assert not any(tally.too_large.values()) and not tally.warned
 
 
 def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -453,7 +453,7 @@ def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
     for offset in (None, mp.mpf("1e-3")):
         found = decide_half_angles(bars, 1.0, half, np.array([1, 4]), theta_2, offset)
         for name, before, after in zip(half._fields, half, found, strict=True):
-            exact = [getattr(exact_half_angle(bars, float(angle), offset), name) for angle in theta_2]
+            exact = [float(getattr(exact_half_angle(bars, float(angle), offset), name)) for angle in theta_2]
             assert after[[1, 4]].tolist() == [exact[1], exact[4]]
             assert np.array_equal(np.delete(after, [1, 4]), np.delete(before, [1, 4]))
             assert offset is None or not np.array_equal(after, before)

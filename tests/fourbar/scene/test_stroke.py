@@ -15,6 +15,7 @@ from fourbar.files.scene_text import dump
 from fourbar.scene.motion import Sweep
 from fourbar.studies.keys import read_place, replace_numbers
 from fourbar_validation.compare.rows import AGREES
+from fourbar_validation.engines.balls import compute_reference
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
@@ -22,7 +23,9 @@ from tests.support.scenes import crank_rocker
 ROUND_OFF = 1e-11
 """Relative: eps over the conditions of these sweeps, 1e-4 at least."""
 BARS = 10.0
-"""Of an error bar, 0.64 standard deviations wide: 2 in ten billion normal errors are beyond."""
+"""Of an error bar, as `stability` allows."""
+OF_LONGER_NUMBERS = 1.1
+"""Of an error bar: what the longer numbers lose themselves is a thousandth of what doubles lose, or some of them."""
 ENDS = {2: SpringEnd(2, 0.12, 0.4), 4: SpringEnd(4, 0.15, -0.6)}
 GROUND = SpringEnd(1, 0.3, 2.2)
 SAMPLED = 0.02
@@ -95,14 +98,22 @@ def test_free_bodies_find_the_angle_by_halving_and_agree(bar: int, side: str) ->
 
 @pytest.mark.parametrize(("bar", "strokes"), [(2, [0.181, 0.4, 0.4199999]), (4, [0.4, 0.45, 0.5])])
 def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar: int, strokes: list[float]) -> None:
-    """The ground turned with all that is on it: the same force, every number of which rounds otherwise."""
+    """The ground turned with all that is on it: the same force, every number of which rounds otherwise.
+
+    Against balls, and not the median of the doubles, which all lose the same in what does not turn.
+    """
     own = replace(scene(bar, np.array(strokes), stroke_speed=0.2, stroke_acceleration=0.1), effects=(), loads=())
     angles = own.linkage.ground_angle + np.linspace(0.0, 3.0, 100)
     s = fourbar.solve(fourbar.vary(own, {"lengths.ground_angle": angles}), "error")
     assert (s.status_code == 0).all() and s.drive_force is not None and s.drive_force_error is not None
-    off = np.abs(s.drive_force - np.median(s.drive_force, axis=0)) / s.drive_force_error
-    assert np.quantile(off, 0.5, axis=0).max() < 1.0 and off.max() < BARS
-    assert np.quantile(off, 0.9, axis=0).min() > 0.1  # no bar is wide enough to hide anything
+    for place, stroke in enumerate(strokes):
+        reference = compute_reference(replace(own, motion=replace(own.motion, stroke=stroke)), 1, stroke)
+        assert reference is not None
+        exact = reference[0]["drive_force"]
+        error = np.array([abs(float((force - exact).mid())) for force in s.drive_force[:, place].tolist()])
+        off = error / s.drive_force_error[:, place]
+        assert np.quantile(off, 0.5) < OF_LONGER_NUMBERS and off.max() < BARS
+        assert np.quantile(off, 0.9) > 0.1  # no bar is wide enough to hide anything
 
 
 def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular() -> None:

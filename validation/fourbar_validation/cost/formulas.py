@@ -8,8 +8,9 @@ import numpy as np
 
 from fourbar.effects import Actions
 from fourbar.effects.actions import list_bodies
-from fourbar.evaluation.case import Case, change_numbers, compute_state
+from fourbar.evaluation.case import Case, compute_state
 from fourbar.formulas.arithmetic import cross
+from fourbar.formulas.longer import change_numbers
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES
@@ -42,23 +43,22 @@ def evaluate_double(scene: Scene, at: Command) -> Quantities:
 
 def evaluate_single(scene: Scene, at: Command) -> Quantities:
     """Evaluate the formulas on float32 arrays."""
-    case = change_numbers(Case.of(scene), float)  # NumPy's doubles would prevail
+    case = change_numbers(Case.of(scene), _round_single)
     path = case.path._replace(u1=np.complex64(case.path.u1))
     with np.errstate(all="ignore"):
         theta_2 = at.theta_2.astype(np.float32)
         speed, growth = (np.float32(value) for value in (at.omega_2 or 0.0, at.alpha_2))
         position = path.position(theta_2, path.half_angle(theta_2), at.branch)
-        # vectors are made of complex doubles whatever their parts are, and so is what stays parallel
         state = case.state(path, theta_2, change_numbers(position, _round_single), at.branch, speed, growth)
         state = change_numbers(state, _round_single)
-        result = case.dynamics(state, growth, rounded=_round_single)
+        result = case.dynamics(state, growth)
     assert result.drive.dtype == np.float32
     return {"torque": result.drive, **{name: _stack(getattr(result.pins, name), len(theta_2)) for name in PIN_FORCES}}
 
 
-def _round_single(value: Any, *, turned: bool = False) -> Any:
+def _round_single(value: Any) -> Any:
     """Round to single precision, both parts of a vector too."""
-    return np.asarray(value).astype(np.complex64 if np.iscomplexobj(value) else np.float32)
+    return np.asarray(value).astype(np.complex64 if np.iscomplexobj(value) else np.float32)[()]
 
 
 def _stack(vector: Any, n: int) -> Array:

@@ -1,0 +1,239 @@
+"""Numbers with more digits than doubles have, in which the formulas run as they stand.
+
+They are the long doubles of the C library where these are longer, as on Linux, and pairs of doubles where they are not,
+as on Windows and on Apple's processors. A pair x = high + low is a sum that is not evaluated, some 32 digits.
+
+Source: T. J. Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18 (1971).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields, is_dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
+
+from fourbar.formulas.arithmetic import PI_LOW, Number, split_sum
+
+HAS_LONG_DOUBLES = np.finfo(np.longdouble).nmant > np.finfo(np.float64).nmant
+HALF_PI_LOWEST = -1.4973849048591833e-33
+"""pi/2 less the two doubles nearest to it."""
+SPLITTER = 2.0**27 + 1.0
+"""Splits the 53 bits of a double into two halves."""
+TERMS = 27
+"""Of the series of sine and cosine up to an eighth of a turn: the next ones are below 1e-32."""
+
+
+def lengthen(number: Number) -> Number:
+    """Return a double, or an array of them, as a longer number."""
+    if not HAS_LONG_DOUBLES:
+        return Pair(np.asarray(number, dtype=float), 0.0)
+    return number.astype(np.longdouble) if isinstance(number, np.ndarray) else np.longdouble(number)
+
+
+def shorten(number: Number) -> Number:
+    """Return a longer number as doubles; any other one as it is."""
+    if isinstance(number, Pair):
+        return number.high
+    if isinstance(number, (np.ndarray, np.generic)) and number.dtype in (np.longdouble, np.clongdouble):
+        return number.astype(complex if number.dtype.kind == "c" else float)
+    return number
+
+
+def change_numbers(value: Any, change: Callable[[Any], Any]) -> Any:
+    """Change each float and array of a value, in tuples and dataclasses too; all else stays."""
+    if isinstance(value, (float, np.ndarray)):
+        return change(value)
+    if isinstance(value, tuple):
+        parts = [change_numbers(part, change) for part in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    if not (names := _list_fields(value.__class__)):
+        return value
+    changed = object.__new__(type(value))  # a constructor checks what a user gives, one number at a time
+    for name in names:
+        object.__setattr__(changed, name, change_numbers(getattr(value, name), change))
+    return changed
+
+
+@cache
+def _list_fields(of: type) -> tuple[str, ...]:
+    """List the fields of a dataclass whose numbers may be changed."""
+    return tuple(field.name for field in fields(of)) if is_dataclass(of) and not getattr(of, "as_given", False) else ()
+
+
+class Pair(NDArrayOperatorsMixin):
+    """Unevaluated sums of two arrays of doubles, or of complex ones part by part: high is the sum as a double."""
+
+    def __init__(self, high: Any, low: Any) -> None:
+        self.high, self.low = high, np.where(np.isfinite(high), low, 0.0)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the arrays."""
+        return np.shape(self.high)
+
+    @property
+    def real(self) -> "Pair":
+        """Real parts."""
+        return Pair(np.real(self.high), np.real(self.low))
+
+    @property
+    def imag(self) -> "Pair":
+        """Imaginary parts."""
+        return Pair(np.imag(self.high), np.imag(self.low))
+
+    def conjugate(self) -> "Pair":
+        """Complex conjugates."""
+        return Pair(np.conjugate(self.high), np.conjugate(self.low))
+
+    def like(self, values: Any) -> "Pair":
+        """Return doubles as pairs."""
+        return Pair(np.asarray(values, dtype=float), 0.0)
+
+    def __getitem__(self, index: Any) -> "Pair":
+        return Pair(self.high[index], self.low[index])
+
+    def __array_ufunc__(self, function: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        if method != "__call__" or options or function not in FUNCTIONS:
+            return NotImplemented
+        return FUNCTIONS[function](*(x if isinstance(x, Pair) else Pair(np.asarray(x), 0.0) for x in inputs))
+
+    def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: Any) -> Any:
+        if function is np.where:
+            return _choose(*args)
+        return function(args[0].high) if function in (np.shape, np.ndim, np.iscomplexobj) else NotImplemented
+
+
+def _choose(mask: Any, x: Any, y: Any) -> Any:
+    """Return x where a mask holds, y elsewhere."""
+    x, y = (number if isinstance(number, Pair) else Pair(np.asarray(number), 0.0) for number in (x, y))
+    return Pair(np.where(mask, x.high, y.high), np.where(mask, x.low, y.low))
+
+
+def _renew(high: Any, low: Any) -> Pair:
+    """Return the pair of a double and a smaller one."""
+    whole = high + low
+    return Pair(whole, low - (whole - high))
+
+
+def _add(x: Any, y: Any) -> Any:
+    high, lost = split_sum(x.high, y.high)
+    low, lost_again = split_sum(x.low, y.low)
+    first = _renew(high, lost + low)
+    return _renew(first.high, first.low + lost_again)
+
+
+def _halve(x: Any) -> tuple[Any, Any]:
+    """Split a double into two of half its bits."""
+    large = SPLITTER * x
+    high = large - (large - x)
+    return high, x - high
+
+
+def _multiply_real(x: Any, y: Any) -> Any:
+    product = x.high * y.high
+    (a, b), (c, d) = _halve(x.high), _halve(y.high)
+    lost = ((a * c - product) + a * d + b * c) + b * d
+    return _renew(product, lost + (x.high * y.low + x.low * y.high))
+
+
+def _multiply(x: Any, y: Any) -> Any:
+    if not np.iscomplexobj(x.high) and not np.iscomplexobj(y.high):
+        return _multiply_real(x, y)
+    if not np.iscomplexobj(y.high):
+        return _join(_multiply_real(x.real, y), _multiply_real(x.imag, y))
+    if not np.iscomplexobj(x.high):
+        return _multiply(y, x)
+    along = _multiply_real(x.real, y.real) - _multiply_real(x.imag, y.imag)
+    return _join(along, _multiply_real(x.real, y.imag) + _multiply_real(x.imag, y.real))
+
+
+def _join(x: Any, y: Any) -> Any:
+    """Make complex numbers of their parts."""
+    return Pair(x.high + 1j * y.high, x.low + 1j * y.low)
+
+
+def _divide(x: Any, y: Any) -> Any:
+    if np.iscomplexobj(y.high):
+        return _multiply(x, y.conjugate()) / (_multiply_real(y.real, y.real) + _multiply_real(y.imag, y.imag))
+    if np.iscomplexobj(x.high):
+        return _join(_divide(x.real, y), _divide(x.imag, y))
+    first = x.high / y.high
+    second = (x - _multiply_real(Pair(first, 0.0), y)).high / y.high
+    third = (x - _multiply_real(_renew(first, second), y)).high / y.high
+    return _renew(first, second) + Pair(third, 0.0)
+
+
+def _root(x: Any) -> Any:
+    near = np.sqrt(x.high)
+    lost = (x - _multiply_real(Pair(near, 0.0), Pair(near, 0.0))).high
+    return _renew(near, np.where(near == 0.0, 0.0, lost / (2.0 * near)))
+
+
+def _turn(x: Any) -> tuple[Any, Any]:
+    """Compute sine and cosine by their series, of what quarter turns leave."""
+    quarters = np.rint(x.high / (0.5 * np.pi))
+    rest = x
+    for part in (0.5 * np.pi, 0.5 * PI_LOW, HALF_PI_LOWEST):
+        rest = rest - _multiply_real(Pair(quarters, 0.0), Pair(np.asarray(part), 0.0))
+    square = _multiply_real(rest, rest)
+    sums = []
+    for last in (TERMS, TERMS - 1):
+        total = Pair(np.ones_like(rest.high), np.zeros_like(rest.high))
+        for k in range(last, 1, -2):
+            total = 1.0 - square * total / float(k * (k - 1))
+        sums.append(total)
+    sine, cosine = rest * sums[0], sums[1]
+    odd, turned = quarters % 2.0 == 1.0, (quarters % 4.0 >= 2.0, (quarters + 1.0) % 4.0 >= 2.0)
+    sine, cosine = _choose(odd, cosine, sine), _choose(odd, sine, cosine)
+    return _choose(turned[0], -sine, sine), _choose(turned[1], -cosine, cosine)
+
+
+def _find_angle(y: Any, x: Any) -> Any:
+    near = Pair(np.arctan2(y.high, x.high), 0.0)
+    sine, cosine = _turn(near)
+    lost = (y * cosine - x * sine) / (x * cosine + y * sine)
+    return _choose(np.isfinite(lost.high), near + lost, near)
+
+
+def _find_size(x: Any) -> Any:
+    if not np.iscomplexobj(x.high):
+        return _choose(x.high < 0.0, -x, x)
+    unit = np.ldexp(1.0, np.frexp(np.abs(x.high))[1])  # whose square stays in the range of doubles
+    along, across = x.real / unit, x.imag / unit
+    return _root(along * along + across * across) * unit
+
+
+def _compare(function: Any) -> Callable[[Any, Any], Any]:
+    return lambda x, y: function((x - y).high, 0.0)
+
+
+def _take_remainder(x: Any, y: Any) -> Any:
+    return x - y * np.floor(x.high / y.high)
+
+
+FUNCTIONS: dict[Any, Callable[..., Any]] = {
+    np.add: _add,
+    np.subtract: lambda x, y: _add(x, -y),
+    np.multiply: _multiply,
+    np.divide: _divide,
+    np.negative: lambda x: Pair(-x.high, -x.low),
+    np.sqrt: _root,
+    np.sin: lambda x: _turn(x)[0],
+    np.cos: lambda x: _turn(x)[1],
+    np.tan: lambda x: _divide(*_turn(x)),
+    np.arctan2: _find_angle,
+    np.absolute: _find_size,
+    np.conjugate: lambda x: x.conjugate(),
+    np.remainder: _take_remainder,
+    np.fmod: lambda x, y: x - y * np.trunc(x.high / y.high),
+    **{
+        function: _compare(function)
+        for function in (np.less, np.less_equal, np.greater, np.greater_equal, np.equal, np.not_equal)
+    },
+    **{function: lambda x, f=function: f(x.high) for function in (np.sign, np.isnan, np.isfinite)},
+    np.rint: lambda x: Pair(np.rint(x.high), 0.0),
+    np.frexp: lambda x: np.frexp(x.high),
+    np.copysign: lambda x, y: np.copysign(x.high, y.high),
+}
