@@ -10,7 +10,7 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import dot, is_any, namespace, polar, select
+from fourbar.formulas.arithmetic import dot, is_any, namespace, polar, select, sine_of, vector
 from fourbar.formulas.longer import Pair
 from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, SECOND_PIN, FourBar, require, require_whole
@@ -45,11 +45,12 @@ class SpringEnd(NamedTuple):
 
     def from_pin(self, pin: str, state: State) -> tuple[Any, Any]:
         """Return the vector from one of the bar's pins in the bar's frame, complex, m, and the square of its length."""
-        vector = self.of(state)
+        arm = self.of(state)
         if pin != SECOND_PIN[self.bar]:
-            return vector, self.distance * self.distance
-        vector = vector - state.lengths[self.bar - 1]
-        return vector, dot(vector, vector)
+            return arm, self.distance * self.distance
+        half = sine_of(0.5 * self.angle)  # r cos phi - L beside the pin, where the cosine is 1 in any digits
+        arm = vector((self.distance - state.lengths[self.bar - 1]) - 2.0 * self.distance * half * half, arm.imag)
+        return arm, dot(arm, arm)
 
     def arm(self, state: State) -> Any:
         """From the bar's first pin, complex, m, world axes."""

@@ -127,6 +127,11 @@ def polar(r: Number, phi: Number) -> Number:
     return r * of.cos(phi) + 1j * (r * of.sin(phi))
 
 
+def sine_of(x: Number) -> Number:
+    """Compute sin x, of Python's own floats as such."""
+    return math.sin(x) if type(x) is float else namespace(x).sin(x)
+
+
 def angle(u: Number) -> Number:
     """Angle of a complex number, rad, in [-pi, pi]."""
     return cmath.phase(u) if type(u) is complex else namespace(u).atan2(u.imag, u.real)
