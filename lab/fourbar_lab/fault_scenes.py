@@ -25,6 +25,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import Law
 from fourbar.scene.point import Point
+from fourbar_validation.scenes.suites import read_default_suite
 
 CRANK = FourBar(
     0.3,
@@ -220,3 +221,7 @@ FAULT_SCENES: dict[str, Scene] = {
     "simulated, quickening": Scene(CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), 4, effects=(Flywheel(0.003, 4),)),
 }
 """By the name under which an entry of faults.toml tries its fault; those called "shipped" judge what else is."""
+CAPABILITIES = read_default_suite()
+for index in range(len(CAPABILITIES)):
+    if (name := CAPABILITIES.name(index)) in CAPABILITIES.not_drawn:
+        FAULT_SCENES |= {f"{judged}, {name}": CAPABILITIES.scene(index) for judged in ("simulated", "shipped")}

@@ -12,6 +12,8 @@ import pytest
 from fourbar.scene import Scene
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.run import pool
+from fourbar_validation.run.judge import judge
+from fourbar_validation.run.question import FREE_BODY
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Files, Random, read_default_suite
@@ -54,6 +56,16 @@ def test_the_default_suite_uses_every_capability() -> None:
     wanted |= {"load in world axes", "load in bar axes", "load over a table", "tolerances", "points"}
     wanted |= {"law with ends rest", "periodic law that begins late", "released with a flywheel"}
     assert wanted <= used
+
+
+SUITE = read_default_suite()
+
+
+@pytest.mark.parametrize("index", range(len(SUITE)), ids=[SUITE.name(i) for i in range(len(SUITE))])
+def test_every_scene_of_it_holds(index: int) -> None:
+    rows = judge(SUITE.name(index), SUITE.scene(index), [FREE_BODY], order=False).rows
+    assert not [row for row in rows if row.failed]
+    assert any(row.compared and row.engine == FREE_BODY.name for row in rows)
 
 
 @pytest.mark.parametrize(("count", "sample", "shipped"), [(6, 30, 6), (60, 30, 30), (1000, 30, 30), (6, 0, 0)])
