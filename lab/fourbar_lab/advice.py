@@ -1,25 +1,34 @@
-"""How good the advice is, on linkages that it has never seen: met, and how near the cheapest."""
+"""How good the advice is, on linkages that it has never seen: met, and how near the cheapest of a search."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
+from statistics import median
 
 import click
 import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.formulas.mobility import turns_fully
+from fourbar.mjcf import Settings
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
-from fourbar_lab.exhaustive import find_cheapest, time_relative_costs
-from fourbar_validation.advise.advise import advise
+from fourbar_validation.advise.advise import MOST_STEPS, advise
 from fourbar_validation.advise.matters import judge_trial
-from fourbar_validation.engines.mujoco.trial import TrialSetup
+from fourbar_validation.cost.study import time_in_turns
+from fourbar_validation.engines.mujoco.trial import FEWEST_STEPS, TrialSetup, make_settings
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
+COARSE, FINE = 2.0, 2.0 ** (1.0 / 3.0)
+"""Ratios of the ladder of steps: first by factors of two, then thirds of an octave below what serves."""
+TIME_CONSTANTS = (3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 120.0, 300.0)
+FIRST_ORDER = ("Euler", "implicit", "implicitfast", "discrete")
+FIRST_ORDER_TIME_CONSTANTS = (2.0, 3.0, 6.0, 12.0)
+ROUNDS, STEPS = 15, 400
 LAB = Path(__file__).parent
 TYPES = tuple(kind for kind in DrawnType if kind is not DrawnType.ROCKER_CRANK)
 SPEEDS = (-1.0, 3.0)
@@ -33,6 +42,56 @@ GENTLE = 0.02
 POSITIONS, DENSER, SEARCHED = 36, 4, 2
 """Intervals of the scene; the answer is judged at so many times more, the search decides at so many times more."""
 NEEDED_MET, NEEDED_CHEAP, CHEAP = 0.95, 0.80, 3.0
+
+
+def time_relative_costs(setup: TrialSetup) -> dict[tuple[str, bool], float]:
+    """Time a step by integrator and pads, relative to RK4 with pads: medians of interleaved rounds."""
+    kinds = [("RK4", True), ("RK4", False), *((name, False) for name in FIRST_ORDER)]
+    clocks = {kind: setup.seconds_per_step(change_kind(kind, make_settings(628.0, 20.0))) for kind in kinds}
+    times = time_in_turns({kind: partial(clock, STEPS) for kind, clock in clocks.items()}, ROUNDS)
+    reference = median(times["RK4", True])
+    return {kind: median(values) / reference for kind, values in times.items()}
+
+
+def change_kind(kind: tuple[str, bool], settings: Settings) -> Settings:
+    """Change the integrator, and leave out the pads where requested."""
+    integrator, pads = kind
+    return replace(settings, integrator=integrator, pad=settings.pad if pads else None)
+
+
+def find_cheapest(setup: TrialSetup, error: float, costs: Mapping[tuple[str, bool], float]) -> float | None:
+    """Try every integrator, with and without pads, over time constants and steps: the least cost of a run that serves.
+
+    In recommended RK4 steps; None where nothing serves.
+    """
+    best: float | None = None
+    for kind, ratio in costs.items():
+        fourth_order = kind[0] == "RK4"
+        for tc in TIME_CONSTANTS if fourth_order else FIRST_ORDER_TIME_CONSTANTS:
+            most = MOST_STEPS if best is None else best / ratio
+            if not fourth_order and best is not None and not _serves(setup, kind, tc, most / FINE, error):
+                continue  # not even with as many steps as the best costs
+            steps = _find_least_steps(setup, kind, tc, most, error)
+            if steps is not None and (best is None or steps * ratio < best):
+                best = steps * ratio
+    return best
+
+
+def _find_least_steps(setup: TrialSetup, kind: tuple[str, bool], tc: float, most: float, error: float) -> int | None:
+    """Find the least steps of the ladder, fewer than `most`, that serve."""
+    n = FEWEST_STEPS
+    while n < most:
+        if _serves(setup, kind, tc, n, error):
+            finer = (each for each in (n / FINE**2, n / FINE) if _serves(setup, kind, tc, each, error))
+            return int(next(finer, n) + 0.5)
+        n *= COARSE
+    return None
+
+
+def _serves(setup: TrialSetup, kind: tuple[str, bool], tc: float, steps: float, error: float) -> bool:
+    per_run = setup.steps(make_settings(1000.0, tc)) / 1000.0
+    trial = setup.try_out(change_kind(kind, make_settings(steps / per_run, tc)))
+    return judge_trial(setup.scene, trial).worst <= error
 
 
 @dataclass(frozen=True, slots=True)

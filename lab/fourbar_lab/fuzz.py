@@ -1,32 +1,74 @@
-"""The command: random scenes through files, formulas and exact engines, or bounds; findings are shrunk and kept."""
+"""Random scenes through files, formulas and exact engines, or bounds; what fails is made smaller and kept.
 
+Even numbers are ordinary scenes, odd ones adversarial; scene i depends on the seed and i alone.
+"""
+
+import json
+import math
+import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
 
-from fourbar.files import dump, loads
+from fourbar.errors import FourBarError, InputError
+from fourbar.files import dump, loads, save
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar_lab import outside
-from fourbar_lab.fuzz_scenes import draw_fuzz_scene
-from fourbar_lab.shrink import keep, shrink_scene
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, say_error
 from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, find_margin
 from fourbar_validation.engines import workers as processes
 from fourbar_validation.engines.hard_suite import hold_fully
 from fourbar_validation.engines.witnesses import WITNESSES, make_prediction
+from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.store import Store
+from fourbar_validation.scenes.random import Ranges, draw_chance, draw_decades, draw_product, draw_scene, draw_uniform
 
+POSITIONS = 2
+SIZES = {False: draw_decades(-0.7, 0.7), True: draw_decades(-6.0, 6.0)}
+"""Lengths, masses, speeds and loads: ordinary, adversarial."""
+ORDINARY = Ranges(
+    mass=SIZES[False],
+    inertia=draw_uniform(0.02, 0.4),
+    centre=draw_uniform(-1.0, 2.0),
+    centre_angle=draw_chance(0.5, draw_uniform(-3.0, 3.0)),
+    load=draw_uniform(-1.0, 1.0),
+    without_force=0.2,
+    speed=draw_chance(0.95, SIZES[False]),
+    viscous=0.2,
+    friction=0.1,
+)
+RANGES = {
+    False: ORDINARY,
+    True: replace(
+        ORDINARY,
+        mass=draw_chance(0.85, SIZES[True]),
+        inertia=draw_chance(0.85, ORDINARY.inertia),
+        centre=draw_product(ORDINARY.centre, draw_chance(0.2, draw_decades(0.0, 3.0), 1.0)),
+        ground_angle=lambda rng: float(rng.choice([0.0, math.pi, rng.uniform(-3.2, 3.2)])),
+        load=draw_product(ORDINARY.load, SIZES[True]),
+        speed=draw_chance(0.95, SIZES[True]),
+    ),
+}
+"""What the scenes are drawn from: ordinary, adversarial."""
+KEPT = Path("results/counterexamples") if CHECKOUT is None else CHECKOUT / "tests" / "counterexamples"
+DIGITS = (1, 2, 3, 6, 10)
+ROUNDS = 4
+NUMBER = re.compile(r'(?<=")-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?= )')
+"""Of a quantity, before its unit."""
+NEEDED = ("[motion]", "theta_2", "omega_2")
+"""A scene without them has no torque, and fails for another reason."""
 LAB = Path(__file__).parent
 EXACT = tuple(hold_fully(w) for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body"))
 """The exact engines, held to full accuracy or to what was predicted for the position."""
@@ -35,6 +77,116 @@ CHUNK, CHUNK_OF_PROOFS = 200, 10
 SHOWN = 20
 LOST = "worker:"
 """How the discrepancy of a scene begins that killed its worker, or never came back."""
+
+
+def draw_fuzz_scene(seed: int, index: int) -> Scene:
+    """Draw a scene, anew until its lengths can close at all."""
+    rng = np.random.default_rng([seed, index])
+    while True:
+        try:
+            return _draw(rng, index % 2 == 1)
+        except InputError:
+            continue
+
+
+def _draw(rng: np.random.Generator, hard: bool) -> Scene:
+    size = SIZES[hard](rng)
+    lengths = tuple(float(x * size) for x in _draw_lengths(rng, hard))
+    scene = draw_scene(rng, lengths, RANGES[hard])
+    psi = _draw_angles(rng, hard, lengths)
+    alpha = float(rng.uniform(-10.0, 10.0)) if rng.random() < 1.0 / 3.0 else scene.motion.alpha_2
+    motion = replace(scene.motion, theta_2=scene.linkage.ground_angle + psi, alpha_2=alpha)
+    return replace(scene, motion=motion)
+
+
+def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
+    """(ground, input, coupler, output), some of them equal, in extreme ratios, or near s + l = p + q."""
+    choice = rng.random() if hard else 1.0
+    x = rng.uniform(0.1, 1.0, 4)
+    if choice < 0.1:
+        return (x[0], x[1], x[0], x[1])
+    if choice < 0.2:
+        return (x[0], x[1], x[1], x[0]) if rng.random() < 0.5 else (x[0], x[0], x[1], x[1])
+    if choice < 0.35:
+        return (
+            x[0],
+            x[1],
+            x[2],
+            x[0] + x[1] - x[2] + float(rng.choice([0.0, 1.0, -1.0])) * 10.0 ** rng.uniform(-15, -3),
+        )
+    if choice < 0.6:
+        small = 10.0 ** rng.uniform(-6, 0, 2)
+        k = rng.permutation(4)
+        x[k[0]] *= small[0]
+        if rng.random() < 0.3:
+            x[k[1]] *= small[1]
+    return x
+
+
+def _draw_angles(rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]) -> Any:
+    """theta_2 - theta_1: anywhere, or near a limit position, a change point, or many turns away."""
+    psi = rng.uniform(-3.2, 3.2, POSITIONS)
+    if not hard:
+        return psi
+    d, a, b, c = lengths
+    choice = rng.random()
+    if choice < 0.5:
+        diagonal = b + c if rng.random() < 0.5 else abs(b - c)
+        cosine = (a * a + d * d - diagonal**2) / (2 * a * d)
+        base = math.acos(min(1.0, max(-1.0, cosine)))
+        psi = float(rng.choice([-1.0, 1.0])) * base + rng.choice([-1.0, 1.0], POSITIONS) * 10.0 ** rng.uniform(
+            -14, -1, POSITIONS
+        )
+    elif choice < 0.6:
+        psi = float(rng.choice([0.0, math.pi])) + rng.choice([-1.0, 0.0, 1.0], POSITIONS) * 10.0 ** rng.uniform(
+            -9, -1, POSITIONS
+        )
+    elif choice < 0.65:
+        psi = psi + 2 * math.pi * rng.integers(-1000, 1000)
+    return psi
+
+
+def shrink_scene(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
+    """Simplify a scene by one change of its file at a time while it fails."""
+    lines = dump(scene).splitlines()
+    for _ in range(ROUNDS):
+        before = lines
+        for number in reversed(range(len(lines))):  # what a change takes away lies behind
+            for simpler in _list_simpler(lines, number):
+                try:
+                    other = loads("\n".join(simpler))
+                    if fails(other):
+                        scene, lines = other, simpler
+                        break
+                except FourBarError:  # no scene any more
+                    continue
+        if lines == before:
+            break
+    return scene
+
+
+def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
+    """Leave out one line, or the table that it begins, or put a simpler entry in the line."""
+    line, until = lines[number], number + 1
+    if line.startswith("["):
+        until = next((i for i in range(until, len(lines)) if lines[i].startswith("[")), len(lines))
+    if not line.startswith(NEEDED):
+        yield [*lines[:number], *lines[until:]]
+    key, _, value = line.partition(" = ")
+    entries = [f"{key} = {json.dumps(each)}" for each in json.loads(value)] if value.startswith('["') else []
+    for digits in DIGITS:
+        entries.append(NUMBER.sub(lambda found, digits=digits: f"{float(found[0]):.{digits}g}", line))  # type: ignore[misc]
+    for entry in entries:
+        if entry != line:
+            yield [*lines[:number], entry, *lines[number + 1 :]]
+
+
+def keep(scene: Scene, name: str, folder: Path = KEPT) -> Path:
+    """Write a counter-example where the tests find it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}.toml"
+    save(scene, path)
+    return path
 
 
 def list_findings(scene: Scene) -> list[str]:

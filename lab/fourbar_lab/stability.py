@@ -17,8 +17,7 @@ from fourbar.scene.motion import Motion
 from fourbar.solution import Solution
 from fourbar.solve import solve
 from fourbar_lab.families import FAMILIES
-from fourbar_lab.libraries import LIBRARIES, evaluate
-from fourbar_lab.slopes import judge_slopes
+from fourbar_lab.slopes import LIBRARIES, evaluate, judge_slopes
 from fourbar_lab.tally import (
     HALF_A_DIGIT,
     TOO_LARGE,

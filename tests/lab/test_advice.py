@@ -8,8 +8,8 @@ import pytest
 import fourbar
 from fourbar.scene import command
 from fourbar_lab import advice
+from fourbar_lab.advice import find_cheapest
 from fourbar_lab.cli import status as ended
-from fourbar_lab.exhaustive import find_cheapest
 from fourbar_validation.advise import advise
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from tests.validation.cost.test_cost import turning

@@ -17,9 +17,7 @@ from fourbar.studies.enclosure import Extreme, Extremes
 from fourbar.studies.sloped import Sloped
 from fourbar_lab import fuzz as examine
 from fourbar_lab import outside
-from fourbar_lab.fuzz import LAB, run
-from fourbar_lab.fuzz_scenes import draw_fuzz_scene
-from fourbar_lab.shrink import KEPT, keep, shrink_scene
+from fourbar_lab.fuzz import KEPT, LAB, draw_fuzz_scene, keep, run, shrink_scene
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.store import Store
 from tests.fourbar.studies.test_enclosure import meeting

@@ -9,11 +9,9 @@ import pytest
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas import torque
 from fourbar.scene import command as command_of
-from fourbar_lab import code_mutants
 from fourbar_lab import mutants as harness
 from fourbar_lab.cli import status as ended
-from fourbar_lab.code_mutants import compile_mutants
-from fourbar_lab.mutants import compute_numbers, is_caught, is_changed
+from fourbar_lab.mutants import compile_mutants, compute_numbers, is_caught, is_changed
 from tests.support.scenes import crank_rocker
 
 SCENE = crank_rocker()
@@ -89,7 +87,7 @@ def test_every_operator_and_number_of_functions_methods_and_properties_is_change
 def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
     verdicts: list[bool | None], status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    some = [code_mutants.Mutant(str(n), lambda: None, (lambda: None).__code__) for n, _ in enumerate(verdicts)]  # type: ignore[arg-type]
+    some = [harness.Mutant(str(n), lambda: None, (lambda: None).__code__) for n, _ in enumerate(verdicts)]  # type: ignore[arg-type]
     each = iter(verdicts)
     monkeypatch.setattr(harness, "make_baselines", list)
     monkeypatch.setattr(harness, "compile_mutants", lambda _: some)

@@ -78,11 +78,9 @@ JUDGED_BY = {
     "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
     "templating",
     # studies: each through its command
-    "lab/test_advice.py": "lab: exhaustive",
     "lab/test_bench.py": "lab: contenders",
-    "lab/test_stability.py": "lab: families libraries slopes tally",
-    "lab/test_fuzz.py": "lab: outside fuzz_scenes shrink",
-    "lab/test_mutants.py": "lab: code_mutants",
+    "lab/test_stability.py": "lab: families slopes tally",
+    "lab/test_fuzz.py": "lab: outside",
     "lab/test_faults.py": "lab: fault_scenes injection",
     "validation/cost/test_cost.py": "validation/cost: series formulas laws pictures study; "
     "validation/advise: worst_errors; validation/engines/mujoco: one_state",
