@@ -38,7 +38,7 @@ LAYERS = {
         "compare scenes",
         "engines",
         "report",
-        "regression",
+        "engine regression",
         "advise check published run",
         "cost lab",
         "cli",
@@ -50,7 +50,7 @@ ON_ONE_FLOOR = {
     ("scenes", "compare"),
 }
 """Of two layers on one floor the first may use the second."""
-MOST = {"fourbar": 16, "fourbar_validation": 14}
+MOST = {"fourbar": 16, "fourbar_validation": 15}
 """Entries at a package's own level, dunder files not counted: what a stranger can take in at a glance."""
 
 

@@ -22,7 +22,7 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines import added, workers
+from fourbar_validation.engines import workers
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.machine import CODE, build, hash_modules, name_code
 from fourbar_validation.report.record import Record
@@ -34,7 +34,7 @@ from fourbar_validation.run.store import RunningError, Store
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, read_scene_files
 from tests.support.here import judge_here
-from tests.support.unlucky import Few, Unlucky, dies_at_first
+from tests.support.unlucky import Few, Moody, Unlucky, dies_at_first
 
 SEED = 7
 KILLS = int(os.environ.get("KILLS", "1"))
@@ -63,8 +63,8 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     hangs = 2.0 * max(1.0, load / (os.cpu_count() or 1))  # s; a busy machine is given longer
-    moody = added.read_witnesses(["tests.support.unlucky:Moody"], ())
-    judge_all(Few(), tmp_path / "run", (*EXACT, *moody), seconds=hangs)
+    moody = Witness("moody", Moody, EQUIVALENCE)
+    judge_all(Few(), tmp_path / "run", (*EXACT, moody), seconds=hangs)
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
     failing = {(row.scene, row.engine): row.reason for row in rows if row.verdict == FAILS}
     assert set(failing) == {("b", "moody"), ("c", "moody")}

@@ -58,7 +58,7 @@ JUDGED_BY = {
     "validation/engines/test_engines.py": "validation/engines: ball_drive ball_vectors balls description "
     "drake exudyn exudyn_elements limits loaded loop opensim pinocchio prediction tree witnesses; "
     "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
-    "validation/engines/test_added_guests.py": "validation/engines: checked output workers",
+    "validation/engines/test_guests.py": "validation: engine; validation/engines: keeper output workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects free_body_stroke",
     "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
     "validation/engines: exact; validation/engines/mujoco: shipped; "

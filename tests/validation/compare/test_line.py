@@ -11,8 +11,8 @@ import fourbar
 from fourbar.effects import LinearDrive, SpringEnd
 from fourbar.scene import Scene
 from fourbar_validation.compare.rows import AGREES, FAILS
-from fourbar_validation.engines.checked import Checked
 from fourbar_validation.engines.exact import BallArithmetic
+from fourbar_validation.engines.guests import Asked, Hello, Program
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, Witness
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
@@ -114,17 +114,10 @@ def test_a_fault_in_the_drive_is_caught(monkeypatch: pytest.MonkeyPatch, fault: 
     assert [row for row in rows if row.verdict == FAILS]
 
 
-class Outside:
-    """A witness from outside that does not know of lines."""
-
-    name = "outside"
-
-    def answer(self, scene: Any, command: Any) -> Any:
-        raise AssertionError("it is not asked")
-
-
 def test_who_cannot_do_it_refuses_in_one_line_that_names_it() -> None:
     scene = driven(1, 4)
     assert "the linear drive (drive.from, drive.to)" in BallArithmetic().answer(scene, fourbar.command(scene)).refusal
-    answer = Checked("outside", f"{__name__}:Outside").answer(scene, fourbar.command(scene))
-    assert answer.refusal == "it does not declare linear_drive"
+    outside = Asked("outside", Program(("none",)), Hello("outside"))
+    assert (
+        outside.answer(scene, fourbar.command(scene)).refusal == "it does not name gravity, cylinder among its effects"
+    )

@@ -15,7 +15,7 @@ import pytest
 
 import fourbar
 from fourbar_validation.compare.rows import FAILS, Row, write_rows
-from fourbar_validation.engines import added
+from fourbar_validation.engines import guests
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
 from fourbar_validation.report import colours
 from fourbar_validation.report.colours import choose_style
@@ -203,16 +203,16 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.Monkey
 def test_every_witness_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever is drawn first, and in whatever process: the witness says its number."""
     monkeypatch.setattr(colours, "NUMBERS", {})
-    guests = "tests.validation.engines.test_added_guests:"
-    witnesses = added.read_witnesses(
-        [f"{guests}Right", f"{guests}Leaves"], [each.name for each in (*WITNESSES, *FURTHER)]
+    classes = "tests.support.hostile_class:"
+    witnesses = guests.read_guests(
+        [f"{classes}Right", f"{classes}Leaves"], [each.name for each in (*WITNESSES, *FURTHER)]
     )
     names = [each.name for each in (*WITNESSES, *FURTHER, *witnesses)]
-    colours.NUMBERS.update(added.list_numbers(witnesses))
+    colours.NUMBERS.update(guests.list_numbers(witnesses))
     marks = {name: (choose_style(name).symbol, choose_style(name).marker) for name in names}
     assert len({mark for mark, _ in marks.values()}) == len({marker for _, marker in marks.values()}) == len(names)
     colours.NUMBERS.clear()
-    colours.NUMBERS.update(added.list_numbers(witnesses[1:]))  # a scene in which the first broke down
+    colours.NUMBERS.update(guests.list_numbers(witnesses[1:]))  # a scene in which the first broke down
     assert choose_style(names[-1]).symbol == marks[names[-1]][0]
     assert all(choose_style(name).colour in colours.VARIABLES for name in names)
 

@@ -35,6 +35,12 @@ def keep_printed(outputs: dict[str, str], engine: str) -> Iterator[None]:
             outputs[engine] = outputs.get(engine, "") + text
 
 
+def print_kept(data: bytes) -> None:
+    """Add what a program outside printed to what this process keeps; nothing where it keeps none."""
+    if _file and data:
+        _file[0].write(data)
+
+
 def take_printed() -> str:
     """Take what was printed since the last call, as plain text; nothing where this process does not keep it."""
     if not _file:

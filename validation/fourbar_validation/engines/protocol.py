@@ -208,7 +208,7 @@ def answer_to_json(scene: Scene, command: Command, answer: Answer) -> dict[str, 
     if answer.refusal is not None:
         return {"refusal": answer.refusal, "setting": answer.setting}
     data: dict[str, Any] = {"answers": {name: _write_array(array) for name, array in answer.quantities.items()}}
-    if answer.at is not None and answer.at is not command and command.stroke is None:
+    if answer.at is not None and answer.at is not command:
         data["at"] = command_to_json(scene, answer.at)
     if answer.assembled is not None:
         data["assembled"] = np.asarray(answer.assembled, dtype=bool).tolist()
@@ -221,7 +221,10 @@ def answer_to_json(scene: Scene, command: Command, answer: Answer) -> dict[str, 
 
 def _write_array(array: Array) -> list[Any]:
     """Write numbers or pairs of them; null where there is no finite number."""
-    array = np.asarray(array, dtype=float)
+    given = np.asarray(array)
+    if given.dtype.kind not in "iuf":
+        raise TypeError(f"an answer holds real numbers, not {given.dtype}")
+    array = given.astype(float)
     finite = np.isfinite(array)
     values: Any = array if finite.all() else np.where(finite, array, np.full(array.shape, None))
     return values.tolist()  # type: ignore[no-any-return]
@@ -321,30 +324,39 @@ def _read_assembled(value: Any, quantities: dict[str, Array], n: int) -> Any:
 
 
 def read_motion(data: Any, command: Command) -> Command:
-    """Read the motion that an engine made, which must be near the one that was commanded; left out: the same."""
-    if data is None or command.stroke is not None:  # of a stroke nothing of the bar is commanded
+    """Read the motion that an engine made; left out: the command."""
+    if data is None:
         return command
-    names = COMMANDS[command.bar]
-    if _find_names(data) != names:
-        raise InputError("at", sorted(data), f"must have {names[0]}, as the command has")
-    if ("branch" in data and not np.array_equal(_read_branch(data["branch"], len(command.angle)), command.branch)) or (
-        (data.get(names[1]) is None) != (command.speed is None)
-    ):
-        raise InputError("at", sorted(data), "must have the branch of the command, and speeds where that has")
-    n, made = len(command.angle), dict[str, Any]()
+    names, n = _find_names(data), len(command.angle)
+    if names not in (KINDS_OF_COMMAND[:-1] if command.stroke is not None else (COMMANDS[command.bar],)):
+        raise InputError("at", sorted(data), f"must have {command.commanded}, or for a stroke an angle of its bar")
+    bar = next(bar for bar, each in COMMANDS.items() if each == names)
+    branch = _read_branch(data["branch"], n) if "branch" in data else command.branch
+    speed, acceleration = (_read_rate(key, data[key], n) if data.get(key) is not None else None for key in names[1:])
+    if acceleration is None:
+        acceleration = command.acceleration if command.stroke is None else 0.0
+    made = Command(_read_list(names[0], data[names[0]], n), branch, speed, acceleration, bar=bar)
+    if command.stroke is not None:  # of a stroke nothing of the bar is commanded: who asked knows its motion
+        return made
+    require_near(made, command)
+    own: dict[str, Any] = {"angle": made.angle, "speed": speed, "acceleration": acceleration}
+    if all(np.array_equal(value, getattr(command, name)) for name, value in own.items()):
+        return command
+    return command._replace(**own, remainder=None)
+
+
+def require_near(made: Command, command: Command) -> None:
+    """Raise InputError where the motion that an engine made is no answer to the command."""
+    same = made.bar == command.bar and np.array_equal(made.branch, command.branch)
+    if not same or (made.speed is None) != (command.speed is None):
+        raise InputError("at", made.commanded, "must have the bar and branch of the command, and speeds where that has")
     speed, acceleration = (0.0 if x is None else float(np.abs(x).max()) for x in (command.speed, command.acceleration))
-    for name, key, size in zip(
-        ("angle", "speed", "acceleration"), names, (1.0, speed, speed**2 + acceleration), strict=True
-    ):
-        commanded = getattr(command, name)
-        if commanded is None or data.get(key) is None:
-            continue
-        made[name] = _read_list(key, data[key], n) if name == "angle" else _read_rate(key, data[key], n)
-        if not np.abs(made[name] - commanded).max() <= FURTHEST * size:
+    sizes = (1.0, speed, speed**2 + acceleration)
+    for key, name, size in zip(COMMANDS[command.bar], ("angle", "speed", "acceleration"), sizes, strict=True):
+        value, commanded = getattr(made, name), getattr(command, name)
+        if value is not None and not np.abs(value - commanded).max() <= FURTHEST * size:
             allowed = f"is too far from the command: it must be within {FURTHEST * size:g} of it"
             raise InputError(f"at.{key}", None, allowed)
-    same = all(np.array_equal(value, getattr(command, name)) for name, value in made.items())
-    return command if same else command._replace(**made, remainder=None)
 
 
 def release_to_json(scene: Scene) -> dict[str, Any]:

@@ -69,15 +69,15 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
 @click.option(
     "--witness",
     "adapters",
-    metavar="MODULE:CLASS",
+    metavar="MODULE:CLASS|COMMAND",
     multiple=True,
-    help="A witness of your own, to judge with the others (docs/adding-a-witness.md).",
+    help="An engine of your own, a class or a program, to judge with the others (docs/protocol.md).",
 )
 @click.option(
     "--time-limit",
     type=click.FloatRange(min=0.0, min_open=True),
     metavar="SECONDS",
-    help="End what takes longer on one scene; left out: a minute, and more for many positions.",
+    help="End a --witness that takes longer for one answer; left out: a minute, and more for many positions.",
 )
 @click.option(
     "--sample-shipped",
@@ -127,7 +127,7 @@ def command(
                 require_file(path, *scenes)
     if against is not None:
         open_run(find_baseline(against), "--against")  # before anything runs
-    suite, witnesses = select_scenes(scenes, named, count, seed or 0, types or ALL_TYPES, adapters)
+    suite, witnesses = select_scenes(scenes, named, count, seed or 0, types or ALL_TYPES, adapters, time_limit)
     if wanted is not None:
         from fourbar_validation.run.required_error import adjust_witnesses
 
@@ -139,8 +139,8 @@ def command(
         passed_on = [*map(os.path.abspath, scenes), "--no-pictures", *(f"--witness={adapter}" for adapter in adapters)]
         passed_on += [f"{option}={value}" for option, value in the_same.items() if value is not None]
         against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
-    present, missing = find_askable(choose_witnesses(engines, witnesses, adapters), by_name=engines is not None)
-    options = RunOptions(workers, scheduler, time_limit, not no_pictures, sample)
+    present, missing = find_askable(choose_witnesses(engines, witnesses), by_name=engines is not None)
+    options = RunOptions(workers, scheduler, drawn=not no_pictures, sample=sample)
     result = show_progress(len(suite), run(suite, out, present, options, missing))
     print_table(result, out)
     worse = _report_differences(against, out, forms, result.verdict)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.rows import FORMULAS, Row
-from fourbar_validation.engines.added import list_numbers
+from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.report.colours import NUMBERS
 from fourbar_validation.report.record import Record

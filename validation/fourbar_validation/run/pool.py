@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from fourbar_validation.compare.rows import make_breakdown, make_plain
 from fourbar_validation.engines import workers as processes
+from fourbar_validation.engines.guests import QUESTIONS, Guest
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge_for_report
@@ -90,6 +91,8 @@ def judge_chunks(
     """Judge chunks of scenes, each as it is done; `seconds`: after which a scene is taken to hang."""
     made = ((number, make_jobs(suite, scenes, witnesses, draw, sample)) for number, scenes in chunks)
     seconds = find_longest(suite) if seconds is None else seconds
+    guests = [guest.seconds or find_longest(suite) for guest in witnesses if isinstance(guest, Guest)]
+    seconds += QUESTIONS * sum(guests)  # each of their questions has a limit of its own
     if cluster is not None:
         return cluster.over(judge_job, made, seconds, judge_by_engine)
     return processes.apply_over_processes(judge_job, made, workers, seconds=seconds, instead=judge_by_engine)

@@ -19,6 +19,7 @@ from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import Array, Mask, find_worst
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.output import keep_printed
+from fourbar_validation.engines.protocol import require_near
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.report.record import Record, Timing
 
@@ -170,7 +171,11 @@ def ask_at(engine: Engine, scene: Scene, at: Command) -> Answer:
     """Give an engine what is commanded, and nothing that the formulas computed from it."""
     given = remove_angles(at)
     answer = engine.answer(scene, given)
-    return replace(answer, at=at) if answer.at is given else answer
+    if answer.at is given:
+        return replace(answer, at=at)
+    if at.stroke is not None and answer.at is not None:
+        require_near(answer.at, at)
+    return answer
 
 
 def remove_angles(at: Command) -> Command:

@@ -26,6 +26,7 @@ from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import EQUIVALENCE, divide, find_worst, replace_zero_size
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.witnesses import Witness, find_missing, make_prediction
 from fourbar_validation.report.record import Timing
 from fourbar_validation.run.question import Question, select_positions
@@ -49,6 +50,8 @@ ENGINES = {
     "pinocchio-forward": (_answer_pinocchio, 2e-3, "pinocchio"),
 }
 """What starts it with a step, longest step (s) and library of each engine that integrates by itself."""
+LONGEST_STEP = 2e-3
+"""s, of a guest."""
 FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10, "stopped_at": 1e-9}
 """Errors (rad, of the greatest speed, of the greatest energies, of the duration) at which a free motion agrees: the
 formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify that by its duration, so 5 s is the unit."""
@@ -133,6 +136,9 @@ def check_released(question: Question) -> Iterator[Row]:
             question.left_out.append(f"{fine.engine}: {fine.refusal}")
         return _make_rows(question, fine, coarse, truth)
 
+    for witness in question.witnesses:
+        if isinstance(witness, Guest) and witness.releases:
+            yield from question.attempt(partial(rows, witness.at_step, LONGEST_STEP), witness.name)
     for engine, (start, longest, library) in ENGINES.items():
         if reason := find_missing(library):
             question.left_out.append(f"{engine}: {reason}")

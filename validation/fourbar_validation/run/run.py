@@ -12,7 +12,7 @@ from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.columns import Columns, read_columns
 from fourbar_validation.compare.rows import FAILS, FORMULAS, Row, make_plain, write_csv
 from fourbar_validation.compare.tolerance import IDENTITY
-from fourbar_validation.engines.added import list_numbers
+from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.hard_suite import Hard
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.regression.record import ABOUT, COLUMNS, TABLE, describe_run, write_about

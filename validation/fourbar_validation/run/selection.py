@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fourbar.errors import DependencyError, InputError
-from fourbar_validation.engines import added
+from fourbar_validation.engines.guests import Guest, read_guests
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard, hold_fully
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, Witness
 from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
@@ -12,14 +12,23 @@ from fourbar_validation.scenes.suites import Random, Suite, read_default_suite, 
 
 
 def select_scenes(
-    scenes: tuple[Path, ...], named: str | None, count: int | None, seed: int, types: str, adapters: Sequence[str] = ()
+    scenes: tuple[Path, ...],
+    named: str | None,
+    count: int | None,
+    seed: int,
+    types: str,
+    guests: Sequence[str] = (),
+    seconds: float | None = None,
 ) -> tuple[Suite, tuple[Witness, ...]]:
-    """Select the scenes, and the witnesses with what they are held to there."""
+    """Select the scenes, and the witnesses with what they are held to there.
+
+    `guests`: those of the command line, with the time in which each must answer, s.
+    """
     if named == "hard":
         own = (*HARD_WITNESSES, *map(hold_fully, FURTHER))
-        return Hard(), (*own, *map(hold_fully, _find_added(adapters, own)))
+        return Hard(), (*own, *map(hold_fully, read_guests(guests, [witness.name for witness in own], seconds)))
     own = (*WITNESSES, *FURTHER)
-    witnesses = (*own, *_find_added(adapters, own))
+    witnesses = (*own, *read_guests(guests, [witness.name for witness in own], seconds))
     if named is not None:
         return read_suite(Path(named)), witnesses
     if count:
@@ -27,17 +36,8 @@ def select_scenes(
     return (read_scene_files(scenes) if scenes else read_default_suite()), witnesses
 
 
-def _find_added(adapters: Sequence[str], own: tuple[Witness, ...]) -> tuple[Witness, ...]:
-    """Find the witnesses of the command line (`adapters`, "module:Class"), and those that installed packages bring."""
-    known = [witness.name for witness in own]
-    here = added.read_witnesses(adapters, known)
-    return (*here, *added.find_installed([*known, *(witness.name for witness in here)]))
-
-
-def choose_witnesses(
-    engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES, adapters: Sequence[str] = ()
-) -> tuple[Witness, ...]:
-    """Choose the witnesses named in a comma-separated list, and those of `adapters`, which are named by being given.
+def choose_witnesses(engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES) -> tuple[Witness, ...]:
+    """Choose the witnesses named in a comma-separated list, and the guests, which are named by being given.
 
     Where there is no list, all but those that need not be installed.
     """
@@ -49,9 +49,7 @@ def choose_witnesses(
     for name in names or [engines]:
         if name not in known:
             raise InputError("--engines", name, "must be among " + ", ".join(known))
-    return tuple(
-        witness for name, witness in known.items() if name in names or getattr(witness, "adapter", None) in adapters
-    )
+    return tuple(witness for name, witness in known.items() if name in names or isinstance(witness, Guest))
 
 
 def find_askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:

@@ -1,0 +1,135 @@
+"""Classes that our host serves: free bodies under other names, and what the hostile ones do besides."""
+
+import os
+import sys
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fourbar_validation import Answer
+from fourbar_validation.engines.free_body import FreeBody
+
+
+class Right:
+    name = "right"
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        return FreeBody().answer(scene, at)
+
+
+class Angle(Right):
+    name = "angle"
+    quantities: ClassVar[tuple[str, ...]] = ("theta_3",)
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        answer = super().answer(scene, at)
+        return Answer(self.name, "exact", at, answer.assembled, {"theta_3": answer.quantities["theta_3"]})
+
+
+class OfAnyBar(Right):
+    """What is commanded of a stroke's bar is not given."""
+
+    name = "of any bar"
+    commands = ("theta_4", "stroke")
+    effects = ("gravity", "loads", "cylinder")
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        assert at.stroke is None or np.isnan(at.angle).all()
+        return super().answer(scene, at)
+
+
+class Changes(Right):
+    """Makes every verdict that it can import a good one, and every tolerance wide."""
+
+    name = "changes"
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        from fourbar_validation.compare import compare, rows
+        from fourbar_validation.compare.tolerance import EQUIVALENCE
+        from fourbar_validation.run import judge
+
+        for module in (compare, rows, judge):
+            module.FAILS = module.AGREES = "agrees"  # type: ignore[attr-defined]
+        object.__setattr__(EQUIVALENCE, "factor", 1e30)
+        answer = super().answer(scene, at)
+        answer.quantities["torque"] = 1.01 * answer.quantities["torque"]
+        return answer
+
+
+class Prints(Right):
+    name = "prints"
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        print("\x1b]0;owned\x07begin")
+        sys.stdout.flush()
+        os.system("echo from a shell")
+        raise ValueError("no\nlicence")
+
+
+class Empty(Right):
+    name = "empty"
+
+    def answer(self, scene: Any, at: Any) -> Any:
+        return None
+
+
+class Leaves(Right):
+    name = "leaves"
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        sys.exit(0)
+
+
+class Lacks(Right):
+    """One quantity NaN, one missing."""
+
+    name = "lacks"
+    quantities: ClassVar[tuple[str, ...]] = ("theta_3", "theta_4", "torque")
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        answer = super().answer(scene, at)
+        theta = answer.quantities["theta_3"]
+        return Answer(self.name, "wrong", at, answer.assembled, {"theta_3": theta, "theta_4": np.nan * theta})
+
+
+class Shapes(Right):
+    name = "shapes"
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        answer = super().answer(scene, at)
+        answer.quantities["F12"] = answer.quantities["F12"].T
+        return answer
+
+
+class Complex(Right):
+    name = "complex"
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        answer = super().answer(scene, at)
+        answer.quantities["torque"] = answer.quantities["torque"].astype(complex)
+        return answer
+
+
+class Elsewhere(Right):
+    name = "elsewhere"
+
+    def answer(self, scene: Any, at: Any) -> Answer:
+        return super().answer(scene, at._replace(speed=0.0))
+
+
+class Nameless:
+    pass
+
+
+class Loose(Right):
+    name = "loose"
+    tolerance = (0.1, "")
+
+
+class Else(Right):
+    name = "else"
+    quantities = ("heat",)
+
+
+class OfAnother(Right):
+    name = "free-body"

@@ -1,0 +1,362 @@
+"""Engines outside: what they answer is judged as anybody's, and whatever they do costs their own rows alone."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fourbar
+from fourbar.effects.spring import SpringEnd
+from fourbar.errors import InputError
+from fourbar.files import save
+from fourbar_validation.compare.columns import read_columns
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES
+from fourbar_validation.engines import guests
+from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
+from fourbar_validation.run.judge import judge
+from fourbar_validation.run.run import RunOptions, run
+from fourbar_validation.run.selection import select_scenes
+from fourbar_validation.scenes.suites import read_scene_files
+from tests.support.here import judge_here
+from tests.support.scenes import crank_rocker
+from tests.whole.test_imports import ROOT
+
+HERE = "tests.support.hostile_class:"
+PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
+(PLAIN,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+"""The page's engine in plain Python."""
+TORQUE = '"torque": moments[0] - cross(r2, F32)'
+SCRIPT = ROOT / "tests" / "support" / "plain_engine.mjs"
+SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
+FREE_BODY = tuple(witness for witness in WITNESSES if witness.name == "free-body")
+Verdicts = dict[str, dict[str, tuple[str, str]]]
+
+
+@pytest.fixture(autouse=True)
+def _ended() -> Iterator[None]:
+    yield
+    for running in guests._RUNNING.values():
+        running.end()
+    guests._RUNNING.clear()
+
+
+def judged(scene: fourbar.Scene, *entries: str, seconds: float = 60.0) -> Verdicts:
+    """Verdict and reason by engine and quantity; a name without a colon is a class of tests.support."""
+    entries = tuple(entry if re.search("[: ]", entry) else HERE + entry for entry in entries)
+    witnesses = (*guests.read_guests(entries, [witness.name for witness in FREE_BODY], seconds), *FREE_BODY)
+    result: Verdicts = {}
+    for row in judge("scene", scene, witnesses).rows:
+        result.setdefault(row.engine, {})[row.quantity] = row.verdict, row.reason
+    return result
+
+
+def verdicts(rows: dict[str, tuple[str, str]]) -> set[str]:
+    return {verdict for verdict, _ in rows.values()}
+
+
+def others_agree(found: Verdicts) -> bool:
+    return verdicts(found["formulas"]) == verdicts(found["free-body"]) == {AGREES}
+
+
+@pytest.mark.parametrize("language", ["python", "node"])
+def test_a_program_in_any_language_agrees(language: str, tmp_path: Path) -> None:
+    if language == "node" and shutil.which("node") is None:
+        pytest.skip("no node")
+    rows = judged(SCENE, f"node {SCRIPT}" if language == "node" else write_program(tmp_path, "plain"))["plain"]
+    assert verdicts(rows) == {AGREES}
+    assert {"theta_3", "theta_4", "torque", "torque_inertia", "closure"} <= rows.keys()
+
+
+LAST = '    print(json.dumps({"id": question["id"], **reply}), flush=True)\n'
+AFTER_HELLO = '    if question["ask"] == "hello":\n    ' + LAST + "        continue\n    import os, signal, time\n"
+WHOLE = '    text = json.dumps({"id": question["id"], **reply})\n'
+SAY = "    print(text, flush=True)\n"
+NO_JSON, ENDLESS = "said what is no JSON", "    while True:\n        print(end='x' * 2**20)\n"
+PROGRAMS: dict[str, tuple[str, str, str]] = {
+    "one number short": ("values in found]", "values in found[1:]]", "answers.theta_3 = "),
+    "log line": ("for question in", 'print("started")\nfor question in', f"{NO_JSON} (Expecting value"),
+    "dead": (LAST, f"{AFTER_HELLO}    sys.exit(3)\n", "exit status 3"),
+    "raises": (LAST, f"{AFTER_HELLO}    1 / 0\n", "exit status 1: ZeroDivisionError: division"),
+    "early": (LAST, LAST + LAST, "answered question 1 where 2 was asked"),
+    "for another": (LAST, LAST.replace('question["id"],', 'question["id"] + 1,'), "answered question 2 where 1 was"),
+    "no id": (LAST, LAST.replace('"id": question["id"], ', ""), "said what is no object with an id"),
+    "a list": (LAST, "    print([1], flush=True)\n", "said what is no object with an id: [1]"),
+    "NaN": (TORQUE, '"torque": math.nan', f"{NO_JSON} (NaN is no number"),
+    "1e400": (LAST, f"{WHOLE}    text = text.replace('0.33', '1e400')\n{SAY}", "answers.torque = "),
+    "texts": (TORQUE, '"torque": "1.0"', "answers.torque = "),
+    "booleans": (TORQUE, '"torque": theta > 2', "answers.torque = "),
+    "long integers": (TORQUE, '"torque": 10**400', "answers.torque = "),
+    "repeated key": (LAST, f"{WHOLE}    text = text[:-1] + ', \"id\": 1}}'\n{SAY}", f"{NO_JSON} (a key"),
+    "another code": (LAST, f"{AFTER_HELLO}    sys.stdout.buffer.write(b'\\xff\\n')\n    sys.stdout.flush()\n", NO_JSON),
+    "empty refusal": ('{"answers": {name', '{"refusal": " "} or {"answers": {name', "refusal = "),
+    "own words": ('{"answers": {name', '{"error": "no\\nlicence"} or {"answers": {name', "no licence"),
+    "mid-line": (LAST, f"{WHOLE}    print(end=text[:20])\n    sys.exit()\n", "exit status 0 in the middle of a line"),
+    "closes": (LAST, f"{AFTER_HELLO}    os.close(1)\n    time.sleep(60)\n", "closed its standard output"),
+    "endless": (LAST, ENDLESS, "said more than 1000000 bytes without an end"),
+    "eats memory": (LAST, f"{AFTER_HELLO}    x = [b'x' * 10**6 * i for i in range(999)]\n", "exit status 1: MemoryEr"),
+    "kills its parent": (LAST, f"{AFTER_HELLO}    os.kill(os.getppid(), 9)\n", "was killed"),
+    "kills itself": (LAST, f"{AFTER_HELLO}    os.kill(os.getpid(), 9)\n", "was killed"),
+    "crashes": (LAST, f"{AFTER_HELLO}    os.kill(os.getpid(), 11)\n", "ended by signal 11"),
+}
+"""Replacement in the plain engine, and the reason of its row."""
+SILENT: dict[str, tuple[str, str]] = {
+    "silent": (LAST, f"{AFTER_HELLO}    time.sleep(1000)\n"),
+    "ignores termination": (LAST, f"{AFTER_HELLO}    signal.signal(15, signal.SIG_IGN)\n    time.sleep(1000)\n"),
+    "floods its errors": (LAST, f"{AFTER_HELLO}    while True: print('x' * 2**20, file=sys.stderr)\n"),
+}
+FORK = """
+    import os, time
+    if question["ask"] == "answer" and os.fork() == 0:
+        os.setsid()
+        if os.fork() == 0:
+            time.sleep(1000)
+        os._exit(0)
+"""
+FINE: dict[str, tuple[str, str]] = {
+    "byte by byte": (LAST, f"{WHOLE}    for c in text + chr(10): print(end=c, flush=True)\n"),
+    "patches the clock": (LAST, f"    import time; time.time = time.monotonic = lambda: 0.0\n{LAST}"),
+    "leaves its session": (LAST, FORK + LAST),
+    "deaf": (LAST, f"{LAST}    if question['ask'] == 'answer': import os; os.close(2)\n"),
+}
+
+
+def write_program(folder: Path, name: str, *replacements: tuple[str, str]) -> str:
+    text = PLAIN.replace('"plain"', repr(name))
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new)
+    file = folder / f"{name.replace(' ', '_')}.py"
+    file.write_text(text, encoding="utf-8")
+    return shlex.join([sys.executable, "-I", "-S", str(file)])
+
+
+def list_processes(mark: str) -> list[int]:
+    """List the processes whose environment has the mark."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and int(entry.name) != os.getpid():
+            try:
+                if mark.encode() in (entry / "environ").read_bytes():
+                    found.append(int(entry.name))
+            except OSError:
+                continue
+    return found
+
+
+def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path: Path) -> None:
+    found = judged(SCENE, write_program(tmp_path, "off", (TORQUE, '"torque": 1.001 * (moments[0] - cross(r2, F32))')))
+    assert {name for name, (verdict, _) in found["off"].items() if verdict == FAILS} == {"torque", "torque_inertia"}
+    assert others_agree(found)
+
+
+@pytest.mark.linux
+@pytest.mark.timeout(300)
+def test_whatever_a_program_does_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guests, "WORKER_MEMORY", 2 * 10**8)
+    monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
+    entries = {}
+    for name, (old, new, _) in PROGRAMS.items():
+        entries[name] = write_program(tmp_path, name, (old, new))
+    fine = {name: write_program(tmp_path, name, pair) for name, pair in FINE.items()}
+    found = judged(SCENE, *entries.values(), *fine.values())
+    assert others_agree(found)
+    for name in fine:
+        assert verdicts(found[name]) == {AGREES}, (name, found[name])
+    for name, (_, _, reason) in PROGRAMS.items():
+        rows = found[name if name in found else name.replace(" ", "_")]  # of one whose hello fails the file's name
+        ((verdict, said),) = [row for quantity, row in rows.items() if quantity == "all"]
+        assert verdict == FAILS and said.startswith(reason) and "\n" not in said, (name, rows)
+    for running in guests._RUNNING.values():
+        running.end()
+    assert not list_processes(f"MARK_OF_TEST={tmp_path}")
+
+
+@pytest.mark.linux
+@pytest.mark.timeout(120)
+def test_a_program_that_is_silent_ends_at_its_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With what it started, and is not asked again for that scene."""
+    monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
+    monkeypatch.setattr(guests, "MOST_ERRORS", 10**7)
+    entries = [write_program(tmp_path, name, pair) for name, pair in SILENT.items()]
+    began = time.monotonic()
+    found = judged(SCENE, *entries, seconds=3.0)
+    assert time.monotonic() - began < 60.0 and others_agree(found)
+    for name in ("silent", "ignores termination"):
+        assert found[name] == {"all": (FAILS, "no answer within 3 s")}
+    assert found["floods its errors"]["all"][1].startswith(("wrote more than", "no answer within"))
+    assert not list_processes(f"MARK_OF_TEST={tmp_path}")
+
+
+@pytest.mark.linux
+def test_what_is_killed_from_outside_is_asked_again(tmp_path: Path) -> None:
+    """As often as it may be killed but once."""
+    lives = tmp_path / "lives"
+    lives.write_text("xxxx")
+    body = f"    n = os.path.getsize({str(lives)!r})\n"
+    body += f"    if n: os.truncate({str(lives)!r}, n - 1); os.kill(os.getpid(), 9)\n"
+    found = judged(SCENE, write_program(tmp_path, "unlucky", (LAST, AFTER_HELLO + body + LAST)))
+    assert verdicts(found["unlucky"]) == {AGREES} and not lives.stat().st_size
+
+
+def test_a_class_is_served_by_our_host() -> None:
+    classes = "Right Angle Changes Prints Empty Leaves Lacks Shapes Elsewhere Complex"
+    found = judged(SCENE, *classes.split())
+    assert others_agree(found) and verdicts(found["right"]) == {AGREES}
+    assert found["right"].keys() >= {*fourbar.quantities.UNKNOWNS, "assembled", "closure", "torque_inertia"}
+    assert set(found["angle"]) == {"assembled", "theta_3", "undecided"} and verdicts(found["angle"]) == {AGREES}
+    failing = {name: {quantity for quantity, row in rows.items() if row[0] == FAILS} for name, rows in found.items()}
+    assert failing["changes"] == {"torque"}
+    assert failing["lacks"] == {"theta_4", "torque", "closure", "torque_inertia"}
+    reasons = {name: rows["all"][1] for name, rows in found.items() if "all" in rows}
+    assert reasons == {
+        "prints": "ValueError: no licence",
+        "empty": "TypeError: the answer is a NoneType, not a fourbar_validation.Answer",
+        "leaves": "SystemExit: 0",
+        "complex": "TypeError: an answer holds real numbers, not complex128",
+        "shapes": reasons["shapes"],
+        "elsewhere": reasons["elsewhere"],
+    }
+    assert reasons["shapes"].startswith("answers.F12") and reasons["elsewhere"].startswith("at.omega_2")
+
+
+def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
+    four = crank_rocker(motion=fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0))
+    three = crank_rocker(motion=fourbar.Motion(theta_3=fourbar.Sweep(0.4, 0.8, 8), omega_3=3.0))
+    stroke = fourbar.Motion(stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left")
+    drive = fourbar.LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
+    for scene in (four, crank_rocker(motion=stroke, drive=drive)):
+        found = judged(scene, "OfAnyBar", "Right")
+        assert verdicts(found["of any bar"]) == {AGREES} and {"theta_3", "alpha_4", "F12"} <= found["of any bar"].keys()
+        assert found["right"].keys() == {"all"} and found["right"]["all"][0] == REFUSES
+    assert judged(three, "OfAnyBar")["of any bar"]["all"][0] == REFUSES
+    loaded = judged(crank_rocker(), write_program(tmp_path, "plain"))["plain"]
+    assert loaded["all"] == (REFUSES, "it does not name loads among its effects")
+
+
+def test_names_stand_apart() -> None:
+    """Of another engine, of two guests, and of those whose hello fails: by entry, class or file."""
+    entries = [HERE + "OfAnother", HERE + "Right", HERE + "Right", HERE + "Nameless", "false", "sh -c 'exit 3'"]
+    names = [guest.name for guest in guests.read_guests(entries, ["free-body"])]
+    assert names == ["free-body-2", "right", "right-2", "Nameless", "false", "sh"]
+
+
+@pytest.mark.parametrize(
+    ("entry", "part"),
+    [
+        ("no such program", "the command line of a program that is there"),
+        ("'", "is no command line"),
+        ("no.such:Class", "ModuleNotFoundError"),
+        (HERE + "Absent", "AttributeError"),
+    ],
+)
+def test_what_is_not_there_is_refused_in_one_line(entry: str, part: str) -> None:
+    with pytest.raises(InputError) as error:
+        select_scenes((), None, None, 0, "", (entry,))
+    assert str(error.value).startswith("--witness = ") and part in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(("name", "reason"), [("Nameless", "engine"), ("Loose", "tolerance"), ("Else", "answers")])
+def test_a_hello_that_fails_is_one_failing_row(name: str, reason: str) -> None:
+    found = judged(SCENE, name)
+    ((engine, rows),) = [item for item in found.items() if item[0] not in ("formulas", "free-body")]
+    assert others_agree(found) and rows.keys() == {"all"} and rows["all"][0] == FAILS
+    assert engine == name and rows["all"][1].startswith(reason)
+
+
+def command_line(out: Path, *options: str) -> "subprocess.CompletedProcess[str]":
+    line = [sys.executable, "-m", "validation", "run", str(out / "scene.toml"), str(out / "second.toml")]
+    line += ["--engines=free-body", "--workers=1", f"--out={out / 'out'}", "--no-pictures", *options]
+    return subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.timeout(300)
+def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
+    for name in ("scene", "second"):
+        save(SCENE, tmp_path / f"{name}.toml")
+    silent = write_program(tmp_path, "silent", SILENT["silent"])
+    leaves = write_program(tmp_path, "leaves", FINE["leaves its session"])
+    classes = [f"--witness={HERE}{name}" for name in ("Right", "Prints")]
+    began = time.monotonic()
+    done = command_line(tmp_path, "--time-limit=5", f"--witness={silent}", f"--witness={leaves}", *classes)
+    assert done.returncode == 1 and time.monotonic() - began < 200.0, done.stderr
+    assert "owned" not in done.stdout + done.stderr
+    rows: dict[str, set[tuple[str, str]]] = {}
+    for row in read_columns(tmp_path / "out" / "results.csv"):
+        rows.setdefault(row.engine, set()).add((row.verdict, row.reason if row.quantity == "all" else ""))
+    for name in ("formulas", "free-body", "right", "leaves"):
+        assert rows[name] == {(AGREES, "")}, name
+    assert rows["silent"] == {(FAILS, "no answer within 5 s")}
+    assert rows["prints"] == {(FAILS, "ValueError: no licence; what it printed: output.txt")}
+    text = (tmp_path / "out" / "output.txt").read_text()
+    assert text.count("\\x1b]0;owned\\x07begin\nfrom a shell") == 2
+    if sys.platform == "linux":
+        time.sleep(2.0)
+        assert not list_processes(f"MARK_OF_TEST={tmp_path}")
+
+
+NEAR = """
+from fourbar_validation.engines.free_body import FreeBody
+
+def answer(scene, at):
+    answer = FreeBody().answer(scene, at)
+    answer.quantities["torque"] = FACTOR * answer.quantities["torque"]
+    return answer
+"""
+
+
+def test_parts_judged_by_another_code_are_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs that are interrupted once the first part is there; what the second one says of its parts."""
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    (tmp_path / "mine.py").write_text(
+        "class Mine:\n    name = 'mine'\n    def answer(self, scene, at):\n"
+        "        import near\n        return near.answer(scene, at)\n"
+    )
+    save(SCENE, tmp_path / "scene.toml")
+    suite = read_scene_files((tmp_path / "scene.toml",))
+    judge_here(monkeypatch)
+
+    def notes(entries: Sequence[str]) -> list[Any]:
+        steps = run(suite, tmp_path / "out", guests.read_guests(entries, ()), RunOptions(drawn=False))
+        found = []
+        for step in steps:
+            found += [step] if isinstance(step, str) else []
+            if any((tmp_path / "out" / "parts").iterdir()):
+                break
+        steps.close()  # type: ignore[attr-defined]
+        return found
+
+    program = write_program(tmp_path, "program")
+    for factor, expected in (("1.0", 0), ("1.0", 0), ("1.01", 1), ("1.01", 0)):
+        (tmp_path / "near.py").write_text(NEAR.replace("FACTOR", factor))
+        assert notes(["mine:Mine", program]) == ["made again: the parts of another run (witnesses)"] * expected
+    write_program(tmp_path, "program", (TORQUE, '"torque": 1.01 * (moments[0] - cross(r2, F32))'))
+    assert notes(["mine:Mine", program]) == ["made again: the parts of another run (witnesses)"]
+
+
+@pytest.mark.parametrize("witness", [*WITNESSES, *FURTHER], ids=lambda witness: witness.name)
+def test_our_own_adapters_answer_the_same_bytes_through_the_host(witness: Any) -> None:
+    if missing := witness.missing():
+        pytest.skip(missing)
+    program = guests.serve(witness.name, 120.0)
+    engine = partial(guests.Asked, witness.name, program, guests.ask_hello(program))
+    outside = replace(witness, engine=engine)
+    loaded = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 40), 10.0))
+    stroke = fourbar.Motion(stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left")
+    drive = fourbar.LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
+    theta_4 = fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0)
+    for scene in (loaded, SCENE, crank_rocker(motion=stroke, drive=drive), crank_rocker(motion=theta_4)):
+        inside = judge("scene", scene, (witness,), order=False).rows
+        assert repr(judge("scene", scene, (outside,), order=False).rows) == repr(inside)

@@ -1,0 +1,145 @@
+"""`python -m fourbar_validation.engine NAME | MODULE:CLASS`: serve an engine by the protocol, one line a question.
+
+NAME is one of our adapters, or the class's own is asked: docs/protocol.md says what a class has.
+"""
+
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, distributions, version
+from pathlib import Path
+from typing import IO, Any
+
+from fourbar import effects
+from fourbar.errors import InputError
+from fourbar.quantities import UNKNOWNS
+from fourbar_validation.compare.answer import Answer, explain_refusal
+from fourbar_validation.compare.rows import say_error
+from fourbar_validation.engines import protocol
+from fourbar_validation.engines.guests import NOT_FOUND
+from fourbar_validation.engines.hard_suite import BALLS
+from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
+from fourbar_validation.report.machine import DISTRIBUTIONS
+
+ALL_BUT_CYLINDER = (*(getattr(effects, name).key for name in effects.FILE_OF), "loads", "drive")
+OURS = frozenset(sys.modules)
+"""Modules that were imported before those of the engine."""
+
+
+class NotFoundError(Exception):
+    """There is no such engine."""
+
+
+def open_engine(entry: str) -> tuple[Callable[..., Any], dict[str, Any]]:
+    """Return what makes an engine, and its hello; NotFoundError where there is none."""
+    if ":" in entry:
+        return _open_class(entry)
+    known = {witness.name: witness for witness in (*WITNESSES, *FURTHER, BALLS)}
+    if entry not in known:
+        raise NotFoundError(f"must be module:Class, or one of {', '.join(known)}")
+    witness = known[entry]
+    if reason := witness.missing():
+        raise NotFoundError(reason)
+    engine = witness.engine()
+    hello = {
+        "engine": entry,
+        "answers": list(witness.expected),
+        "commands": list(getattr(engine, "commands", ("theta_2",))),
+        "effects": [*ALL_BUT_CYLINDER, "cylinder"],
+    }
+    try:
+        hello["version"] = version(DISTRIBUTIONS.get(witness.library, "fourbar"))
+    except PackageNotFoundError:
+        hello["version"] = ""
+    return witness.engine, hello
+
+
+def _open_class(entry: str) -> tuple[Callable[..., Any], dict[str, Any]]:
+    module, _, name = entry.partition(":")
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+    try:
+        made = getattr(import_module(module), name)
+    except (ModuleNotFoundError, AttributeError) as error:
+        if getattr(error, "name", None) in (module, module.partition(".")[0], name):
+            raise NotFoundError(say_error(error)) from None
+        raise
+    hello = {
+        "engine": getattr(made, "name", None),
+        "answers": getattr(made, "quantities", UNKNOWNS),
+        "commands": getattr(made, "commands", ("theta_2",)),
+        "effects": [*getattr(made, "effects", ALL_BUT_CYLINDER), *(["release"] * hasattr(made, "release"))],
+        "tolerance": getattr(made, "tolerance", "equivalence"),
+        "version": str(getattr(made, "version", "")),
+        "code": hash_code(module),
+    }
+    return made, hello
+
+
+def hash_code(module: str) -> str:
+    """Hash of the modules imported with a class, of the others in its folder, and of what is installed."""
+    files = {getattr(each, "__file__", None) for name, each in list(sys.modules.items()) if name not in OURS}
+    if file := sys.modules[module].__file__:
+        files |= {str(path) for path in Path(file).parent.glob("*.py")}
+    digest = hashlib.sha256()
+    for path in sorted(filter(None, files)):
+        digest.update(f"{path} ".encode() + hashlib.sha256(Path(path).read_bytes()).digest())
+    digest.update(repr(sorted(f"{each.name} {each.version}" for each in distributions())).encode())
+    return digest.hexdigest()[:16]
+
+
+def answer(engine: Any, question: dict[str, Any]) -> dict[str, Any]:
+    """Answer one question."""
+    scene = protocol.scene_from_json(question["scene"])
+    if question["ask"] == "release":
+        scene = protocol.release_from_json(scene, question["command"], question["times"])
+        step = [float(question["step"])] if "step" in question else []
+        return protocol.released_to_json(engine(*step).release(scene, question["times"]))
+    scene, command = protocol.command_from_json(scene, question["command"])
+    made = engine()
+    if refusal := explain_refusal(made, command):
+        return {"refusal": refusal}
+    reply = made.answer(scene, command)
+    if not isinstance(reply, Answer):
+        raise TypeError(f"the answer is a {type(reply).__name__}, not a fourbar_validation.Answer")
+    return protocol.answer_to_json(scene, command, reply)
+
+
+def serve(entry: str, questions: IO[bytes], replies: IO[bytes]) -> None:
+    """Answer line by line, until there are no more."""
+    engine: Callable[..., Any] | None = None
+    for line in questions:
+        question = json.loads(line)
+        try:
+            if engine is None:
+                engine, hello = open_engine(entry)
+            if question["ask"] == "hello":
+                reply = hello
+            elif question["ask"] in ("answer", "release"):
+                reply = answer(engine, question)
+            else:
+                reply = {"error": f"unknown question {question['ask']!r}"}
+            text = json.dumps({"id": question["id"], **reply}, allow_nan=False)
+        except NotFoundError:
+            raise
+        except InputError as error:
+            text = json.dumps({"id": question["id"], "error": str(error)})
+        except BaseException as error:  # whatever a class of the user's raises
+            text = json.dumps({"id": question["id"], "error": say_error(error)})
+        replies.write(text.encode() + b"\n")
+        replies.flush()
+
+
+if __name__ == "__main__":
+    with os.fdopen(os.dup(0), "rb") as questions, os.fdopen(os.dup(1), "wb") as replies:
+        with open(os.devnull, "rb") as nothing:
+            os.dup2(nothing.fileno(), 0)
+        os.dup2(2, 1)  # what an engine prints is no answer
+        try:
+            serve(" ".join(sys.argv[1:]), questions, replies)
+        except NotFoundError as error:
+            print(error, file=sys.stderr)
+            sys.exit(NOT_FOUND)
