@@ -9,7 +9,7 @@ from collections.abc import Container
 from contextlib import suppress
 from dataclasses import dataclass
 from numbers import Integral
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +106,30 @@ def require_bar(key: str, value: object) -> int:
     return require_whole(key, value, MOVING_BARS, "must be 2, 3 or 4")
 
 
+REQUIRED = object()
+"""In place of what is left out: the number has to be stated."""
+
+
+class Stated(NamedTuple):
+    """How a number of a scene is stated, in constructors, scene files, studies and tolerances."""
+
+    unit: str
+    bound: str = ANY
+    left_out: Any = REQUIRED
+    """Value where a scene file leaves it out."""
+    pair: bool = False
+    """Whether it is a magnitude in this unit with an angle in rad."""
+
+
+def check_numbers(description: Any, key: str) -> None:
+    """Check the numbers that a frozen description states by its `numbers`, and convert those with units."""
+    for name, stated in description.numbers.items():
+        value, own = getattr(description, name), f"{key}.{name}".strip(".")
+        if value is not None or stated.left_out is not None:
+            of = require_pair(own, value, stated.unit) if stated.pair else require(own, value, *stated[:2])
+            object.__setattr__(description, name, of)
+
+
 @dataclass(frozen=True, slots=True)
 class Bar:
     """A moving bar; massless unless stated otherwise.
@@ -125,17 +149,15 @@ class Bar:
     mass: float = 0.0
     inertia: float | None = None
     centre: tuple[float, float] | None = None
+    numbers: ClassVar[dict[str, Stated]] = {
+        "length": Stated("m", POSITIVE),
+        "mass": Stated("kg", AT_LEAST_ZERO, 0.0),
+        "inertia": Stated("kg m^2", AT_LEAST_ZERO, None),
+        "centre": Stated("m", left_out=None, pair=True),
+    }
 
     def __post_init__(self) -> None:
-        length = require("length", self.length, "m", POSITIVE)
-        mass = require("mass", self.mass, "kg", AT_LEAST_ZERO)
-        set_field = object.__setattr__  # the class is frozen; this is its constructor
-        set_field(self, "length", length)
-        set_field(self, "mass", mass)
-        if self.inertia is not None:
-            set_field(self, "inertia", require("inertia", self.inertia, "kg m^2", AT_LEAST_ZERO))
-        if self.centre is not None:
-            set_field(self, "centre", require_pair("centre", self.centre, "m"))
+        check_numbers(self, "")
 
     @property
     def moment_of_inertia(self) -> float:
@@ -169,13 +191,13 @@ class FourBar:
     coupler: Bar
     output: Bar
     ground_angle: float = 0.0
+    numbers: ClassVar[dict[str, Stated]] = {"ground": Stated("m", POSITIVE), "ground_angle": Stated("rad", ANY, 0.0)}
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ground", require("lengths.ground", self.ground, "m", POSITIVE))
+        check_numbers(self, "lengths")
         for name, bar in zip(("input", "coupler", "output"), self.moving, strict=True):
             if not isinstance(bar, Bar):
                 raise InputError(f"bars.{name}", bar, "must be a Bar, like fourbar.Bar(0.1) for a bar of 0.1 m")
-        object.__setattr__(self, "ground_angle", require("lengths.ground_angle", self.ground_angle, "rad"))
         longest = max(self.lengths)
         if not math.isfinite(4.0 * longest):
             raise InputError("lengths", self.lengths, "must be at most a quarter of the greatest double, 4.5e307 m")

@@ -10,8 +10,8 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
 
+from fourbar.effects import list_kinds
 from fourbar.errors import InputError
-from fourbar.files.effects import REGISTRY
 from fourbar.files.scene_text import BRANCHES
 from fourbar.linkage import PINS
 from fourbar.scene.motion_law import ENDS
@@ -27,7 +27,7 @@ LONGEST_TEXT = 10_000
 def list_offers() -> dict[str, Any]:
     """List the empty fields, the parts that can be added, and the words to choose from."""
     found = tomllib.loads(files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8"))
-    for key, effect in REGISTRY.items():
+    for key, effect in list_kinds().items():
         value = tomllib.loads(effect.example)[key]
         found["parts"].append({"at": ["effects", key], "value": value})
         if isinstance(value, dict) and set(value) <= set(PINS):

@@ -48,3 +48,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'fourbar.effects' has no attribute {name!r}")
     globals()[name] = value = getattr(import_module(f"fourbar.effects.{file}"), name)
     return value
+
+
+def list_kinds() -> "dict[str, type[Effect]]":
+    """List the effects by their keys under ``[effects]``, in the order in which they are listed."""
+    return {kind.key: kind for kind in map(__getattr__, FILE_OF)}

@@ -44,7 +44,7 @@ class Actions:
         self.couples: dict[str, Any] = {}
         """Between the two bars that meet at a pin, on the second of them, N m."""
         self.through: dict[str, Any] = {}
-        """Forces between two bars that meet at a pin, as if through it, on the second of them, complex, N."""
+        """Forces between bars 2 and 3, 3 and 4, as if through their pin, on the second of them, complex, N."""
 
     def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
         """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.
@@ -68,17 +68,21 @@ class Actions:
         """Add a force (complex, N, world axes) at a point of a bar, and its opposite at one of another bar.
 
         It acts along the line of the two points. Between bars that meet at a pin it goes through the pin and leaves a
-        couple, by the arm of the point that is nearer to the pin; it is in no sum of another bar.
+        couple, by the arm of the point that is nearer to the pin; between moving bars it is in no sum of another bar.
         """
         pin = find_common_pin(start.bar, end.bar)
         if pin is None:
             self.pull_ends(start, end, force)
             return
-        on_second = force if start.bar > end.bar else -force
         (one, square), (other, other_square) = (point.from_pin(pin, self.state) for point in (start, end))
         by_one, by_other = one * self.state.direction(start.bar), other * self.state.direction(end.bar)
         arm = select(square < other_square, by_one, by_other)
-        self.through[pin] = self.through[pin] + on_second if pin in self.through else on_second
+        first, second = PINS[pin]
+        on_second = force if start.bar == second else -force
+        if first == 1:  # the pin is the first one of the other bar
+            self.force(second, on_second)
+        else:
+            self.through[pin] = self.through[pin] + on_second if pin in self.through else on_second
         self.couple(pin, cross(-on_second, arm))
 
     def pull_ends(self, start: Any, end: Any, force: Number) -> None:
@@ -157,8 +161,8 @@ class Actions:
         """Return what the pins themselves carry of the forces between their bars."""
         if not self.through:
             return pins
-        O2, A, B, O4 = (self.through.get(pin, 0.0) for pin in PINS)
-        return PinForces(pins.F12 - O2, pins.F32 + A, pins.F43 + B, pins.F14 - O4)
+        A, B = (self.through.get(pin, 0.0) for pin in ("A", "B"))
+        return pins._replace(F32=pins.F32 + A, F43=pins.F43 + B)
 
 
 @cache

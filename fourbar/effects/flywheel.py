@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fourbar.effects.effect import Effect
-from fourbar.linkage import AT_LEAST_ZERO, require, require_whole
+from fourbar.linkage import AT_LEAST_ZERO, Stated, check_numbers, require_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,11 +21,12 @@ class Flywheel(Effect):
     inertia: float
     bar: int = 2
     key: ClassVar[str] = "flywheel"
+    example: ClassVar[str] = 'flywheel = { bar = 2, inertia = "0.02 kg m^2" }'
+    numbers: ClassVar[dict[str, Stated]] = {"inertia": Stated("kg m^2", AT_LEAST_ZERO)}
 
     def __post_init__(self) -> None:
-        inertia = require("effects.flywheel.inertia", self.inertia, "kg m^2", AT_LEAST_ZERO)
+        check_numbers(self, "effects.flywheel")
         bar = require_whole("effects.flywheel.bar", self.bar, (2, 4), "must be 2 or 4, a bar on a fixed pin")
-        object.__setattr__(self, "inertia", inertia)
         object.__setattr__(self, "bar", bar)
 
     @property

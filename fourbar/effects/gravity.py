@@ -8,10 +8,9 @@ import numpy as np
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.numbers import OF_EFFECT
 from fourbar.formulas.arithmetic import is_any, namespace, polar, vector
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, require
+from fourbar.linkage import MOVING_BARS, Stated, check_numbers
 
 U = 2.0**-53
 """Unit round-off of a double."""
@@ -24,10 +23,11 @@ class Gravity(Effect):
     magnitude: float = 9.81
     angle: float = -math.pi / 2
     key: ClassVar[str] = "gravity"
+    example: ClassVar[str] = 'gravity = ["9.81 m/s^2", "-90 deg"]'
+    numbers: ClassVar[dict[str, Stated]] = {"magnitude": Stated("m/s^2"), "angle": Stated("rad")}
 
     def __post_init__(self) -> None:
-        for name, (unit, _) in OF_EFFECT["gravity"].items():
-            object.__setattr__(self, name, require("effects.gravity", getattr(self, name), unit))
+        check_numbers(self, "effects.gravity")
 
     @property
     def field(self) -> Any:

@@ -13,7 +13,7 @@ from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import PI_LOW, angle, is_any, make_like, namespace, nearest, polar, split_sum
 from fourbar.formulas.longer import shorten
 from fourbar.formulas.motion import State
-from fourbar.linkage import FourBar, require, require_bar, require_numbers, require_pair
+from fourbar.linkage import FourBar, Stated, check_numbers, require_bar, require_numbers
 
 TURN = 2.0 * math.pi
 BEYOND_TURN = 2.0 * PI_LOW
@@ -113,18 +113,19 @@ class Load(Effect):
     frame: str = "world"
     table: Table | None = None
     key: ClassVar[str] = "load"
+    numbers: ClassVar[dict[str, Stated]] = {
+        "force": Stated("N", left_out=None, pair=True),
+        "at": Stated("m", left_out=(0.0, 0.0), pair=True),
+        "moment": Stated("N m", left_out=0.0),
+    }
 
     def __post_init__(self) -> None:
-        set_field = object.__setattr__  # the class is frozen; this is its constructor
-        set_field(self, "bar", require_bar("loads.bar", self.bar))
+        object.__setattr__(self, "bar", require_bar("loads.bar", self.bar))
         expect("loads.frame", self.frame, str)
         if self.frame not in ("world", "bar"):
             raise InputError("loads.frame", self.frame, 'must be "world" or "bar"')
         expect("loads.table", self.table, Table, type(None))
-        if self.force is not None:
-            set_field(self, "force", require_pair("loads.force", self.force, "N"))
-        set_field(self, "at", require_pair("loads.at", self.at, "m"))
-        set_field(self, "moment", require("loads.moment", self.moment, "N m"))
+        check_numbers(self, "loads")
 
     def act(self, actions: Actions, state: State) -> None:
         """F at its point, and the couple."""

@@ -1,15 +1,18 @@
 """Effects with values per pin: rows (pin, number, ...)."""
 
+from dataclasses import fields
 from typing import Any, Self
 
 from fourbar.effects.effect import Effect
-from fourbar.effects.numbers import OF_EFFECT, ROWS
 from fourbar.errors import InputError, expect
 from fourbar.linkage import PINS, require
 
 
 class PinRows(Effect):
-    """An effect that holds rows (pin, number, ...), in the field that `ROWS` names, in the order of the pins."""
+    """An effect whose first field holds rows (pin, number, ...), in the order of the pins.
+
+    The one number that a pin has is called "".
+    """
 
     __slots__ = ()
 
@@ -19,8 +22,18 @@ class PinRows(Effect):
         rows = ((pin, *(value if isinstance(value, (tuple, list)) else (value,))) for pin, value in values.items())
         return cls(tuple(rows))  # type: ignore[call-arg]
 
+    @property
+    def field(self) -> str:
+        """Name of the field that holds the rows."""
+        return fields(self)[0].name  # type: ignore[arg-type]
+
+    @property
+    def rows(self) -> tuple[tuple[Any, ...], ...]:
+        """Rows (pin, number, ...)."""
+        return getattr(self, self.field)  # type: ignore[no-any-return]
+
     def __post_init__(self) -> None:
-        key, numbers, rows = f"effects.{self.key}", OF_EFFECT[self.key], getattr(self, ROWS[self.key])
+        key, numbers, rows = f"effects.{self.key}", self.numbers, self.rows
         expect(key, rows, tuple, list)
         found: dict[str, tuple[Any, ...]] = {}
         for row in rows:
@@ -30,6 +43,6 @@ class PinRows(Effect):
             if pin not in PINS or pin in found:
                 raise InputError(f"{key}.{pin}", row[1:], f"the pins are {', '.join(PINS)}, each once")
             given = zip(numbers.items(), values, strict=True)
-            checked = (require(f"{key}.{pin}.{name}".rstrip("."), value, *of) for (name, of), value in given)
+            checked = (require(f"{key}.{pin}.{name}".rstrip("."), value, *of[:2]) for (name, of), value in given)
             found[pin] = (pin, *checked)
-        object.__setattr__(self, ROWS[self.key], tuple(found[pin] for pin in PINS if pin in found))
+        object.__setattr__(self, self.field, tuple(found[pin] for pin in PINS if pin in found))

@@ -8,16 +8,35 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
-from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import dot, is_any, namespace, polar, select, sine_of, vector
 from fourbar.formulas.longer import Pair
 from fourbar.formulas.motion import State
-from fourbar.linkage import BAR_NAMES, SECOND_PIN, FourBar, require, require_whole
+from fourbar.linkage import (
+    AT_LEAST_ZERO,
+    BAR_NAMES,
+    POSITIVE,
+    SECOND_PIN,
+    FourBar,
+    Stated,
+    check_numbers,
+    require,
+    require_pair,
+    require_whole,
+)
 from fourbar.quantities import NO_DIRECTION, OK
 
 COINCIDE = 16.0 * 2.0**-52
 """Two points nearer than this part of their paths from O2, bar by bar, have no direction between them."""
+
+
+AT = Stated("m", left_out=(0.0, 0.0), pair=True)
+"""How the place of an end on its bar is stated."""
+GAS = {
+    **dict.fromkeys(("extended", "stroke"), Stated("m", POSITIVE)),
+    **dict.fromkeys(("extended_force", "compressed_force"), Stated("N", AT_LEAST_ZERO)),
+}
+"""Numbers of a gas spring, which becomes one of the springs."""
 
 
 class SpringEnd(NamedTuple):
@@ -68,8 +87,7 @@ def require_ends(key: str, start: object, end: object) -> tuple[SpringEnd, Sprin
         if not isinstance(point, SpringEnd):
             raise InputError(f"{key}.{name}", point, "must be a fourbar.SpringEnd")
         bar = require_whole(f"{key}.{name}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
-        at = zip(point[1:], ("m", "rad"), strict=True)
-        ends.append(SpringEnd(bar, *(require(f"{key}.{name}.at", number, unit) for number, unit in at)))
+        ends.append(SpringEnd(bar, *require_pair(f"{key}.{name}.at", point[1:], AT.unit)))
     if ends[0].bar == ends[1].bar:
         raise InputError(f"{key}.to.bar", ends[1].bar, "must be another bar than that of `from`")
     return ends[0], ends[1]
@@ -95,12 +113,16 @@ class Spring:
     stiffness: float
     length: float = 0.0
     preload: float = 0.0
+    numbers: ClassVar[dict[str, Stated]] = {
+        "stiffness": Stated("N/m", AT_LEAST_ZERO),
+        "length": Stated("m", AT_LEAST_ZERO),
+        "preload": Stated("N", left_out=0.0),
+    }
 
     def __post_init__(self) -> None:
         for name, point in zip(("start", "end"), require_ends("effects.springs", self.start, self.end), strict=True):
             object.__setattr__(self, name, point)
-        for name, of in OF_EFFECT["springs"].items():
-            object.__setattr__(self, name, require(f"effects.springs.{name}", getattr(self, name), *of))
+        check_numbers(self, "effects.springs")
 
     @classmethod
     def gas(
@@ -124,8 +146,8 @@ class Spring:
         compressed_force : at full stroke, N, no less; left out: the same.
         """
         key, last = "effects.springs.gas", extended_force if compressed_force is None else compressed_force
-        given = zip(OF_GAS_SPRING.items(), (extended, stroke, extended_force, last), strict=True)
-        extended, stroke, first, last = (require(f"{key}.{name}", value, *of) for (name, of), value in given)
+        given = zip(GAS.items(), (extended, stroke, extended_force, last), strict=True)
+        extended, stroke, first, last = (require(f"{key}.{name}", value, *of[:2]) for (name, of), value in given)
         if stroke >= extended:
             raise InputError(f"{key}.stroke", stroke, f"must be less than the extended length, {extended:.6g} m")
         if last < first:
@@ -153,6 +175,11 @@ class Springs(Effect):
 
     springs: tuple[Spring, ...]
     key: ClassVar[str] = "springs"
+    example: ClassVar[str] = (
+        'springs = [{ from = { bar = 1, at = ["10 cm", "-90 deg"] }, to = { bar = 4, at = ["8 cm", "0 deg"] }, '
+        'stiffness = "200 N/m", length = "12 cm", preload = "3 N" }]'
+    )
+    numbers: ClassVar[dict[str, Stated]] = {**Spring.numbers, "at": AT}
 
     def __post_init__(self) -> None:
         expect("effects.springs", self.springs, tuple, list)

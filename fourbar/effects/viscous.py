@@ -6,6 +6,7 @@ from typing import ClassVar
 from fourbar.effects.actions import Actions
 from fourbar.effects.pins import PinRows
 from fourbar.formulas.motion import State
+from fourbar.linkage import AT_LEAST_ZERO, Stated
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,6 +15,8 @@ class Viscous(PinRows):
 
     coefficients: tuple[tuple[str, float], ...]
     key: ClassVar[str] = "viscous"
+    example: ClassVar[str] = 'viscous = { O2 = "0.01 N m s/rad" }'
+    numbers: ClassVar[dict[str, Stated]] = {"": Stated("N m s/rad", AT_LEAST_ZERO)}
 
     def act(self, actions: Actions, state: State) -> None:
         """M on bar j = -k (omega_j - omega_i), its opposite on bar i."""

@@ -1,56 +1,82 @@
-"""Each effect in a scene file: how its entry under ``[effects]`` is read and written, one row of a table each.
+"""Effects in a scene file: how the entry of each under ``[effects]`` is read and written, from its own declarations."""
 
-An effect is imported when a file names it.
-"""
-
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import MISSING, fields
+from typing import TYPE_CHECKING, Any
 
 from fourbar import effects as kinds
-from fourbar.effects.numbers import OF_EFFECT, OF_GAS_SPRING, ROWS
+from fourbar.effects.pins import PinRows
+from fourbar.effects.spring import AT, GAS
 from fourbar.errors import InputError
-from fourbar.files.fields import Reader, write_polar, write_quantity
-from fourbar.linkage import AT_LEAST_ZERO, PINS
+from fourbar.files.fields import Reader, write_numbers, write_polar, write_stated
+from fourbar.linkage import PINS
 
 if TYPE_CHECKING:
-    from fourbar.effects import Effect, Flywheel, SpringEnd, Springs
+    from fourbar.effects import Effect, SpringEnd, Springs
 
 MOST_SPRINGS = 1000
-FIELD, INERTIA = OF_EFFECT["gravity"]["magnitude"][0], OF_EFFECT["flywheel"]["inertia"][0]
 
 
-def _read_springs(value: object, read: Reader) -> "Springs":
-    """Read springs, whose preload is 0 where it is left out, and gas springs."""
-    key, numbers = "effects.springs", OF_EFFECT["springs"]
+def read_effect(key: str, value: object, read: Reader) -> "Effect":
+    """Read an effect from the value under its key."""
+    kind: Any = kinds.list_kinds()[key]
+    own = f"effects.{key}"
+    if kind is kinds.Gravity:
+        return kinds.Gravity(*read.polar(own, value, kind.numbers["magnitude"].unit))
+    if kind is kinds.Springs:
+        return _read_springs(own, value, read)
+    if issubclass(kind, PinRows):
+        rows = []
+        for pin, entry in read.table(own, value, PINS).items():
+            given = {"": entry} if "" in kind.numbers else read.table(f"{own}.{pin}", entry, kind.numbers)
+            rows.append((pin, *read.numbers(f"{own}.{pin}", given, kind.numbers).values()))
+        return kind(tuple(rows))  # type: ignore[no-any-return]
+    bars = {field.name: field.default for field in fields(kind) if field.name == "bar"}
+    given = read.table(own, value, (*bars, *kind.numbers))
+    bar = {
+        name: read.whole(f"{own}.{name}", given.get(name, None if default is MISSING else default), 2, 4)
+        for name, default in bars.items()
+    }
+    return kind(**bar, **read.numbers(own, given, kind.numbers))  # type: ignore[no-any-return]
+
+
+def write_effect(effect: "Effect") -> Any:
+    """Write the value of an effect under its key; InputError where a scene file has no form of it."""
+    if kinds.list_kinds().get(effect.key) is not type(effect):
+        raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file has no form of this effect")
+    if isinstance(effect, kinds.Gravity):
+        return write_polar(effect.magnitude, effect.angle, effect.numbers["magnitude"].unit)
+    if isinstance(effect, kinds.Springs):
+        return [{**write_ends(spring), **write_numbers(spring)} for spring in effect.springs]
+    if isinstance(effect, PinRows):
+        rows = {}
+        for pin, *values in effect.rows:
+            texts = {name: write_stated(x, of) for (name, of), x in zip(effect.numbers.items(), values, strict=True)}
+            rows[pin] = texts.get("", texts)
+        return rows
+    bar = {"bar": effect.bar} if hasattr(effect, "bar") else {}
+    return {**bar, **write_numbers(effect)}
+
+
+def _read_springs(key: str, value: object, read: Reader) -> "Springs":
+    """Read springs and gas springs."""
     if not isinstance(value, list) or not 1 <= len(value) <= MOST_SPRINGS:
         raise read.refuse(key, value, f"must be a list of 1 to {MOST_SPRINGS} springs")
     springs = []
     for index, entry in enumerate(value):
         own = f"{key}[{index}]"
-        given = read.table(own, entry, ("from", "to", *numbers, "gas"))
+        given = read.table(own, entry, ("from", "to", *kinds.Spring.numbers, "gas"))
         start, end = read_ends(read, own, given)
         if gas := "gas" in given:
             read.table(own, entry, ("from", "to", "gas"))
-            words = read.table(f"{own}.gas", given["gas"], OF_GAS_SPRING)
-            words = {"compressed_force": words.get("extended_force"), **words}
-            stated = _read_numbers(read, f"{own}.gas", words, OF_GAS_SPRING)
+            words = read.table(f"{own}.gas", given["gas"], GAS)
+            stated = read.numbers(f"{own}.gas", {"compressed_force": words.get("extended_force"), **words}, GAS)
         else:
-            stated = _read_numbers(read, own, given, numbers, preload=0.0)
+            stated = read.numbers(own, given, kinds.Spring.numbers)
         try:
-            springs.append(kinds.Spring.gas(start, end, *stated) if gas else kinds.Spring(start, end, *stated))
+            springs.append(kinds.Spring.gas(start, end, **stated) if gas else kinds.Spring(start, end, **stated))
         except InputError as error:  # which knows of one spring alone
             raise read.refuse(error.key.replace(key, own), error.value, error.allowed) from None
     return kinds.Springs(tuple(springs))
-
-
-def _read_numbers(
-    read: Reader, key: str, given: Mapping[str, object], numbers: Mapping[str, tuple[str, str]], **defaults: float
-) -> list[float]:
-    """Read each of some numbers within its bound."""
-    return [
-        read.quantity(f"{key}.{name}".rstrip("."), given.get(name), *of, defaults.get(name))
-        for name, of in numbers.items()
-    ]
 
 
 def read_ends(read: Reader, key: str, given: dict[str, Any]) -> "tuple[SpringEnd, SpringEnd]":
@@ -60,102 +86,11 @@ def read_ends(read: Reader, key: str, given: dict[str, Any]) -> "tuple[SpringEnd
         own = f"{key}.{name}"
         entry = read.table(own, given.get(name), ("bar", "at"))
         bar = read.whole(f"{own}.bar", entry.get("bar"), 1, 4)
-        ends.append(kinds.SpringEnd(bar, *(read.polar(f"{own}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0))))
+        ends.append(kinds.SpringEnd(bar, *read.stated(f"{own}.at", entry.get("at"), AT)))
     return ends[0], ends[1]
 
 
 def write_ends(line: Any) -> dict[str, Any]:
     """Write them back."""
     ends = {"from": line.start, "to": line.end}
-    return {name: {"bar": end.bar, "at": write_polar(end[1], end[2], "m")} for name, end in ends.items()}
-
-
-def _write_springs(effect: "Springs") -> Any:
-    return [
-        {
-            **write_ends(s),
-            **{name: write_quantity(getattr(s, name), unit) for name, (unit, _) in OF_EFFECT["springs"].items()},
-        }
-        for s in effect.springs
-    ]
-
-
-def _read_flywheel(value: object, read: Reader) -> "Flywheel":
-    """On bar 2 where none is named."""
-    key = "effects.flywheel"
-    entry = read.table(key, value, ("bar", "inertia"))
-    inertia = read.quantity(f"{key}.inertia", entry.get("inertia"), INERTIA, AT_LEAST_ZERO)
-    return kinds.Flywheel(inertia, read.whole(f"{key}.bar", entry.get("bar", 2), 2, 4))
-
-
-class EffectFormat(NamedTuple):
-    """What a scene file says of one effect."""
-
-    read: Callable[[object, Reader], "Effect"]
-    """From the value under its key."""
-    write: Callable[[Any], Any]
-    """Back to that value."""
-    example: str
-    """One line of a scene file."""
-
-
-def _describe_per_pin(key: str, kind: str, example: str, **defaults: float) -> EffectFormat:
-    """Describe an effect that holds rows (pin, number, ...); where a pin has one number, that stands without a list."""
-    numbers = OF_EFFECT[key]
-
-    def read_rows(value: object, read: Reader) -> "Effect":
-        rows = []
-        for pin, entry in read.table(f"effects.{key}", value, PINS).items():
-            own = f"effects.{key}.{pin}"
-            texts = {"": entry} if "" in numbers else read.table(own, entry, numbers)
-            rows.append((pin, *_read_numbers(read, own, texts, numbers, **defaults)))
-        effect: Effect = getattr(kinds, kind)(tuple(rows))
-        return effect
-
-    def write_rows(effect: Any) -> Any:
-        rows = {}
-        for pin, *own in getattr(effect, ROWS[key]):
-            texts = {name: write_quantity(x, unit) for (name, (unit, _)), x in zip(numbers.items(), own, strict=True)}
-            rows[pin] = texts.get("", texts)
-        return rows
-
-    return EffectFormat(read_rows, write_rows, example)
-
-
-REGISTRY: dict[str, EffectFormat] = {
-    "gravity": EffectFormat(
-        lambda value, read: kinds.Gravity(*read.polar("effects.gravity", value, FIELD)),
-        lambda effect: write_polar(effect.magnitude, effect.angle, FIELD),
-        'gravity = ["9.81 m/s^2", "-90 deg"]',
-    ),
-    "viscous": _describe_per_pin("viscous", "Viscous", 'viscous = { O2 = "0.01 N m s/rad" }'),
-    "friction": _describe_per_pin("friction", "Friction", 'friction = { A = "0.05 N m" }'),
-    "pin_friction": _describe_per_pin(
-        "pin_friction", "PinFriction", 'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
-    ),
-    "torsion": _describe_per_pin(
-        "torsion",
-        "Torsion",
-        'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }',
-        preload=0.0,
-    ),
-    "springs": EffectFormat(
-        _read_springs,
-        _write_springs,
-        'springs = [{ from = { bar = 1, at = ["10 cm", "-90 deg"] }, to = { bar = 4, at = ["8 cm", "0 deg"] }, '
-        'stiffness = "200 N/m", length = "12 cm", preload = "3 N" }]',
-    ),
-    "flywheel": EffectFormat(
-        _read_flywheel,
-        lambda effect: {"bar": effect.bar, "inertia": write_quantity(effect.inertia, INERTIA)},
-        'flywheel = { bar = 2, inertia = "0.02 kg m^2" }',
-    ),
-}
-"""By the key under ``[effects]``, in the order in which they are listed; a new one is added here."""
-
-
-def write_effect(effect: "Effect") -> Any:
-    """Write the value of an effect under its key; InputError where a scene file has no form of it."""
-    if effect.key not in REGISTRY:
-        raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file has no form of this effect")
-    return REGISTRY[effect.key].write(effect)
+    return {name: {"bar": end.bar, "at": write_stated(end[1:], AT)} for name, end in ends.items()}

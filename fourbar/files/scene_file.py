@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import LinearDrive, Load, Table
+from fourbar.effects import LinearDrive, Load, Table, list_kinds
 from fourbar.errors import InputError, expect
 from fourbar.files import reading
-from fourbar.files.effects import REGISTRY, read_ends
+from fourbar.files.effects import read_effect, read_ends
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.pictures import Picture
 from fourbar.files.scene_text import BARS, BRANCHES
 from fourbar.files.tolerances import read_tolerances
-from fourbar.linkage import AT_LEAST_ZERO, BAR_NAMES, MOST_STEPS, POSITIVE, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, MOST_STEPS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import COMMANDS, ENDS, Law
@@ -107,13 +107,13 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     entries = top.get("loads", [])
     if not isinstance(entries, list) or len(entries) > MOST_LOADS:
         raise read.refuse("loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}")
-    effects = read.table("effects", top.get("effects", {}), REGISTRY)
+    effects = read.table("effects", top.get("effects", {}), list_kinds())
     scene = Scene(
         _read_linkage(read, top),
         _read_motion(read, top.get("motion", {})),
         None if line else read.whole("drive.bar", drive.get("bar", 2), 2, 4),  # type: ignore[arg-type]
         tuple(_load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)),
-        tuple(REGISTRY[key].read(value, read) for key, value in effects.items()),
+        tuple(read_effect(key, value, read) for key, value in effects.items()),
         read.text("title", top.get("title", "")),
         read.text("source", top.get("source", "")),
         _read_pictures(read, top.get("bars", {}), folder),
@@ -129,9 +129,9 @@ def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     found = []
     for name, point in value.items():
         key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
-        entry = read.table(key, point, ("bar", "from_pin"))
+        entry = read.table(key, point, ("bar", *Point.numbers))
         bar = read.whole(f"{key}.bar", entry.get("bar"), 1, 4)
-        found.append(Point(name, bar, read.polar(f"{key}.from_pin", entry.get("from_pin"), "m")))
+        found.append(Point(name, bar, **read.numbers(key, entry, Point.numbers)))
     return tuple(found)
 
 
@@ -146,24 +146,20 @@ def _read_pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Pic
 
 def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
     lengths = read.table("lengths", top.get("lengths", {}), (*BAR_NAMES.values(), "ground_angle"))
-    length = {name: read.quantity(f"lengths.{name}", lengths.get(name), "m", POSITIVE) for name in BAR_NAMES.values()}
+    length = read.numbers("lengths", lengths, dict.fromkeys(BAR_NAMES.values(), Bar.numbers["length"]))
     tables = read.table("bars", top.get("bars", {}), BARS)
     bars = {name: _read_bar(read, f"bars.{name}", tables.get(name, {}), length[name]) for name in BARS}
-    angle = read.quantity("lengths.ground_angle", lengths.get("ground_angle"), "rad", default=0.0)
-    return FourBar(length["ground"], bars["input"], bars["coupler"], bars["output"], angle)
+    ground = read.numbers("lengths", lengths, FourBar.numbers)
+    return FourBar(ground["ground"], bars["input"], bars["coupler"], bars["output"], ground["ground_angle"])
 
 
 def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
-    entry = read.table(key, value, ("mass", "inertia", "centre", "picture"))
-    mass = read.quantity(f"{key}.mass", entry.get("mass"), "kg", AT_LEAST_ZERO, 0.0)
-    inertia = centre = None
-    if "inertia" in entry:
-        inertia = read.quantity(f"{key}.inertia", entry["inertia"], "kg m^2", AT_LEAST_ZERO)
-    elif not math.isfinite(mass * length * length):
+    stated = {name: of for name, of in Bar.numbers.items() if name != "length"}
+    entry = read.table(key, value, (*stated, "picture"))
+    numbers = read.numbers(key, entry, stated)
+    if numbers["inertia"] is None and not math.isfinite(numbers["mass"] * length * length):
         raise read.refuse(f"{key}.mass", entry.get("mass"), "must leave the inertia m L^2/12 a finite number")
-    if "centre" in entry:
-        centre = read.polar(f"{key}.centre", entry["centre"], "m")
-    return Bar(length, mass, inertia, centre)
+    return Bar(length, **numbers)
 
 
 def _read_motion(read: Reader, value: object) -> Motion:
@@ -234,7 +230,7 @@ def _read_places(read: Reader, key: str, value: object, unit: str) -> float | Ar
 
 
 def _load(read: Reader, key: str, value: object) -> Load:
-    entry = read.table(key, value, ("bar", "force", "at", "moment", "frame", "table"))
+    entry = read.table(key, value, ("bar", *Load.numbers, "frame", "table"))
     table = None
     if "table" in entry:
         over = read.table(f"{key}.table", entry["table"], ("theta_2", "factor"))
@@ -249,9 +245,7 @@ def _load(read: Reader, key: str, value: object) -> Load:
         raise read.refuse(f"{key}.at", entry["at"], "belongs to a force, and there is none")
     return Load(
         read.whole(f"{key}.bar", entry.get("bar"), 2, 4),
-        read.polar(f"{key}.force", entry["force"], "N") if "force" in entry else None,
-        read.polar(f"{key}.at", entry["at"], "m") if "at" in entry else (0.0, 0.0),
-        read.quantity(f"{key}.moment", entry.get("moment"), "N m", default=0.0),
-        read.choice(f"{key}.frame", entry.get("frame", "world"), ("world", "bar")),
-        table,
+        **read.numbers(key, entry, Load.numbers),
+        frame=read.choice(f"{key}.frame", entry.get("frame", "world"), ("world", "bar")),
+        table=table,
     )

@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.effects import Load
 from fourbar.errors import InputError, expect
 from fourbar.files.effects import write_effect, write_ends
-from fourbar.files.fields import write_polar, write_quantity
+from fourbar.files.fields import write_numbers, write_quantity
 from fourbar.files.tolerances import write_tolerances
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
 from fourbar.scene import Scene
@@ -42,7 +42,7 @@ def dump(scene: Scene) -> str:
     expect("scene", scene, Scene)
     top = {key: value for key, value in {"title": scene.title, "source": scene.source}.items() if value}
     described, motion = describe(scene), _write_motion(scene.motion)
-    points = {point.name: {"bar": point.bar, "from_pin": write_polar(*point.from_pin, "m")} for point in scene.points}
+    points = {point.name: {"bar": point.bar, **write_numbers(point)} for point in scene.points}
     bars = described["bars"]
     for picture in scene.pictures:
         bars.setdefault(BAR_NAMES[picture.bar], {})["picture"] = picture.name
@@ -86,12 +86,7 @@ def describe(scene: Scene) -> dict[str, Any]:
 def _write_bar(bar: Bar) -> dict[str, Any]:
     if bar == Bar(bar.length):
         return {}
-    entry: dict[str, Any] = {"mass": write_quantity(bar.mass, "kg")}
-    if bar.inertia is not None:
-        entry["inertia"] = write_quantity(bar.inertia, "kg m^2")
-    if bar.centre is not None:
-        entry["centre"] = write_polar(*bar.centre, "m")
-    return entry
+    return {name: text for name, text in write_numbers(bar).items() if name != "length"}
 
 
 def _write_motion(motion: Motion) -> dict[str, Any]:
@@ -127,11 +122,9 @@ def _write_law(law: Law) -> dict[str, Any]:
 
 
 def _load_entry(load: Load) -> dict[str, Any]:
-    entry: dict[str, Any] = {"bar": load.bar}
-    if load.force is not None:
-        entry["force"] = write_polar(*load.force, "N")
-        entry["at"] = write_polar(*load.at, "m")
-    entry |= {"moment": write_quantity(load.moment, "N m"), "frame": load.frame}
+    entry: dict[str, Any] = {"bar": load.bar, **write_numbers(load), "frame": load.frame}
+    if load.force is None:
+        del entry["at"]
     if load.table is not None:
         angles = [write_quantity(angle, "rad") for angle in load.table.theta_2]
         entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}

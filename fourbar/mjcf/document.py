@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from fourbar.effects.numbers import ROWS
+from fourbar.effects.pins import PinRows
 from fourbar.errors import InputError, LimitError, NotAssembledError, clean_line
 from fourbar.formulas.mobility import change_points, choose_range
 from fourbar.linkage import MOVING_BARS, FourBar
@@ -133,7 +133,7 @@ def _name_untaken(scene: Scene) -> list[str]:
     """Name what is no number of a joint but its rest angle."""
     names = ["loads"] if scene.loads else []
     for effect in scene.effects:
-        pins = {pin for pin, *_ in getattr(effect, ROWS[effect.key])} if effect.key in ROWS else set()
+        pins = {pin for pin, *_ in effect.rows} if isinstance(effect, PinRows) else set()
         names += ["springs"] if effect.key == "springs" else []
         names += [f"{effect.key} at B"] if "B" in pins else []
         names += ["rest angles of torsion (it rests as assembled)"] if effect.key == "torsion" and pins - {"B"} else []

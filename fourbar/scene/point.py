@@ -1,9 +1,10 @@
 """A point of a bar whose position, velocity and acceleration a scene wants."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from fourbar.errors import InputError
-from fourbar.linkage import BAR_NAMES, require_pair, require_whole
+from fourbar.linkage import BAR_NAMES, Stated, check_numbers, require_whole
 from fourbar.quantities import UNITS
 
 LONGEST_NAME = 40
@@ -25,6 +26,7 @@ class Point:
     name: str
     bar: int
     from_pin: tuple[float, float]
+    numbers: ClassVar[dict[str, Stated]] = {"from_pin": Stated("m", pair=True)}
 
     def __post_init__(self) -> None:
         plain = isinstance(self.name, str) and self.name.isascii() and self.name.isidentifier()
@@ -35,7 +37,7 @@ class Point:
             raise InputError(self.key, self.name, "is the name of a quantity; a point needs another")
         bar = require_whole(f"{self.key}.bar", self.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
         object.__setattr__(self, "bar", bar)
-        object.__setattr__(self, "from_pin", require_pair(f"{self.key}.from_pin", self.from_pin, "m"))
+        check_numbers(self, self.key)
 
     @property
     def key(self) -> str:

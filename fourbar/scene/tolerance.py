@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from fourbar.effects.numbers import find_unit
 from fourbar.errors import InputError, expect
 from fourbar.linkage import POSITIVE, require
+from fourbar.scene.numbers import find_unit
 
 THREE_SIGMA = 3.0
 """What counts as the width of a normal distribution in a worst case."""

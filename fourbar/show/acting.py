@@ -7,7 +7,7 @@ any position.
 import cmath
 from typing import Any, NamedTuple
 
-from fourbar.effects.numbers import ROWS
+from fourbar.effects.pins import PinRows
 from fourbar.linkage import FIRST_PIN
 from fourbar.scene import Scene
 
@@ -70,9 +70,8 @@ def list_acting(scene: Scene) -> list[Symbol]:
 
 def _list_symbols(effect: Any) -> list[Symbol]:
     """List the symbols of one effect; none of a kind without one."""
-    if effect.key in ROWS:
-        entries = getattr(effect, ROWS[effect.key])
-        return [Symbol(effect.key, effect.key.replace("_", " "), pin=entry[0]) for entry in entries]
+    if isinstance(effect, PinRows):
+        return [Symbol(effect.key, effect.key.replace("_", " "), pin=pin) for pin, *_ in effect.rows]
     if effect.key == "gravity":
         return [Symbol("gravity", "g", vector=complex(*effect.vector))]
     if effect.key == "flywheel":

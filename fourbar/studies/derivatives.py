@@ -12,7 +12,6 @@ from fourbar.effects import Gravity, PinFriction
 from fourbar.effects.actions import Actions
 from fourbar.effects.cones import solve_sliding
 from fourbar.effects.effect import SolvedFriction
-from fourbar.effects.numbers import OF_SCENE
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.stages import list_kinematics, name_of_command
@@ -23,6 +22,7 @@ from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
+from fourbar.scene.numbers import OF_MOTION
 from fourbar.scene.point import OF_POINTS
 from fourbar.scene.stroke import find_triangle
 from fourbar.solution import Array, Solution, find_values, split_parts
@@ -178,7 +178,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     if not moving:  # positions depend on these alone
         of_positions = ("lengths", "points", "drive")
         known = {key: own for key, own in known.items() if key.startswith(of_positions) or ".centre." in key}
-    keys = {theta: SceneNumber((), OF_SCENE[scene.motion.names[0]])} | known
+    keys = {theta: SceneNumber((), OF_MOTION[scene.motion.names[0]].unit)} | known
     most = np.nan if at.stroke is None else float(at.stroke.max())
     numbers = [most if key == theta else read_place(scene, entry.place) for key, entry in keys.items()]
     forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")

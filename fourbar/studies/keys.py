@@ -9,11 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fourbar.effects.numbers import OF_EFFECT, ROWS, find_unit
+from fourbar.effects import Gravity, Springs
+from fourbar.effects.pins import PinRows
+from fourbar.effects.spring import AT
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import namespace, polar
-from fourbar.linkage import ANY, AT_LEAST_ZERO, BAR_NAMES, MOVING_BARS, POSITIVE, Bar
+from fourbar.linkage import ANY, AT_LEAST_ZERO, BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
+from fourbar.scene.numbers import OF_MOTION
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Of what is commanded."""
@@ -39,44 +42,47 @@ class SceneNumber(NamedTuple):
         return namespace(values).isfinite(values) & low
 
 
-def _make_entry(key: str, place: Place, bound: str = ANY) -> dict[str, SceneNumber]:
-    """Make the entry of a number."""
-    unit = find_unit(key)
-    assert unit is not None, key
-    return {key: SceneNumber(place, unit, bound)}
+def _list_numbers(description: Any, key: str, place: Place) -> dict[str, SceneNumber]:
+    """List the entries of the numbers that a description states, a magnitude and its angle as two."""
+    found = dict[str, SceneNumber]()
+    for name, stated in description.numbers.items():
+        if stated.pair:
+            found |= _make_pair(f"{key}.{name}", (*place, name), stated.unit)
+        else:
+            found[f"{key}.{name}"] = SceneNumber((*place, name), *stated[:2])
+    return found
 
 
-def _make_pair(key: str, place: Place, names: tuple[str | int, str | int] = (0, 1)) -> dict[str, SceneNumber]:
+def _make_pair(
+    key: str, place: Place, unit: str, names: tuple[str | int, str | int] = (0, 1)
+) -> dict[str, SceneNumber]:
     """Make the two entries of a magnitude with its angle."""
-    return _make_entry(f"{key}.0", (*place, names[0])) | _make_entry(f"{key}.1", (*place, names[1]))
+    return {f"{key}.0": SceneNumber((*place, names[0]), unit), f"{key}.1": SceneNumber((*place, names[1]), "rad")}
 
 
 def _list_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of an effect under its key, at its place."""
-    numbers = OF_EFFECT.get(effect.key, {})
-    if effect.key == "gravity":
-        return _make_pair(key, place, ("magnitude", "angle"))
-    if effect.key in ROWS:
-        field = ROWS[effect.key]
+    if isinstance(effect, Gravity):
+        return _make_pair(key, place, effect.numbers["magnitude"].unit, ("magnitude", "angle"))
+    if isinstance(effect, PinRows):
         return {
-            f"{key}.{row[0]}.{name}".removesuffix("."): SceneNumber((*place, field, index, column), *of)
-            for index, row in enumerate(getattr(effect, field))
-            for column, (name, of) in enumerate(numbers.items(), 1)
+            f"{key}.{row[0]}.{name}".removesuffix("."): SceneNumber((*place, effect.field, index, column), *of[:2])
+            for index, row in enumerate(effect.rows)
+            for column, (name, of) in enumerate(effect.numbers.items(), 1)
         }
-    if effect.key != "springs":
-        return {f"{key}.{name}": SceneNumber((*place, name), *of) for name, of in numbers.items()}
+    if not isinstance(effect, Springs):
+        return _list_numbers(effect, key, place)
     found = dict[str, SceneNumber]()
-    for index in range(len(effect.springs)):
-        spring, own = f"{key}.{index}", (*place, "springs", index)
-        found |= {f"{spring}.{name}": SceneNumber((*own, name), *of) for name, of in numbers.items()}
-        found |= _list_ends(spring, own)
+    for index, spring in enumerate(effect.springs):
+        own = (*place, "springs", index)
+        found |= _list_numbers(spring, f"{key}.{index}", own) | _list_ends(f"{key}.{index}", own)
     return found
 
 
 def _list_ends(key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of both ends of a line between two bars."""
     one, other = (
-        _make_pair(f"{key}.{name}.at", (*place, end), ("distance", "angle"))
+        _make_pair(f"{key}.{name}.at", (*place, end), AT.unit, ("distance", "angle"))
         for name, end in (("from", "start"), ("to", "end"))
     )
     return one | other
@@ -84,27 +90,21 @@ def _list_ends(key: str, place: Place) -> dict[str, SceneNumber]:
 
 def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     """List the numbers of a scene that a study varies, lengths first, by key; what is commanded is not among them."""
-    found = _make_entry("lengths.ground", ("linkage", "ground"), POSITIVE)
-    bars = [BAR_NAMES[number] for number in MOVING_BARS]
-    for name in bars:
-        found |= _make_entry(f"lengths.{name}", ("linkage", name, "length"), POSITIVE)
-    found |= _make_entry("lengths.ground_angle", ("linkage", "ground_angle"))
-    for name in bars:
-        for number in ("mass", "inertia"):
-            found |= _make_entry(f"bars.{name}.{number}", ("linkage", name, number), AT_LEAST_ZERO)
-        found |= _make_pair(f"bars.{name}.centre", ("linkage", name, "centre"))
+    of_ground = _list_numbers(FourBar, "lengths", ("linkage",))
+    bars = {BAR_NAMES[bar]: _list_numbers(Bar, "", ("linkage", BAR_NAMES[bar])) for bar in MOVING_BARS}
+    lengths = {f"lengths.{name}": numbers.pop(".length") for name, numbers in bars.items()}
+    found = {"lengths.ground": of_ground["lengths.ground"], **lengths, **of_ground}
+    found |= {f"bars.{name}{key}": number for name, numbers in bars.items() for key, number in numbers.items()}
     if scene.motion.law is None:
         for name in scene.motion.names[1:]:
-            found |= _make_entry(f"motion.{name}", ("motion", name))
+            found[f"motion.{name}"] = SceneNumber(("motion", name), *OF_MOTION[name][:2])
     if scene.drive is not None:
         found |= _list_ends("drive", ("drive",))
     for index, load in enumerate(scene.loads):
-        if load.force is not None:
-            found |= _make_pair(f"loads.{index}.force", ("loads", index, "force"))
-            found |= _make_pair(f"loads.{index}.at", ("loads", index, "at"))
-        found |= _make_entry(f"loads.{index}.moment", ("loads", index, "moment"))
+        numbers = _list_numbers(load, f"loads.{index}", ("loads", index))
+        found |= {key: of for key, of in numbers.items() if load.force is not None or of.place[2] == "moment"}
     for index, point in enumerate(scene.points):
-        found |= _make_pair(f"{point.key}.from_pin", ("points", index, "from_pin"))
+        found |= _list_numbers(point, point.key, ("points", index))
     for index, effect in enumerate(scene.effects):
         found |= _list_effect(effect, f"effects.{effect.key}", ("effects", index))
     return found

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Effect
-from fourbar.effects.numbers import find_unit
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.blocks import choose_block_size, keep
 from fourbar.evaluation.case import BLOCK, Case
@@ -19,6 +18,7 @@ from fourbar.linkage import convert_to_unit
 from fourbar.quantities import ANGLES, INVALID, NOT_ASSEMBLED
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
+from fourbar.scene.numbers import find_unit
 from fourbar.scene.stroke import turn_bar
 from fourbar.solution import Array, Solution
 from fourbar.solve import find_requested, make_arrays, make_solution, unwrap_angles

@@ -13,11 +13,8 @@ import numpy as np
 import pytest
 
 from fourbar import effects
-from fourbar.effects import numbers
 from fourbar.errors import InputError, LimitError
 from fourbar.files import dump, loads
-from fourbar.files import effects as in_files
-from fourbar.files.effects import REGISTRY
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.effects import MJCF_OF, NO_MJCF
 from fourbar.scene import Scene, command
@@ -34,8 +31,6 @@ from tests.validation.engines.test_effects import ENGINES, EXACT, SIMULATED, fai
 PAGE = (Path(__file__).parents[2] / "docs" / "adding-an-effect.md").read_text(encoding="utf-8")
 REFERENCE = (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
 TABLES: list[tuple[ModuleType, str]] = [
-    (numbers, "OF_EFFECT"),
-    (in_files, "REGISTRY"),
     (on_trees, "TERM_OF"),
     (in_scales, "SIZE_OF"),
     (free_body_effects, "WRENCH_OF"),
@@ -93,7 +88,7 @@ def test_the_example_is_read_written_and_agreed_on(latch: Any) -> None:
     scene = guide_scene()
     assert scene.effects == (latch(4, 0.2, math.radians(115.0), math.radians(5.0)),)
     assert loads(dump(scene)).effects == scene.effects
-    assert REGISTRY["latch"].example in block("toml")
+    assert latch.example in block("toml")
     assert failing(scene, EXACT) == []
     assert refusals(scene, EXACT) == {}
 
@@ -126,11 +121,11 @@ def test_without_its_row_nothing_is_judged_by_another_scale(latch: Any, monkeypa
     assert engines >= {witness.name for witness in EXACT}
 
 
-def test_without_its_row_a_file_neither_reads_nor_writes_the_example(
+def test_without_its_line_a_file_neither_reads_nor_writes_the_example(
     latch: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = guide_scene()
-    monkeypatch.delitem(REGISTRY, "latch")
+    monkeypatch.delitem(effects.FILE_OF, "Latch")
     with pytest.raises(InputError, match=r"effects\.latch"):
         guide_scene()
     with pytest.raises(InputError, match=r"effects\.latch"):
@@ -174,9 +169,9 @@ def test_a_fault_in_the_example_is_caught(latch: Any, place: str, monkeypatch: p
     assert "torque" in {quantity for _, quantity, _ in failing(guide_scene(), EXACT)}
 
 
-@pytest.mark.parametrize("key", REGISTRY)
+@pytest.mark.parametrize("key", effects.list_kinds())
 def test_the_example_of_each_effect_is_read_and_written_back(key: str) -> None:
-    example = REGISTRY[key].example
+    example = effects.list_kinds()[key].example
     scene = loads(f"{SCENE}[effects]\n{example}")
     assert [each.key for each in scene.effects] == [key]
     assert loads(dump(scene)).effects == scene.effects
@@ -185,14 +180,14 @@ def test_the_example_of_each_effect_is_read_and_written_back(key: str) -> None:
 
 def test_every_effect_has_a_row_in_each_table() -> None:
     """In MJCF those that have a counterpart; loads have a table of their own in a file."""
-    keys = {getattr(effects, name).key for name in effects.FILE_OF}
-    assert keys == {*REGISTRY} == {*free_body_effects.WRENCH_OF}
+    keys = {*effects.list_kinds()}
+    assert keys == {*free_body_effects.WRENCH_OF}
     assert keys | {"load"} == {*on_trees.TERM_OF} == {*in_scales.SIZE_OF} == {*MJCF_OF, *NO_MJCF}
 
 
 def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
     scene = loads(SCENE.partition("[motion]")[0] + block("toml", REFERENCE))
-    assert [effect.key for effect in scene.effects] == list(REGISTRY)
+    assert [effect.key for effect in scene.effects] == list(effects.list_kinds())
     assert scene.motion.law is not None and scene.loads[0].table is not None
     again = loads(dump(scene))
     assert (again.effects, again.loads, again.motion.law) == (scene.effects, scene.loads, scene.motion.law)

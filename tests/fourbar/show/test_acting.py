@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Load
+from fourbar.effects import Load, list_kinds
 from fourbar.effects.load import Table
 from fourbar.files import loads
-from fourbar.files.effects import REGISTRY
 from fourbar.scene import Scene
 from fourbar.show import animate
 from fourbar.show.acting import NO_SYMBOL, list_acting
@@ -29,7 +28,7 @@ TABLED = Load(4, (5.0, 0.2), table=Table((0.0, math.pi, math.tau), (1.0, -1.0, 1
 @pytest.fixture(scope="module")
 def everything() -> Scene:
     """Every effect that a scene file can name, by its own example, and loads of both frames."""
-    effects = "\n".join(entry.example for entry in REGISTRY.values())
+    effects = "\n".join(kind.example for kind in list_kinds().values())
     lengths = '[lengths]\nground = "0.3 m"\ninput = "0.1 m"\ncoupler = "0.25 m"\noutput = "0.22 m"\n'
     described = loads(f'{lengths}[motion]\nomega_2 = "3 rad/s"\n[effects]\n{effects}\n')
     return crank_rocker(loads=(TURNING, TABLED), effects=described.effects, drive_bar=4)
@@ -37,7 +36,7 @@ def everything() -> Scene:
 
 def test_everything_that_acts_has_a_symbol(everything: Scene) -> None:
     kinds = [symbol.kind for symbol in list_acting(everything)]
-    for key in REGISTRY.keys() - NO_SYMBOL:
+    for key in list_kinds().keys() - NO_SYMBOL:
         assert {"springs": "spring"}.get(key, key) in kinds
     assert kinds.count("force") == 2 and kinds[0] == "drive"
     released = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(0.5, 4)))
