@@ -37,11 +37,14 @@ def fields(kind: type) -> list[tuple[str, str, str]]:
     body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
     found: list[tuple[str, str, str]] = []
     for statement in body:
-        if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+        if isinstance(statement, ast.AnnAssign) and ast.unparse(statement.annotation).startswith("ClassVar"):
+            found.append(("", "", ""))  # of the class, not of what it describes; its docstring goes with it
+        elif isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
             found.append((statement.target.id, ast.unparse(statement.annotation), ""))
         elif found and isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
             name, of, _ = found.pop()
             found.append((name, of, " ".join(str(statement.value.value).split())))
+    found = [each for each in found if each[0]]
     return found + (fields(Quantities) if Quantities in kind.__bases__ else [])
 
 
@@ -53,7 +56,9 @@ def signature(thing: Any) -> str:
         taken = [
             ast.unparse(each).replace("field(default_factory=", "(")
             for each in node.body
-            if isinstance(each, ast.AnnAssign) and not ast.unparse(each).endswith("init=False)")
+            if isinstance(each, ast.AnnAssign)
+            and not ast.unparse(each).endswith("init=False)")
+            and not ast.unparse(each.annotation).startswith("ClassVar")
         ]
         return f"({', '.join(taken)})"
     node.args.args = [each for each in node.args.args if each.arg != "self"]

@@ -110,7 +110,7 @@ REQUIRED = object()
 """In place of what is left out: the number has to be stated."""
 
 
-class Stated(NamedTuple):
+class Declared(NamedTuple):
     """How a number of a scene is stated, in constructors, scene files, studies and tolerances."""
 
     unit: str
@@ -149,11 +149,11 @@ class Bar:
     mass: float = 0.0
     inertia: float | None = None
     centre: tuple[float, float] | None = None
-    numbers: ClassVar[dict[str, Stated]] = {
-        "length": Stated("m", POSITIVE),
-        "mass": Stated("kg", AT_LEAST_ZERO, 0.0),
-        "inertia": Stated("kg m^2", AT_LEAST_ZERO, None),
-        "centre": Stated("m", left_out=None, pair=True),
+    numbers: ClassVar[dict[str, Declared]] = {
+        "length": Declared("m", POSITIVE),
+        "mass": Declared("kg", AT_LEAST_ZERO, 0.0),
+        "inertia": Declared("kg m^2", AT_LEAST_ZERO, None),
+        "centre": Declared("m", left_out=None, pair=True),
     }
 
     def __post_init__(self) -> None:
@@ -191,7 +191,10 @@ class FourBar:
     coupler: Bar
     output: Bar
     ground_angle: float = 0.0
-    numbers: ClassVar[dict[str, Stated]] = {"ground": Stated("m", POSITIVE), "ground_angle": Stated("rad", ANY, 0.0)}
+    numbers: ClassVar[dict[str, Declared]] = {
+        "ground": Declared("m", POSITIVE),
+        "ground_angle": Declared("rad", ANY, 0.0),
+    }
 
     def __post_init__(self) -> None:
         check_numbers(self, "lengths")

@@ -10,7 +10,7 @@ from fourbar.effects.actions import Actions
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import PinForces
-from fourbar.linkage import Stated
+from fourbar.linkage import Declared
 from fourbar.solution import Array
 
 
@@ -37,7 +37,7 @@ class Effect:
     """Its name: under ``[effects]``, and in every table."""
     example: ClassVar[str] = ""
     """One line of a scene file."""
-    numbers: ClassVar[Mapping[str, Stated]] = {}
+    numbers: ClassVar[Mapping[str, Declared]] = {}
     """Its numbers by their names."""
     dry: ClassVar[bool] = False
     """Whether its couples jump where the relative rotation at a pin changes its sense."""

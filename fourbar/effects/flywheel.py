@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fourbar.effects.effect import Effect
-from fourbar.linkage import AT_LEAST_ZERO, Stated, check_numbers, require_whole
+from fourbar.linkage import AT_LEAST_ZERO, Declared, check_numbers, require_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Flywheel(Effect):
     bar: int = 2
     key: ClassVar[str] = "flywheel"
     example: ClassVar[str] = 'flywheel = { bar = 2, inertia = "0.02 kg m^2" }'
-    numbers: ClassVar[dict[str, Stated]] = {"inertia": Stated("kg m^2", AT_LEAST_ZERO)}
+    numbers: ClassVar[dict[str, Declared]] = {"inertia": Declared("kg m^2", AT_LEAST_ZERO)}
 
     def __post_init__(self) -> None:
         check_numbers(self, "effects.flywheel")

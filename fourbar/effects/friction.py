@@ -7,7 +7,7 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.pins import PinRows
 from fourbar.formulas.arithmetic import is_any
 from fourbar.formulas.motion import State
-from fourbar.linkage import AT_LEAST_ZERO, Stated
+from fourbar.linkage import AT_LEAST_ZERO, Declared
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class Friction(PinRows):
     torques: tuple[tuple[str, float], ...]
     key: ClassVar[str] = "friction"
     example: ClassVar[str] = 'friction = { A = "0.05 N m" }'
-    numbers: ClassVar[dict[str, Stated]] = {"": Stated("N m", AT_LEAST_ZERO)}
+    numbers: ClassVar[dict[str, Declared]] = {"": Declared("N m", AT_LEAST_ZERO)}
     dry: ClassVar[bool] = True
 
     @property

@@ -10,7 +10,7 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.formulas.arithmetic import is_any, namespace, polar, vector
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, Stated, check_numbers
+from fourbar.linkage import MOVING_BARS, Declared, check_numbers
 
 U = 2.0**-53
 """Unit round-off of a double."""
@@ -24,7 +24,7 @@ class Gravity(Effect):
     angle: float = -math.pi / 2
     key: ClassVar[str] = "gravity"
     example: ClassVar[str] = 'gravity = ["9.81 m/s^2", "-90 deg"]'
-    numbers: ClassVar[dict[str, Stated]] = {"magnitude": Stated("m/s^2"), "angle": Stated("rad")}
+    numbers: ClassVar[dict[str, Declared]] = {"magnitude": Declared("m/s^2"), "angle": Declared("rad")}
 
     def __post_init__(self) -> None:
         check_numbers(self, "effects.gravity")

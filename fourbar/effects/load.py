@@ -13,7 +13,7 @@ from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import PI_LOW, angle, is_any, make_like, namespace, nearest, polar, split_sum
 from fourbar.formulas.longer import shorten
 from fourbar.formulas.motion import State
-from fourbar.linkage import FourBar, Stated, check_numbers, require_bar, require_numbers
+from fourbar.linkage import Declared, FourBar, check_numbers, require_bar, require_numbers
 
 TURN = 2.0 * math.pi
 BEYOND_TURN = 2.0 * PI_LOW
@@ -113,10 +113,10 @@ class Load(Effect):
     frame: str = "world"
     table: Table | None = None
     key: ClassVar[str] = "load"
-    numbers: ClassVar[dict[str, Stated]] = {
-        "force": Stated("N", left_out=None, pair=True),
-        "at": Stated("m", left_out=(0.0, 0.0), pair=True),
-        "moment": Stated("N m", left_out=0.0),
+    numbers: ClassVar[dict[str, Declared]] = {
+        "force": Declared("N", left_out=None, pair=True),
+        "at": Declared("m", left_out=(0.0, 0.0), pair=True),
+        "moment": Declared("N m", left_out=0.0),
     }
 
     def __post_init__(self) -> None:

@@ -14,7 +14,7 @@ from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import is_any, make_like
 from fourbar.formulas.longer import shorten
 from fourbar.formulas.pin_forces import PinForces
-from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Stated
+from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared
 from fourbar.quantities import JAMMED, OK, SEVERAL
 from fourbar.solution import Array
 
@@ -31,9 +31,9 @@ class PinFriction(PinRows):
     pins: tuple[tuple[str, float, float], ...]
     key: ClassVar[str] = "pin_friction"
     example: ClassVar[str] = 'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
-    numbers: ClassVar[dict[str, Stated]] = {
-        "coefficient": Stated("1", AT_LEAST_ZERO),
-        "radius": Stated("m", AT_LEAST_ZERO),
+    numbers: ClassVar[dict[str, Declared]] = {
+        "coefficient": Declared("1", AT_LEAST_ZERO),
+        "radius": Declared("m", AT_LEAST_ZERO),
     }
     dry: ClassVar[bool] = True
 

@@ -17,8 +17,8 @@ from fourbar.linkage import (
     BAR_NAMES,
     POSITIVE,
     SECOND_PIN,
+    Declared,
     FourBar,
-    Stated,
     check_numbers,
     require,
     require_pair,
@@ -30,11 +30,11 @@ COINCIDE = 16.0 * 2.0**-52
 """Two points nearer than this part of their paths from O2, bar by bar, have no direction between them."""
 
 
-AT = Stated("m", left_out=(0.0, 0.0), pair=True)
+AT = Declared("m", left_out=(0.0, 0.0), pair=True)
 """How the place of an end on its bar is stated."""
 GAS = {
-    **dict.fromkeys(("extended", "stroke"), Stated("m", POSITIVE)),
-    **dict.fromkeys(("extended_force", "compressed_force"), Stated("N", AT_LEAST_ZERO)),
+    **dict.fromkeys(("extended", "stroke"), Declared("m", POSITIVE)),
+    **dict.fromkeys(("extended_force", "compressed_force"), Declared("N", AT_LEAST_ZERO)),
 }
 """Numbers of a gas spring, which becomes one of the springs."""
 
@@ -113,10 +113,10 @@ class Spring:
     stiffness: float
     length: float = 0.0
     preload: float = 0.0
-    numbers: ClassVar[dict[str, Stated]] = {
-        "stiffness": Stated("N/m", AT_LEAST_ZERO),
-        "length": Stated("m", AT_LEAST_ZERO),
-        "preload": Stated("N", left_out=0.0),
+    numbers: ClassVar[dict[str, Declared]] = {
+        "stiffness": Declared("N/m", AT_LEAST_ZERO),
+        "length": Declared("m", AT_LEAST_ZERO),
+        "preload": Declared("N", left_out=0.0),
     }
 
     def __post_init__(self) -> None:
@@ -179,7 +179,7 @@ class Springs(Effect):
         'springs = [{ from = { bar = 1, at = ["10 cm", "-90 deg"] }, to = { bar = 4, at = ["8 cm", "0 deg"] }, '
         'stiffness = "200 N/m", length = "12 cm", preload = "3 N" }]'
     )
-    numbers: ClassVar[dict[str, Stated]] = {**Spring.numbers, "at": AT}
+    numbers: ClassVar[dict[str, Declared]] = {**Spring.numbers, "at": AT}
 
     def __post_init__(self) -> None:
         expect("effects.springs", self.springs, tuple, list)

@@ -15,7 +15,7 @@ from fourbar.formulas.arithmetic import Number, conjugate, namespace, wrap_angle
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES
 from fourbar.formulas.position import reorder_lengths
-from fourbar.linkage import PINS, POSITIVE, Stated
+from fourbar.linkage import PINS, POSITIVE, Declared
 from fourbar.quantities import OK, WOUND
 from fourbar.solution import Array
 
@@ -39,10 +39,10 @@ class Torsion(PinRows):
     counts_turns: ClassVar[bool] = True
     key: ClassVar[str] = "torsion"
     example: ClassVar[str] = 'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg", preload = "0.1 N m" } }'
-    numbers: ClassVar[dict[str, Stated]] = {
-        "stiffness": Stated("N m/rad", POSITIVE),
-        "rest": Stated("rad"),
-        "preload": Stated("N m", left_out=0.0),
+    numbers: ClassVar[dict[str, Declared]] = {
+        "stiffness": Declared("N m/rad", POSITIVE),
+        "rest": Declared("rad"),
+        "preload": Declared("N m", left_out=0.0),
     }
 
     def __post_init__(self) -> None:

@@ -6,7 +6,7 @@ from typing import ClassVar
 from fourbar.effects.actions import Actions
 from fourbar.effects.pins import PinRows
 from fourbar.formulas.motion import State
-from fourbar.linkage import AT_LEAST_ZERO, Stated
+from fourbar.linkage import AT_LEAST_ZERO, Declared
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +16,7 @@ class Viscous(PinRows):
     coefficients: tuple[tuple[str, float], ...]
     key: ClassVar[str] = "viscous"
     example: ClassVar[str] = 'viscous = { O2 = "0.01 N m s/rad" }'
-    numbers: ClassVar[dict[str, Stated]] = {"": Stated("N m s/rad", AT_LEAST_ZERO)}
+    numbers: ClassVar[dict[str, Declared]] = {"": Declared("N m s/rad", AT_LEAST_ZERO)}
 
     def act(self, actions: Actions, state: State) -> None:
         """M on bar j = -k (omega_j - omega_i), its opposite on bar i."""

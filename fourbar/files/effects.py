@@ -7,7 +7,7 @@ from fourbar import effects as kinds
 from fourbar.effects.pins import PinRows
 from fourbar.effects.spring import AT, GAS
 from fourbar.errors import InputError
-from fourbar.files.fields import Reader, write_numbers, write_polar, write_stated
+from fourbar.files.fields import Reader, write_declared, write_numbers, write_polar
 from fourbar.linkage import PINS
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def write_effect(effect: "Effect") -> Any:
     if isinstance(effect, PinRows):
         rows = {}
         for pin, *values in effect.rows:
-            texts = {name: write_stated(x, of) for (name, of), x in zip(effect.numbers.items(), values, strict=True)}
+            texts = {name: write_declared(x, of) for (name, of), x in zip(effect.numbers.items(), values, strict=True)}
             rows[pin] = texts.get("", texts)
         return rows
     bar = {"bar": effect.bar} if hasattr(effect, "bar") else {}
@@ -86,11 +86,11 @@ def read_ends(read: Reader, key: str, given: dict[str, Any]) -> "tuple[SpringEnd
         own = f"{key}.{name}"
         entry = read.table(own, given.get(name), ("bar", "at"))
         bar = read.whole(f"{own}.bar", entry.get("bar"), 1, 4)
-        ends.append(kinds.SpringEnd(bar, *read.stated(f"{own}.at", entry.get("at"), AT)))
+        ends.append(kinds.SpringEnd(bar, *read.declared(f"{own}.at", entry.get("at"), AT)))
     return ends[0], ends[1]
 
 
 def write_ends(line: Any) -> dict[str, Any]:
     """Write them back."""
     ends = {"from": line.start, "to": line.end}
-    return {name: {"bar": end.bar, "at": write_stated(end[1:], AT)} for name, end in ends.items()}
+    return {name: {"bar": end.bar, "at": write_declared(end[1:], AT)} for name, end in ends.items()}

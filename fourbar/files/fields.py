@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from fourbar.errors import InputError
-from fourbar.linkage import ANY, REQUIRED, Stated, is_within
+from fourbar.linkage import ANY, REQUIRED, Declared, is_within
 from fourbar.quantities.units import UnitError, to_si
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -88,17 +88,15 @@ class Reader:
         except UnitError as error:
             raise self.refuse(key, value, f"{error}; {wanted}") from None
 
-    def stated(self, key: str, value: object, stated: Stated) -> Any:
+    def declared(self, key: str, value: object, by: Declared) -> Any:
         """Read a number, or a magnitude with its angle, as it is declared."""
-        if value is None and stated.left_out is not REQUIRED:
-            return stated.left_out
-        return self.polar(key, value, stated.unit) if stated.pair else self.quantity(key, value, *stated[:2])
+        if value is None and by.left_out is not REQUIRED:
+            return by.left_out
+        return self.polar(key, value, by.unit) if by.pair else self.quantity(key, value, *by[:2])
 
-    def numbers(self, key: str, given: Mapping[str, object], numbers: Mapping[str, Stated]) -> dict[str, Any]:
+    def numbers(self, key: str, given: Mapping[str, object], numbers: Mapping[str, Declared]) -> dict[str, Any]:
         """Read each of some numbers, by name."""
-        return {
-            name: self.stated(f"{key}.{name}".rstrip("."), given.get(name), stated) for name, stated in numbers.items()
-        }
+        return {name: self.declared(f"{key}.{name}".rstrip("."), given.get(name), by) for name, by in numbers.items()}
 
     def quantities(self, key: str, value: object, unit: str) -> tuple[float, ...]:
         """Read a list of numbers with units, in `unit`."""
@@ -128,15 +126,17 @@ def write_quantity(value: float, unit: str) -> Any:
     return text
 
 
-def write_stated(value: Any, stated: Stated) -> Any:
+def write_declared(value: Any, by: Declared) -> Any:
     """Write a number, or a magnitude with its angle, as it is declared."""
-    return write_polar(value[0], value[1], stated.unit) if stated.pair else write_quantity(value, stated.unit)
+    return write_polar(value[0], value[1], by.unit) if by.pair else write_quantity(value, by.unit)
 
 
 def write_numbers(description: Any) -> dict[str, Any]:
     """Write the numbers that a description states; what it leaves out stays out."""
     values = {name: getattr(description, name) for name in description.numbers}
-    return {name: write_stated(value, description.numbers[name]) for name, value in values.items() if value is not None}
+    return {
+        name: write_declared(value, description.numbers[name]) for name, value in values.items() if value is not None
+    }
 
 
 def write_polar(magnitude: float, angle: float, unit: str) -> list[str]:

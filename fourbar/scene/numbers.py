@@ -1,13 +1,13 @@
 """The unit of every number of a scene, by its key: each is declared where it belongs, as `numbers` of its class."""
 
 from fourbar import effects
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar, Stated
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, Declared, FourBar
 from fourbar.scene.motion import OF_STROKE
 from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.point import Point
 
 OF_MOTION = {
-    name: Stated(f"{unit}{per}")
+    name: Declared(f"{unit}{per}")
     for unit, commands in (("rad", COMMANDS.values()), ("m", [OF_STROKE]))
     for names in commands
     for name, per in zip(names, ("", "/s", "/s^2"), strict=True)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from fourbar.errors import InputError
-from fourbar.linkage import BAR_NAMES, Stated, check_numbers, require_whole
+from fourbar.linkage import BAR_NAMES, Declared, check_numbers, require_whole
 from fourbar.quantities import UNITS
 
 LONGEST_NAME = 40
@@ -26,7 +26,7 @@ class Point:
     name: str
     bar: int
     from_pin: tuple[float, float]
-    numbers: ClassVar[dict[str, Stated]] = {"from_pin": Stated("m", pair=True)}
+    numbers: ClassVar[dict[str, Declared]] = {"from_pin": Declared("m", pair=True)}
 
     def __post_init__(self) -> None:
         plain = isinstance(self.name, str) and self.name.isascii() and self.name.isidentifier()

@@ -25,7 +25,7 @@ JUDGED_BY = {
     "whole/test_package.py": "validation: places",
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: actions cones effect flywheel friction gravity load "
-    "numbers pin_friction pins torsion viscous",
+    "pin_friction pins torsion viscous",
     "fourbar/edit/test_session.py": "fourbar/edit: reply document dragging exports",
     "fourbar/edit/test_server.py": "fourbar/edit: redirect witness",
     "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text",
@@ -35,7 +35,7 @@ JUDGED_BY = {
     "fourbar/formulas/test_mobility.py": "fourbar/formulas: circuits linkage_type",
     "fourbar/test_solve.py": "fourbar: linkage solution; "
     "fourbar/scene: motion; fourbar/evaluation: blocks case stages withheld",
-    "fourbar/studies/test_study.py": "fourbar/scene: motion_law; fourbar/studies: keys",
+    "fourbar/studies/test_study.py": "fourbar/scene: motion_law numbers; fourbar/studies: keys",
     "fourbar/studies/test_spread.py": "fourbar/scene: tolerance; fourbar/files: tolerances",
     "fourbar/studies/test_derivatives.py": "fourbar/show: influence",
     "fourbar/studies/test_enclosure.py": "fourbar/studies: interval; fourbar/show: extremes",
