@@ -1,23 +1,30 @@
-# `make validate` runs the main job, `make test` the tests; each sets itself up in .venv first.
+# `make validate` runs the main job, `make test` the quick tests, `make test-all` all of them; each sets itself up first.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 LONG := kills package machines engines simulators problems releases standing free fuzz accuracy suites
 
-.PHONY: validate test long-test $(LONG:%=long-%) models docs setup clean
+.PHONY: validate test test-all check long-test $(LONG:%=long-%) models docs setup clean
 
 
 validate: setup
 	$(BIN)/python -m validation run
 
-test: setup
+# the contributor's loop: two minutes on two idle cores
+test: check
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
+
+# every test that is not of a night
+test-all: check
+	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-# everything that `make test` samples, in full; each part ends within one hour on two cores. Minutes of two idle cores: kills
+# everything that `make test-all` samples, in full; each part ends within one hour on two cores. Minutes of two idle cores: kills
 # at most 16, suites 6, package 3, standing 2; from the processor's time of a share: machines 7 for each kernel that the
 # processor has, free 15, fuzz 14, accuracy 12; the others below 5
 long-test: $(LONG:%=long-%)

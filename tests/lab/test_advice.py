@@ -15,6 +15,7 @@ from fourbar_validation.engines.mujoco.trial import TrialSetup
 from tests.validation.cost.test_cost import turning
 
 
+@pytest.mark.slow
 def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> None:
     """A few of those of the study `advice`, of every type, judged between the positions that the advice saw."""
     costs = {("RK4", True): 1.0}
@@ -23,6 +24,7 @@ def test_unseen_linkages_are_served_and_not_at_three_times_the_cheapest() -> Non
         assert case.met and case.cheap, case
 
 
+@pytest.mark.slow
 def test_the_search_knows_when_nothing_serves() -> None:
     scene = turning(positions=12)
     setup = TrialSetup(scene, command(scene))
@@ -38,6 +40,7 @@ def hopeless(scene: fourbar.Scene) -> object:
     return made
 
 
+@pytest.mark.slow
 def test_a_count_that_cannot_decide_says_which_one_can(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -26,6 +26,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(contenders, name, count)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
     found = bench.measure(1000, 1, 10_000)
@@ -40,6 +41,7 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
     assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 15
 
 
+@pytest.mark.slow
 def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, at = make_example(), make_command(500)
     own = solve(scene, at=at)

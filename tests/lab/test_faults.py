@@ -26,6 +26,7 @@ ELSEWHERE = (
     *("a third of all positions is called singular", "MuJoCo's loop without the drift of its Jacobian"),
     *("what no torque balances is called an overflow", "dry friction that holds a released linkage loads no pin"),
 )
+CHOSEN = {"forces": IN_FORCES, "torque": IN_TORQUE, "elsewhere": ELSEWHERE}
 """Some of each kind; `python -m fourbar_lab faults` tries them all."""
 EXACT = {"pinocchio-inverse", "mujoco-inverse", "free-body"}
 
@@ -39,7 +40,13 @@ def test_every_entry_fits_its_module_and_is_tried_on_a_scene() -> None:
         assert entry["caught_by"] or entry["harmless"], entry["fault"]
 
 
-@pytest.mark.parametrize("chosen", [IN_FORCES, IN_TORQUE, ELSEWHERE], ids=["forces", "torque", "elsewhere"])
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        pytest.param(IN_FORCES[:1], id="one"),
+        *(pytest.param(chosen, id=name, marks=pytest.mark.slow) for name, chosen in CHOSEN.items()),
+    ],
+)
 def test_an_injected_fault_fails_the_harness_where_its_entry_says(chosen: tuple[str, ...]) -> None:
     """A fault of the formulas is noticed by every exact engine by itself."""
     found = try_faults([ENTRIES[fault] for fault in chosen])

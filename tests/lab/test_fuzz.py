@@ -33,6 +33,7 @@ def test_a_kept_counterexample_holds(path: Path) -> None:
     assert findings(loads(path.read_text(encoding="utf-8"))) == []
 
 
+@pytest.mark.slow
 def test_a_stretch_of_scenes_holds() -> None:
     assert not [number for number in range(60) if examine.examine(SEED, False, number)]
 

@@ -16,6 +16,7 @@ from fourbar_lab.stability import run
 from fourbar_lab.tally import CHANCE, TOO_SMALL, USELESS, Tally, is_by_chance
 from tests.fourbar.studies.test_function import LIBRARIES
 
+pytestmark = pytest.mark.slow  # random campaigns
 SAMPLES = 40
 """Per family: about 1 s each; the ten thousand of each are `python -m fourbar_lab stability`."""
 FED_BACK = 8

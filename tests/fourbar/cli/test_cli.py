@@ -204,6 +204,7 @@ def test_a_terminal_gets_some_forty_rows() -> None:
     assert max(map(len, lines)) <= 80
 
 
+@pytest.mark.slow
 def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None:
     thinned = run("analyze", MODELS / "crank_rocker.toml", "--every", 100)[1].splitlines()
     rows = [line.split()[0] for line in thinned if re.match(r" *\d+\.\d{4} ", line)]
@@ -272,6 +273,7 @@ def test_the_digits_of_the_torque() -> None:
         assert digits == tables.MOST_DIGITS or error > abs(torque) * 10.0 ** -(digits + 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [(), ("--json",), ("--csv",)])
 def test_out_holds_what_would_be_printed(form: tuple[str, ...], tmp_path: Path, run: Fourbar) -> None:
     printed = run("analyze", MODELS / "crank_rocker.toml", *form)[1]
@@ -396,6 +398,7 @@ def test_sdf_and_usd_name_the_loads_that_they_leave_out(form: str, tmp_path: Pat
     assert run(form, MODELS / "crank_rocker.toml", "--without-loads", "-o", tmp_path / "a")[0] == HOLDS
 
 
+@pytest.mark.slow
 def test_plot_and_animate_write_what_their_ending_says(tmp_path: Path, run: Fourbar) -> None:
     file = MODELS / "crank_rocker.toml"
     drawn = tmp_path / "a.svg"
@@ -483,6 +486,7 @@ def child(*arguments: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run([sys.executable, *arguments], cwd=ROOT, text=True, capture_output=True, check=False)
 
 
+@pytest.mark.slow
 def test_the_command_line_starts_light() -> None:
     heavy = "pint rich matplotlib scipy mujoco pinocchio jinja2"
     code = f"import sys, fourbar.cli; print([m for m in {heavy.split()!r} if m in sys.modules])"
@@ -491,6 +495,7 @@ def test_the_command_line_starts_light() -> None:
     assert (done.returncode, done.stdout) == (0, f"fourbar, version {fourbar.__version__}\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [("classify", "3", "1", "2", "3"), ("analyze", "models/thesis.toml", "--json")])
 def test_a_reader_that_leaves_early_is_no_error(arguments: tuple[str, ...]) -> None:
     reading, writing = os.pipe()
@@ -501,6 +506,7 @@ def test_a_reader_that_leaves_early_is_no_error(arguments: tuple[str, ...]) -> N
     assert (done.returncode, done.stderr) == (HOLDS, "")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
 def test_standard_output_that_is_full() -> None:
     with Path("/dev/full").open("w") as full:

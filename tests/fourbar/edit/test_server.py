@@ -155,6 +155,7 @@ def test_a_request_of_a_hundred_megabytes_is_not_read(bench) -> None:
     bench(ask)
 
 
+@pytest.mark.slow
 def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(bench) -> None:
     async def ask(made: Workbench, address: str) -> None:
         assert await asyncio.gather(*(status(address) for _ in range(30))) == [200] * 30
@@ -191,6 +192,7 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench) -> None:
     assert session.state_file.exists()  # it is not saved
 
 
+@pytest.mark.slow
 def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch) -> None:
     collect, changed, finished = server.collect_tolerances, threading.Event(), []
 
@@ -287,6 +289,7 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch)
     bench(ask)
 
 
+@pytest.mark.slow
 def test_a_page_that_closes_while_answers_wait_leaves_no_trace(bench, caplog) -> None:
     async def ask(made: Workbench, address: str) -> None:
         line = await page(address)
@@ -329,6 +332,7 @@ def processor_time(process: subprocess.Popen) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
+@pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.parametrize("files", [256, 40], ids=["within its limit of files", "beyond its limit of files"])
 def test_half_open_connections_neither_stop_the_server_nor_stay(tmp_path: Path, files: int) -> None:
@@ -397,6 +401,7 @@ def test_a_page_in_the_background_which_is_woken_once_a_minute_finds_its_server(
     assert GONE >= 60.0 + 20.0
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_processes(tmp_path: Path) -> None:
     path, seen = tmp_path / "scene.toml", tmp_path / "seen"
@@ -421,6 +426,7 @@ def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_proc
     assert not redirect.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 def test_a_second_workbench_on_one_file_leads_to_the_first(tmp_path: Path) -> None:
     path, link = tmp_path / "scene.toml", tmp_path / "link.toml"
@@ -462,6 +468,7 @@ def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(tmp_pat
     second.remove()
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"

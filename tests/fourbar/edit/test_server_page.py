@@ -90,6 +90,7 @@ def opened(chromium, tmp_path: Path):
     chromium.get_log("browser")  # of lines that were cut on purpose
 
 
+@pytest.mark.slow
 def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(chromium, opened, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(fourbar.dump(fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22))))
     chromium.execute_cdp_cmd(
@@ -106,6 +107,7 @@ def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(chromium, open
     assert chromium.execute_script("return document.documentElement.scrollWidth") <= 400
 
 
+@pytest.mark.slow
 def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, tmp_path: Path) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     server = opened(path)
@@ -158,6 +160,7 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, t
     assert not driver.get_log("browser")
 
 
+@pytest.mark.slow
 def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(chromium, opened, tmp_path: Path) -> None:
     driver = chromium
     driver.get(opened(tmp_path / "mine.toml").address)
@@ -182,6 +185,7 @@ def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(chromium
     assert driver.execute_script("return data.lengths.slice(1, 3)") == [0.11, 0.25]
 
 
+@pytest.mark.slow
 def test_a_page_whose_line_is_cut_finds_its_server_again(chromium, opened, tmp_path: Path) -> None:
     driver = chromium
     driver.get(opened(tmp_path / "mine.toml").address)
@@ -191,6 +195,7 @@ def test_a_page_whose_line_is_cut_finds_its_server_again(chromium, opened, tmp_p
     wait_for(driver, "data.lengths[1] === 0.11")
 
 
+@pytest.mark.slow
 def test_a_stopped_server_is_named_and_a_new_one_goes_on_from_its_state(chromium, opened, tmp_path: Path) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     server = opened(path)

@@ -335,6 +335,7 @@ def test_a_damaged_state_file_is_one_line(session: Session, name: str) -> None:
     assert "\n" not in str(caught.value) and str(session.state_file) in str(caught.value)
 
 
+@pytest.mark.slow
 def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(session: Session) -> None:
     large = session.now.text + "".join(f"# {'µ' * 100} {n}\n" for n in range(1950))
     assert len(large) == pytest.approx(205_000, rel=0.05)

@@ -115,6 +115,7 @@ def test_friction_at_one_pin_in_fifty_digits() -> None:
     assert slowed.torque == pytest.approx(expected, abs=LAST_DIGITS * np.abs(expected).max(), rel=0)
 
 
+@pytest.mark.slow
 def test_friction_couples_fulfil_their_equation_with_forces_of_thirteen_equations() -> None:
     """Nine unknowns by Newton-Euler about the mass centres, written anew, with the friction found here."""
     pins = {"O2": (0.3, 0.02), "A": (0.25, 0.015), "B": (0.4, 0.01), "O4": (0.2, 0.02)}

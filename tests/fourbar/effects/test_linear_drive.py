@@ -339,6 +339,7 @@ def test_derivatives_by_its_ends_are_those_of_differences(one: int, other: int) 
             )
 
 
+@pytest.mark.slow
 def test_extremes_hold_every_sample() -> None:
     link, motion = fourbar.uniform(0.5, 0.3, 0.15, 0.15), fourbar.Motion(0.1, 3.0)
     across = fourbar.LinearDrive(SpringEnd(1, 0.4, 1.5), SpringEnd(2, 0.2, 0.1))

@@ -34,6 +34,7 @@ def linkage(name: str) -> fourbar.FourBar:
     return fourbar.uniform(*LINKAGES[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pin", ["A", "B"])
 @pytest.mark.parametrize("name", ["crank-rocker", "drag link"])
 def test_a_spring_with_both_ends_in_one_pin_has_no_direction(name: str, pin: str) -> None:
@@ -113,6 +114,7 @@ def test_the_pins_that_turn_do_wind_their_springs() -> None:
     assert travel["O2"] > 6.2 and travel["A"] > 6.2 and travel["B"] < math.pi and travel["O4"] < math.pi
 
 
+@pytest.mark.slow
 def test_every_engine_stops_where_the_spring_is_wound() -> None:
     spring = Torsion.at(O2=(0.2, 0.5, 0.0))
     scene = Scene(linkage("crank-rocker"), Motion(Sweep(0.1, 6.2, 12), 10.0), effects=(spring,))
@@ -137,6 +139,7 @@ def test_where_the_loop_closes_between_the_positions_alone_no_spring_begins() ->
     assert [row for row in record.rows if row.failed] == []
 
 
+@pytest.mark.slow
 def test_a_free_motion_that_winds_a_spring_is_an_error() -> None:
     free = Motion(0.1, 12.0, free=Free(1.0, 100))
     weak = Torsion.at(O2=(1e-4, 0.0, 0.0))

@@ -16,6 +16,7 @@ HANGING = fourbar.FourBar(
 )
 
 
+@pytest.mark.slow
 def test_one_window_of_iftomm_a02() -> None:
     """Ten seconds through the change points (lim.ii.udc.es/mbsbenchmark, A02)."""
     bar = fourbar.Bar(1.0, 1.0)
@@ -36,6 +37,7 @@ def test_needs_no_driving_torque() -> None:
     assert np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1  # of all the weights at one metre
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coupler", [0.12, 0.15])  # the first has a change point, the second a limit position only
 def test_stops_at_a_limit_unless_set_to_follow(coupler: float) -> None:
     linkage = fourbar.FourBar(0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4))
@@ -129,6 +131,7 @@ def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
     return np.linalg.solve(left, right)[9:].reshape(4, 2)
 
 
+@pytest.mark.slow
 def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPatch) -> None:
     """theta_2, omega_2, alpha_2 as doubles do not hold the forces there, the angle of bar 4 does."""
     motion = SWING.motion

@@ -162,6 +162,7 @@ SHOWN = {
 MANY = [(kind, number) for kind in KINDS for number in range(int(os.environ.get("FREE_MOTIONS", "0")))]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(("kind", "number"), list(dict.fromkeys([*SHOWN, *MANY])))
 def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
@@ -198,6 +199,7 @@ def test_the_motions_shown_meet_every_force() -> None:
     }
 
 
+@pytest.mark.slow
 def test_the_reference_against_a_printed_answer() -> None:
     """One window of IFToMM's A02 after ten seconds (lim.ii.udc.es/mbsbenchmark), through its change points."""
     bar = fourbar.Bar(1.0, 1.0)

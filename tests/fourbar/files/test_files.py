@@ -233,6 +233,7 @@ SCENE = st.builds(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(SCENE)
 def test_any_scene_reads_back_bit_for_bit(scene: fourbar.Scene) -> None:

@@ -274,6 +274,7 @@ def test_large_nonsense_is_answered_soon(pattern: str) -> None:
     assert time.process_time() - started < PATIENCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pattern", ["a{n}." + "a." * 98 + "a=1\n", "[a{n}]\nb=1\n", "[[a]]\nb={n}\n"])
 def test_large_files_without_a_repeated_key_are_answered_soon(pattern: str) -> None:
     text = "".join(pattern.format(n=n) for n in range(LARGEST_FILE // (len(pattern) + 3)))
@@ -283,6 +284,7 @@ def test_large_files_without_a_repeated_key_are_answered_soon(pattern: str) -> N
     assert time.process_time() - started < PATIENCE
 
 
+@pytest.mark.slow
 def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:
     """2000 seeded mutations of a good file: any other exception than ours fails the test."""
     random.seed(20261121)

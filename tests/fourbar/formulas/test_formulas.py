@@ -102,6 +102,7 @@ def hard_doubles(seed: int, count: int) -> list[tuple[float, float, float, float
     return found
 
 
+@pytest.mark.slow
 def test_a_difference_of_two_sums_is_zero_where_it_is_zero_and_nowhere_else() -> None:
     zeros = 0
     # two lengths a billiardth of the others: what both sums lose is no double
@@ -117,6 +118,7 @@ def test_a_difference_of_two_sums_is_zero_where_it_is_zero_and_nowhere_else() ->
     assert zeros > 1000
 
 
+@pytest.mark.slow
 def test_the_constants_of_the_loop_vanish_at_change_points_alone() -> None:
     zeros = [0, 0]
     # a + d and b + c, or a + c and b + d, from the same two sums

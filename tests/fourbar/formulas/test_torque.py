@@ -61,6 +61,7 @@ def some_of(at: Command, where: np.ndarray) -> Command:
     return at._replace(angle=at.theta_2[where], branch=at.branch[where], speed=omega, acceleration=alpha)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", [2, 3, 4])
 def test_torque_and_pin_forces_agree_with_the_thirteen_equations(drive: int) -> None:
     rng = np.random.default_rng(drive)

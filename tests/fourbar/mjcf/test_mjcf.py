@@ -77,6 +77,7 @@ def run_alone(scene: fourbar.Scene) -> tuple[float, float, float]:
     return gap, speed, abs(data.qpos[0] - (stop if omega > 0 else start)) / (stop - start)
 
 
+@pytest.mark.slow
 def test_runs_alone() -> None:
     rng, kinds = np.random.default_rng(SEED), set()
     for _ in range(40):
@@ -122,6 +123,7 @@ def test_the_joints_count_the_turns_of_every_spring() -> None:
     assert abs(at_O4 - rests["O4"]) < math.pi and abs(at_O4 - at_O2 - at_A - rests["B"]) < math.pi
 
 
+@pytest.mark.slow
 def test_opens_assembled_and_moves_without_keyframe_or_control() -> None:
     rng = np.random.default_rng(SEED)
     scenes = [fourbar.load(file) for file in list_model_files()] + [sprung()]

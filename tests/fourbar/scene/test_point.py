@@ -64,6 +64,7 @@ def test_positions_alone_have_no_velocities_of_points() -> None:
     assert s.points == {} and s.acceleration["P"] is out["a_P"] and out["a_P"].all()
 
 
+@pytest.mark.slow
 def test_every_table_has_their_columns() -> None:
     s = solve(scene(*POINTS))
     document, head = json.loads(write_json(s)), write_csv(s).split("\n", 1)[0].split(",")

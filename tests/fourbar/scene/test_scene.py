@@ -257,6 +257,7 @@ def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
         _ = fourbar.command(scene).theta_2
 
 
+@pytest.mark.slow
 def test_the_harness_asks_who_takes_the_command_and_writes_the_refusal_of_the_others() -> None:
     scene = replace(LOADED, motion=Motion(theta_4=Sweep(3.9, 4.4, 4), omega_4=2.0, alpha_4=1.0), drive_bar=3)
     rows = judge("", scene).rows

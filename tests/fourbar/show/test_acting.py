@@ -120,6 +120,7 @@ def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
     assert np.allclose(factors, TABLED.table.at(np.array(data["theta_2"])), rtol=1e-15)  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     """Path, speed and mark in the plot, place and columns in the page."""
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
@@ -139,6 +140,7 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     assert data["points"][0]["name"] == "P" and abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
 
 
+@pytest.mark.slow
 def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything: Scene) -> None:
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
     from tests.fourbar.show.plot.test_plot import clashes, composed
@@ -152,6 +154,7 @@ def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything:
     assert not clashes(composed(pump, "overview", units="imperial"))
 
 
+@pytest.mark.slow
 def test_a_film_names_and_moves_what_the_plot_does(everything: Scene) -> None:
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
     from fourbar.show.plot.film import _make_stage

@@ -72,6 +72,7 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown() -> None:
 RELEASED = crank_rocker(motion=fourbar.Motion(0.5, 0.0, free=fourbar.Free(1.8, 90)), drive_bar=2)
 
 
+@pytest.mark.slow
 def test_a_free_motion_is_embedded_instant_by_instant() -> None:
     data, solution = embedded(animate.write_page(RELEASED)), fourbar.solve(RELEASED)
     (columns,) = data["branches"].values()
@@ -177,6 +178,7 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_gif_moves_the_linkage(tmp_path: Path) -> None:
     from PIL import Image
 
@@ -190,6 +192,7 @@ def test_a_gif_moves_the_linkage(tmp_path: Path) -> None:
     assert all(np.any(p != q) for p, q in pairwise(pictures))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     shutil.which("ffmpeg") is None and find_spec("imageio_ffmpeg") is None, reason="neither ffmpeg nor imageio-ffmpeg"
 )
@@ -206,6 +209,7 @@ def test_without_ffmpeg_an_mp4_is_refused_in_one_line(tmp_path: Path, monkeypatc
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 def test_an_ffmpeg_without_the_encoder_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program = tmp_path / "bin" / "ffmpeg"
@@ -218,6 +222,7 @@ def test_an_ffmpeg_without_the_encoder_is_named(tmp_path: Path, monkeypatch: pyt
     assert not list(tmp_path.glob("*.mp4"))
 
 
+@pytest.mark.slow
 def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -22,6 +22,7 @@ from tests.support.scenes import crank_rocker, thesis
 HOSTILE = "<script>alert(1)</script>&"
 
 
+@pytest.mark.slow
 def test_a_scene_shows_itself() -> None:
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
     shown = thesis()._repr_html_()

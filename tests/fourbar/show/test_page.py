@@ -146,6 +146,7 @@ def test_an_input_that_turns_fully_goes_round_and_one_that_does_not_swings(brows
     assert np.abs(np.diff(rows)).max() <= 1  # it never jumps
 
 
+@pytest.mark.slow
 def test_a_free_motion_plays_once_in_its_own_time(browse) -> None:
     driver = browse(animate.write_page(RELEASED))
     s = fourbar.solve(RELEASED)
@@ -465,6 +466,7 @@ def test_it_says_why_a_position_has_no_forces(browse) -> None:
         assert (remark in status.text) and status.is_displayed() == bool(remark)
 
 
+@pytest.mark.slow
 def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> None:
     loose = (fourbar.Tolerance("lengths.input", 5e-5), fourbar.Tolerance("bars.coupler.mass", 0.001, True))
     scene = crank_rocker(tolerances=loose, points=(fourbar.Point("P", 3, (0.1, 0.2)),))

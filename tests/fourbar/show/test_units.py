@@ -65,6 +65,7 @@ def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(capsys: p
     assert "time" not in (fourbar.solve(growing).to_csv() or "")
 
 
+@pytest.mark.slow
 def test_the_table_names_its_units(capsys: pytest.CaptureFixture[str]) -> None:
     assert status(["analyze", str(MODEL), "--units", "mm kN N.mm"]) == HOLDS
     lines = capsys.readouterr().out.splitlines()
@@ -91,6 +92,7 @@ def test_units_are_read_as_people_write_them() -> None:
         units("mm lb-in")
 
 
+@pytest.mark.slow
 def test_plots_and_notebooks_say_theirs() -> None:
     pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
     from fourbar.show.plot.figures import draw_figure

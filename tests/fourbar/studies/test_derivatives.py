@@ -162,6 +162,7 @@ def test_an_unknown_name_is_refused() -> None:
             found.of(quantity, key)
 
 
+@pytest.mark.slow
 def test_the_command_ranks_the_numbers_and_writes_them_all(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     models, out = Path(__file__).parents[3] / "models", tmp_path / "s.json"
     assert status(["analyze", str(models / "crank_rocker.toml"), "--sensitivity"]) == 0

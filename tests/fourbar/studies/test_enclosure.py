@@ -44,6 +44,7 @@ def holds(found: Extremes, samples: dict[str, np.ndarray]) -> None:
         assert values.max() <= found.greatest[name].high + size, name
 
 
+@pytest.mark.slow
 def test_no_sample_lies_outside_and_the_enclosure_is_as_narrow_as_promised(rocker: tuple[Scene, Extremes]) -> None:
     scene, found = rocker
     theta_2 = np.linspace(0, 2 * math.pi, 20_001)
@@ -59,6 +60,7 @@ def test_no_sample_lies_outside_and_the_enclosure_is_as_narrow_as_promised(rocke
             assert extreme.low <= at + dense * size and at - dense * size <= extreme.high
 
 
+@pytest.mark.slow
 def test_poles_are_kept_away_from_and_the_drive_may_be_on_any_bar() -> None:
     scene = fourbar.load(MODELS / "thesis.toml")
     found = extremes(scene, ["torque"])
@@ -69,6 +71,7 @@ def test_poles_are_kept_away_from_and_the_drive_may_be_on_any_bar() -> None:
     assert found.greatest["torque"].high == pytest.approx(samples["torque"].max(), rel=1e-6)  # at an end
 
 
+@pytest.mark.slow
 def test_with_tolerances_no_linkage_lies_outside(rocker: tuple[Scene, Extremes]) -> None:
     scene, nominal = rocker
     linkage = scene.linkage.lengths
@@ -117,6 +120,7 @@ def test_a_pole_within_the_tolerances_is_named(monkeypatch: pytest.MonkeyPatch) 
         extremes(replace(scene, tolerances=(Tolerance("lengths.coupler", 0.01),)), ["torque"])
 
 
+@pytest.mark.slow
 def test_what_only_tolerances_widen_is_not_halved_further(rocker: tuple[Scene, Extremes]) -> None:
     loose = replace(rocker[0], tolerances=(Tolerance("lengths.input", 3e-3),))
     found = extremes(loose, ["torque"])
@@ -166,6 +170,7 @@ def meeting(distance: float) -> Scene:
     return Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(0.0, 10.0), 2, (), (Springs((spring,)),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [0.102, 0.1005])
 def test_a_spring_whose_ends_nearly_meet_hides_no_value(distance: float) -> None:
     scene = meeting(distance)
@@ -173,11 +178,13 @@ def test_a_spring_whose_ends_nearly_meet_hides_no_value(distance: float) -> None
     holds(extremes(scene, ["torque", "F12"]), sampled(solution))
 
 
+@pytest.mark.slow
 def test_a_spring_whose_ends_meet_has_no_bound_there() -> None:
     with pytest.raises(fourbar.FourBarError, match=r"no bound at theta_2 = 28\.64"):
         extremes(meeting(0.1), ["F12"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "lengths", [(1, 1e-7, 0.6, 0.8), (1, 1e-12, 0.6, 0.8), (1, 1e-3, 1.5, 0.51), (1, 0.3, 0.9, 0.8)]
 )
@@ -194,6 +201,7 @@ def test_the_transmission_angle_is_that_of_the_triangle_to_the_last_digits(lengt
         assert extreme.high - extreme.low <= PROVEN
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("far", [50.0, 1e11, -1e15])
 def test_turns_of_the_input_change_no_bound(far: float) -> None:
     scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(0.0, 10.0), drive_bar=4)
@@ -208,6 +216,7 @@ def test_a_ground_turned_too_far_is_one_line() -> None:
         extremes(Scene(turned, Motion(0.0, 10.0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1e-150, 1e150])
 def test_sizes_whose_squares_doubles_do_not_hold_are_bounded(size: float) -> None:
     lengths = (0.3, 0.1, 0.25, 0.22)

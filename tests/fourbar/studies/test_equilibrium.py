@@ -41,6 +41,7 @@ def one(found: Equilibria, stability: str) -> Equilibrium:
     return each
 
 
+@pytest.mark.slow
 def test_gazebos_four_bar_hangs_at_the_frequency_of_its_pendulum() -> None:
     scene = fourbar.load(MODELS / "problems" / "gz_physics_987.toml")
     found = equilibrium(scene)
@@ -69,6 +70,7 @@ def test_a_crank_with_mass_alone_is_a_pendulum() -> None:
     assert unstable.frequency is None and unstable.slope == pytest.approx(M * 9.81 * R, rel=CLOSE)
 
 
+@pytest.mark.slow
 def test_at_a_limit_of_the_input_the_output_is_the_angle() -> None:
     linkage = FourBar(0.3, Bar(0.4), Bar(0.2), Bar(0.25, M, INERTIA, (R, 0.0)), 0.5)
     for limit in fourbar.limit_positions(linkage):
@@ -130,6 +132,7 @@ def energy(scene: Scene, theta: np.ndarray, branch: np.ndarray) -> np.ndarray:
     return np.asarray(V)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_the_potential_energy_is_least_where_stable_and_nowhere_else(
     seed: int, monkeypatch: pytest.MonkeyPatch
@@ -170,6 +173,7 @@ def test_friction_holds_a_pendulum_within_the_angle_that_it_can() -> None:
     assert (whole.moves == 0).all() and len(whole.held) == 1 and all(each.held for each in whole.found)
 
 
+@pytest.mark.slow
 def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move() -> None:
     scene = fourbar.load(MODELS / "crank_rocker.toml")
     scene = replace(scene, loads=(), effects=(DOWN, PinFriction.at(O2=(0.2, 0.01), A=(0.1, 0.01), O4=(0.2, 0.02))))
@@ -185,6 +189,7 @@ def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move() -> None
         assert min(abs(torques.torque_low[1]), abs(torques.torque_high[1])) <= 1e-9 * size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", [(3.0, 3.0, 4.0, 4.0), (4.0, 4.0, 3.0, 3.0), (1.0, 1.0, 3.0, 3.0)])
 def test_beside_a_change_point_nothing_is_taken_for_a_rest(lengths: tuple[float, ...]) -> None:
     """A kite in which A comes to O4, turned with its gravity: as many equilibria, and as many undecided, none."""

@@ -34,6 +34,7 @@ def test_figures_of_the_crank_rocker(omega: float, required: float, most: int) -
     assert advice.best.steps == min(attempt.steps for attempt in serves) < max(attempt.steps for attempt in serves)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["double_rocker", "triple_rocker", "thesis"])
 def test_figures_of_rockers_and_the_thesis(name: str) -> None:
     advice = advise.advise(fourbar.load(MODELS / f"{name}.toml"), 1e-5)
@@ -107,6 +108,7 @@ def test_an_error_is_between_0_and_1(required: float) -> None:
         required_error.adjust_witnesses(WITNESSES, required)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("required", [1e-3, 1e-7])
 def test_a_run_is_no_more_precise_than_required(required: float) -> None:
     scene = turning(positions=90)

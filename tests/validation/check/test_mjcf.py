@@ -374,6 +374,7 @@ OVERDONE = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("what", "old", "new", "words"), OVERDONE, ids=[case[0] for case in OVERDONE])
 def test_a_file_that_overdoes_it_is_one_line_with_its_name(
     what: str, old: str, new: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -432,6 +433,7 @@ def devour(scene: Scene, text: str | None, names: dict[str, str]) -> None:
     bytearray(2 * WORKER_MEMORY)
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 def test_ctrl_c_does_not_wait_for_the_file() -> None:
     # a test run in the background inherits SIGINT ignored
@@ -446,6 +448,7 @@ def test_ctrl_c_does_not_wait_for_the_file() -> None:
     assert time.monotonic() - began < mjcf.SECONDS / 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "word"),
     [(crash, "crashed"), (hang, "did not come back"), pytest.param(devour, "memory", marks=pytest.mark.linux)],
@@ -456,6 +459,7 @@ def test_a_file_that_breaks_the_engine_is_one_line(what: object, word: str, monk
         examined(f"{__name__}:{what.__name__}", BARE, "<mujoco/>", {})  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     path = tmp_path / "mine\x1b[31m.xml"
     path.write_text(other_plane().replace('name="rod"', 'name="rod&#60;b&#62;|"'))
@@ -494,6 +498,7 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
     )
 
 
+@pytest.mark.slow
 def test_a_required_error_is_what_their_file_is_held_to(tmp_path: Path) -> None:
     text = write_mjcf(BARE).replace("0.0016133333333333336", "0.0017")
     assert run(tmp_path, text) == (1, [0.0, SIMULATED.factor])

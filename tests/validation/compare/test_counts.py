@@ -199,6 +199,7 @@ omega_2 = "1 rad/s"
 """
 
 
+@pytest.mark.slow
 def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -215,6 +216,7 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     assert status([*arguments, "--engines", "mujoco-simulated,free-body"]) == HOLDS
 
 
+@pytest.mark.slow
 def test_every_form_of_a_report_says_the_same_counts() -> None:
     refused = Witness("echo", Refuses, EQUIVALENCE)
     exact = next(w for w in WITNESSES if w.name == "free-body")
@@ -304,6 +306,7 @@ def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.Cap
     assert "Nothing was compared; no digit left to judge 1 more by" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_study_in_which_no_law_is_fitted_is_no_success(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -45,6 +45,7 @@ def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Setting
     return error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("integrator", "order", "steps"),
     [
@@ -283,6 +284,7 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
     assert not list(other.points()) and not list((tmp_path / "parts").iterdir())
 
 
+@pytest.mark.slow
 def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = tmp_path / "small.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))

@@ -112,6 +112,7 @@ def whole() -> dict[str, object]:
     return made(ROOT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", KINDS)
 def test_a_build_that_never_heard_of_an_effect_gives_the_same_bits(
     key: str, whole: dict[str, object], tmp_path: Path
@@ -230,6 +231,7 @@ print(*sorted({row.engine for row in record.rows}))
 """
 
 
+@pytest.mark.slow
 def test_positions_alone_start_no_force_engine() -> None:
     done = subprocess.run([sys.executable, "-c", POSITIONS_ONLY], capture_output=True, text=True, check=True, cwd=ROOT)
     engines, *left_out, answered = done.stdout.splitlines()

@@ -126,6 +126,7 @@ def test_agrees_to_round_off(name: str, lengths: tuple[float, ...]) -> None:
             assert failures(name, case, every=12) == [], (drive, branch)
 
 
+@pytest.mark.slow
 @further
 def test_each_load_and_effect(name: str) -> None:
     assert {effect: failures(name, scene(effect)) for effect in ACTING} == {effect: [] for effect in ACTING}
@@ -153,6 +154,7 @@ def test_accelerations_of_points(name: str) -> None:
         assert np.abs(got[point] - expected).max() <= allowed, point
 
 
+@pytest.mark.slow
 @each_tree
 def test_the_branch_is_the_commanded_one(name: str) -> None:
     """On 300 random linkages, cold and warm; B lies left of the diagonal from A to O4 on branch +1."""

@@ -244,6 +244,7 @@ def test_without_a_fault_nothing_fails() -> None:
     assert failing() == set()
 
 
+@pytest.mark.slow
 def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None:
     close, matrix, inertia, acting = (
         free_body.close,

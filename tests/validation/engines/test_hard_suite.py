@@ -47,6 +47,7 @@ def test_the_suite_is_made_from_its_parameters_alone() -> None:
     assert {one.scene(i).source for i in range(len(one))} == {family.statement for family in FAMILIES}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", [f for f in FAMILIES if f.name != "released"], ids=lambda family: family.name)
 def test_a_scene_of_each_family_holds(family: Family) -> None:
     name, scene = list(family.scenes())[-1]
@@ -255,6 +256,7 @@ def test_an_alarm_fails_its_row(monkeypatch: pytest.MonkeyPatch) -> None:
     assert any(row.verdict == FAILS and row.reason == "the sky falls" for row in rows)
 
 
+@pytest.mark.slow
 def test_a_free_motion_through_change_points_in_every_engine() -> None:
     """IFToMM A02, one window, ten seconds: lim.ii.udc.es/mbsbenchmark."""
     (name, scene), *_ = families.released(durations=(10.0,), steps=10)

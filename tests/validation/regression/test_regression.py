@@ -194,6 +194,7 @@ def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path: Path, capsys: p
     assert [status(command) for command in commands.values()] == [0, 0, 0]
 
 
+@pytest.mark.slow
 def test_a_damaged_table_is_one_line_and_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run, kept = save(tmp_path / "run", [ROW]), tmp_path / "kept"
     assert status(["accept", str(run), "--to", str(kept)]) == 0
@@ -490,6 +491,7 @@ def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
     assert kinds([replace(shipped, allowed=4e-7)], [replace(shipped, error=6e-7)]) == [Kind.WORSE]
 
 
+@pytest.mark.slow
 def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None:
     """In two fresh processes, one of which takes this CPU for another."""
     code = "from fourbar_validation.report.machine import find_kernels; print(find_kernels())"
@@ -555,6 +557,7 @@ def test_what_is_compared_can_be_chosen(tmp_path: Path, capsys: pytest.CaptureFi
     assert capsys.readouterr().err == "error: --engines = 'motor': must be among engine\n"
 
 
+@pytest.mark.slow
 def test_the_run_itself_is_written_as_junit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fourbar_validation.report.junit.LISTED", 10)
     judge_here(monkeypatch)
@@ -589,6 +592,7 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -
     assert table.scene_hash.nunique() == 1
 
 
+@pytest.mark.slow
 def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -50,6 +50,7 @@ def wait(driver, condition):
     return WebDriverWait(driver, LOADED).until(lambda _: condition())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
 def test_all_text_is_readable(browse, dark: bool) -> None:
     driver = browse(report(copies(2, failing=1))[1], dark=dark)
@@ -58,11 +59,13 @@ def test_all_text_is_readable(browse, dark: bool) -> None:
     assert worst[0][0] >= CONTRAST, worst
 
 
+@pytest.mark.slow
 def test_nothing_is_wider_than_a_phone(browse) -> None:
     driver = browse(report(copies(2, failing=1))[1], 360)
     assert driver.execute_script("return document.documentElement.scrollWidth") <= 360
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, ALL_OPEN + 2])
 def test_a_number_leads_to_its_row(browse, count: int) -> None:
     driver = browse(report(copies(count))[1])
@@ -77,6 +80,7 @@ def test_a_number_leads_to_its_row(browse, count: int) -> None:
     assert row.find_elements("tag name", "td")[0].text == target.removeprefix("row-")
 
 
+@pytest.mark.slow
 def test_the_download_is_results_csv(browse) -> None:
     pages = copies(2)
     driver = browse(report(pages)[1])
@@ -85,6 +89,7 @@ def test_the_download_is_results_csv(browse) -> None:
     assert base64.b64decode(data).decode() == write_rows(row for page in pages for row in page.rows)
 
 
+@pytest.mark.slow
 def test_200_scenes_open_quickly_and_a_scene_when_opened(browse) -> None:
     driver = browse(report(copies(200))[1])
     times = driver.execute_script("return JSON.stringify(performance.getEntriesByType('navigation')[0])")
@@ -96,6 +101,7 @@ def test_200_scenes_open_quickly_and_a_scene_when_opened(browse) -> None:
     assert scene.find_element("tag name", "table").is_displayed()
 
 
+@pytest.mark.slow
 def test_it_prints_on_paper(browse) -> None:
     driver = browse(report(copies(2))[1], dark=True)
     pdf = driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69})

@@ -75,6 +75,7 @@ def unpacked(text: str) -> str:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, ALL_OPEN + 1])
 def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(count: int) -> None:
     pages = copies(count, failing=1)
@@ -92,6 +93,7 @@ def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(
     assert linked <= {int(line) for line in rows} and len(linked) > 20 * count
 
 
+@pytest.mark.slow
 def test_the_page_carries_results_csv_to_the_byte() -> None:
     pages = copies(3)
     _, text = report(pages)
@@ -100,6 +102,7 @@ def test_the_page_carries_results_csv_to_the_byte() -> None:
     assert base64.b64decode(data.group(1)).decode() == write_rows(row for each in pages for row in each.rows)
 
 
+@pytest.mark.slow
 def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() -> None:
     summary, text = report(copies(3, failing=1))
     assert summary.verdict.startswith("FAILS: 1 of ")
@@ -108,6 +111,7 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else() 
     assert "What fails</h2>" not in report(copies(3))[1]
 
 
+@pytest.mark.slow
 def test_a_scene_cannot_write_into_the_demo() -> None:
     hostile = replace(demo(), title=HOSTILE, source=HOSTILE, name=HOSTILE, left_out=[HOSTILE])
     summary, text = report([hostile], sections=[Section("more", HOSTILE, HOSTILE, [HOSTILE], [[HOSTILE]])])
@@ -116,6 +120,7 @@ def test_a_scene_cannot_write_into_the_demo() -> None:
     assert "<img" not in write_markdown(summary)
 
 
+@pytest.mark.slow
 def test_nothing_is_fetched() -> None:
     _, text = report(copies(2), pictures={"scene-000": "iVBORw0KGgo="}, no_pictures="none")
     text = re.sub(r'xmlns(:xlink)?="[^"]*"', "", text)
@@ -155,6 +160,7 @@ def test_costs_are_those_of_the_run() -> None:
     assert set(points) == {"pinocchio-inverse", "mujoco-inverse", "free-body"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("motion", "pictures"),
     [
@@ -181,6 +187,7 @@ def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text
 
 
+@pytest.mark.slow
 def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fourbar_validation.report.summary.SCENES_SHOWN", 20)
     pages = copies(100)
@@ -200,6 +207,7 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.Monkey
     assert len(text) < 1.8e6  # 20 scenes, each with a figure of 20 kB and some 55 kB of rows of eleven engines
 
 
+@pytest.mark.slow
 def test_every_witness_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever is drawn first, and in whatever process: the witness says its number."""
     monkeypatch.setattr(colours, "NUMBERS", {})

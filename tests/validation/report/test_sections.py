@@ -64,6 +64,7 @@ def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
     assert 'href="#hard"' in text and 'href="hard.html"' in text and "<text>the picture</text>" in text
 
 
+@pytest.mark.slow
 def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
     assert set(WORK) == {"formulas", *(witness.name for witness in (*HARD_WITNESSES, *FURTHER))}
     summary, text = report([demo(draw=False)])
@@ -80,6 +81,7 @@ def test_the_picture_of_costs_says_what_each_did_for_a_position() -> None:
     }
 
 
+@pytest.mark.slow
 def test_a_study_of_cost_next_to_the_report_is_part_of_it(tmp_path: Path) -> None:
     assert collect_sections(None, tmp_path) == []
     folder = tmp_path / "cost" / "demo"

@@ -43,6 +43,7 @@ def test_engines_that_are_right_raise_no_alarm(name: str) -> None:
     assert not [row for row in judge(name, SCENES[name], EXACT).rows if row.failed]
 
 
+@pytest.mark.slow
 def test_ratios_over_ten_decades_raise_no_alarm() -> None:
     """As `run --random N --type uneven`. In the last the forces were summed more strictly than its coupler allows."""
     scenes = [(index, draw_random_scene(0, index, ())) for index in (1, 6, 8, 9, 10, 32, 36, 61)]
@@ -54,6 +55,7 @@ def test_ratios_over_ten_decades_raise_no_alarm() -> None:
     assert not failed
 
 
+@pytest.mark.slow
 def test_a_free_motion_near_a_limit_raises_no_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
     """The engines get theta_2, omega_2 and alpha_2 of the independent theta_4, rounded: what that costs is computed."""
     monkeypatch.setattr(released, "ENGINES", {})

@@ -55,6 +55,7 @@ def running(nanny: object) -> int | None:
     return watched.process.pid
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 @pytest.mark.timeout(120 + 20 * KILLS)
 def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,6 +79,7 @@ def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypa
             assert (tmp_path / "here" / name).read_bytes() == (out / name).read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "tls://127.0.0.1:1", "tcp://a..b:1", "nonsense"])
 def test_no_scheduler_is_one_line_and_leaves_no_client_half_open(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -135,6 +137,7 @@ def started(tmp_path: Path) -> Iterator[Callable[..., tuple[subprocess.Popen[byt
 WORKER = ("--nthreads", "1", "--no-nanny")
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 def test_a_cluster_without_workers_or_without_the_checkout_is_one_line(
     started: Callable[..., tuple[subprocess.Popen[bytes], str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -152,6 +155,7 @@ def test_a_cluster_without_workers_or_without_the_checkout_is_one_line(
     assert "\n" not in str(caught.value) and "no such module" in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 @pytest.mark.parametrize("how", ["SIGKILL", "SIGTERM"] if FULL else ["SIGKILL"])
 def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
@@ -174,6 +178,7 @@ def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
     assert all(f'"{FAILS}"' not in gzip.decompress(part).decode() for part in written)
 
 
+@pytest.mark.slow
 def test_a_worker_of_another_code_or_library_is_refused(
     cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -29,6 +29,7 @@ def row(rows: list[Row], engine: str, quantity: str) -> Row:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coupler", [0.12, 0.15])
 def test_every_engine_is_judged_up_to_the_limit_and_by_its_instant(coupler: float) -> None:
     scene = falling(coupler)
@@ -44,6 +45,7 @@ def test_every_engine_is_judged_up_to_the_limit_and_by_its_instant(coupler: floa
     assert page.figure is not None
 
 
+@pytest.mark.slow
 def test_what_follows_the_path_has_no_instant_to_compare() -> None:
     rows = judge("falling", falling(through="follow")).rows
     assert rows and all(row.passed for row in rows)
@@ -67,6 +69,7 @@ def test_an_engine_that_stops_before_fails(monkeypatch: pytest.MonkeyPatch) -> N
     assert only.verdict == FAILS and "20 of 44 instants" in only.reason
 
 
+@pytest.mark.slow
 def test_an_engine_that_is_nan_before_it_fails_and_one_that_is_nan_behind_the_limit_does_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -141,6 +144,7 @@ def test_the_summary_says_that_the_motion_ended() -> None:
     assert json.loads(write_json(solution))["stopped_at"] == solution.stopped_at
 
 
+@pytest.mark.slow
 def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
     from fourbar_validation.report import figures
 

@@ -76,6 +76,7 @@ def test_of_a_sample_what_else_is_shipped_is_judged(count: int, sample: int, shi
     assert [job.shipped for job in pool.make_jobs(suite, range(count), (), False, sample)] == [j.shipped for j in jobs]
 
 
+@pytest.mark.slow
 def test_pictures_change_nothing_that_is_judged(tmp_path: Path) -> None:
     suite = replace(read_default_suite(), texts=read_default_suite().texts[:1])
     assert isinstance(suite, Files)

@@ -58,6 +58,7 @@ def composed(scene, name, branches="one", position=None, units="SI"):
     return draw_figure(scene, name, position=position, branches=branches, units=fourbar.units(units)).figure
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file_format", plot.FORMATS)
 def test_the_same_scene_gives_the_same_bytes(tmp_path: Path, file_format: str) -> None:
     files = [tmp_path / f"{k}.{file_format}" for k in (1, 2)]
@@ -97,6 +98,7 @@ def clashes(figure) -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy", "stroke"}))
 def test_every_figure_draws_both_branches_and_no_texts_overlap(name: str) -> None:
     for scene, branches in ((CRANK_ROCKER, "both"), (thesis(), "one")):
@@ -118,6 +120,7 @@ def test_no_text_stands_on_a_bar() -> None:
     assert not any(bar.intersects_bbox(box, filled=False) for bar in bars for box in boxes)
 
 
+@pytest.mark.slow
 def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None:
     figure = composed(CRANK_ROCKER, "overview")
     flat = [axes for axes in figure.axes if axes.name == "rectilinear"]
@@ -137,6 +140,7 @@ def solved(scene: fourbar.Scene) -> fourbar.Solution:
     return solution if found is None else found.solution
 
 
+@pytest.mark.slow
 def test_drawn_curves_are_those_of_the_solution() -> None:
     scene = crank_rocker()
     solution = solved(scene)
@@ -170,16 +174,19 @@ def test_the_coupler_figure_shows_the_points_of_the_scene() -> None:
     np.testing.assert_allclose(curves["P"], solved(scene).points["P"], atol=1e-15)
 
 
+@pytest.mark.slow
 def test_couples_of_a_free_body_have_an_arrow_and_no_sign() -> None:
     lines = [text for text, _ in texts_shown(composed(crank_rocker(), "freebody")) if text[0] in "↺↻"]
     assert lines and not any(" = −" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_free_bodies_say_at_which_position_they_are_drawn() -> None:
     figure = composed(crank_rocker(), "freebody", position=math.radians(135.0))
     assert " ".join(figure.subfigs[0].get_supxlabel().split()).startswith("At θ₂ = 135°. ")
 
 
+@pytest.mark.slow
 def test_the_sensitivities_have_the_units_asked_for_and_whole_names() -> None:
     panels = composed(crank_rocker(), "sensitivity", units="imperial").axes
     assert [axes.get_xlabel() for axes in panels[:2]] == ["lbf in", "lbf"]
@@ -268,6 +275,7 @@ def test_free_bodies_balance(drive: int | fourbar.LinearDrive, effects: tuple[Ef
         assert any(c.text == f"$T_{bar}$" for c in couples) == (bar == drive_bar)
 
 
+@pytest.mark.slow
 def test_a_linear_drive_is_drawn_with_its_force_and_the_poles_of_that(tmp_path: Path) -> None:
     scene = crank_rocker(drive=CYLINDER)
     for figure in ("overview", "torque", "freebody"):
@@ -280,6 +288,7 @@ def test_a_linear_drive_is_drawn_with_its_force_and_the_poles_of_that(tmp_path: 
     assert len(stands) and np.array_equal(find_poles(shown), stands)
 
 
+@pytest.mark.slow
 def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 30)))
     plot.draw(scene, tmp_path / "a.svg")
@@ -288,6 +297,7 @@ def test_a_scene_without_velocity_draws_positions_only(tmp_path: Path) -> None:
     assert not (tmp_path / "b.svg").exists()
 
 
+@pytest.mark.slow
 def test_the_position_drawn_of_both_branches_is_one_and_stands_clear_of_their_poles() -> None:
     alone = make_view(thesis(FULL_TURN)).here
     scenes = [set_branch(thesis(FULL_TURN), sign) for sign in (1, -1)]
@@ -318,6 +328,7 @@ def test_a_remark_stands_where_the_curve_keeps_away() -> None:
     assert 0.0 < find_free_place(np.full(361, np.nan)) < 1.0
 
 
+@pytest.mark.slow
 def test_hostile_titles_are_text(tmp_path: Path) -> None:
     title = "$\\frac{ <script>alert(1)</script> & \x1b[31m\u2028 %s {0} " + 300 * "x"
     plot.draw(replace(crank_rocker(), title=title), tmp_path / "a.svg", "linkage")
@@ -341,6 +352,7 @@ def test_what_is_not_allowed_is_named(tmp_path: Path, name: str, options: dict[s
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_position_and_dimensions_show_where_they_are_taken() -> None:
     for option, value in {"position": 1.0, "dimensions": True}.items():
         for figure in TAKERS[option]:
@@ -349,6 +361,7 @@ def test_a_position_and_dimensions_show_where_they_are_taken() -> None:
                 assert plain._repr_svg_() != changed._repr_svg_(), (figure, option)
 
 
+@pytest.mark.slow
 def test_threads_draw_what_one_draws_and_leave_the_settings_as_they_were() -> None:
     drawn, before = crank_rocker().plot("torque")._repr_svg_(), dict(matplotlib.rcParams)
     with ThreadPoolExecutor(4) as pool:
@@ -373,6 +386,7 @@ def by_law() -> fourbar.Scene:
     return crank_rocker(motion=fourbar.Motion(law=law), drive_bar=4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", (released(60, 1.2), by_law()), ids=("released", "by law"))
 def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
     solution = solved(scene)
@@ -388,6 +402,7 @@ def test_a_motion_through_time_is_drawn_over_time(scene: fourbar.Scene) -> None:
         assert all(axes.get_xlabel().endswith(("(s)", "m)")) for axes in flat)
 
 
+@pytest.mark.slow
 def test_branches_that_are_released_for_different_times_share_their_scales() -> None:
     bars = [fourbar.Bar(0.22, 0.5), fourbar.Bar(0.25, 0.8), fourbar.Bar(0.2, 0.4)]
     motion = fourbar.Motion(math.radians(60.0), 0.0, free=fourbar.Free(2.0, 200))
@@ -463,6 +478,7 @@ def test_the_settings_of_the_reader_are_left_alone(tmp_path: Path) -> None:
     assert dict(mpl.rcParams) == before
 
 
+@pytest.mark.slow
 def test_matplotlib_is_loaded_only_to_draw_and_its_absence_is_one_line(tmp_path: Path) -> None:
     code = (
         "import sys, fourbar.show.plot, fourbar.show.animate\n"
@@ -515,6 +531,7 @@ def commanding(motion: fourbar.Motion) -> fourbar.Scene:
     return crank_rocker(motion=motion, drive=fourbar.LinearDrive(BOTTOM, SIDE), effects=(fourbar.Gravity(),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", COMMANDS)
 def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
     scene = commanding(COMMANDS[label])
@@ -535,6 +552,7 @@ def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
     assert at in linkage.get_title(loc="left").replace("θ₃", "θ₄")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", COMMANDS)
 @pytest.mark.parametrize("figure", ["freebody", "hodograph", "transmission", "kinematics", "sensitivity"])
 def test_every_figure_takes_every_command(label: str, figure: str) -> None:

@@ -43,6 +43,7 @@ def failing(posed: Scene) -> set[str]:
     return {row.quantity for row in simulated(posed) if not row.passed}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", [2, 4])
 @pytest.mark.parametrize("name", LAWS)
 def test_a_motion_law_is_run_through(name: str, drive: int) -> None:

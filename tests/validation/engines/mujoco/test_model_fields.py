@@ -112,6 +112,7 @@ def test_every_field_is_on_a_list() -> None:
     assert {key for key in model_fields.GATED.values() if key not in keys} == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", sorted(COMPARED.keys() - model_fields.COUNTED.keys()))
 def test_a_change_in_a_compared_field_is_named(field: str) -> None:
     def seen(text: str) -> Iterator[bool]:

@@ -18,6 +18,7 @@ NEAR = 0.45
 """Distance in RGB that tells them from each other and from the background."""
 
 
+@pytest.mark.slow
 def test_the_bars_are_seen_where_the_formulas_put_them() -> None:
     scene = thesis(np.radians([100.0, 250.0]))
     drawn, why_not = render_pictures({"thesis": write_mjcf(scene)})
@@ -52,6 +53,7 @@ def test_no_position_leaves_the_frame(scene: fourbar.Scene) -> None:
             assert offset[1] < seen.half_height and offset[0] < seen.half_height * WIDTH / HEIGHT
 
 
+@pytest.mark.slow
 def test_without_opengl_there_is_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUJOCO_GL", "disabled")
     drawn, why_not = render_pictures({"thesis": write_mjcf(thesis())})

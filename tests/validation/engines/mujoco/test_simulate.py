@@ -211,6 +211,7 @@ def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links: 
     assert {row.verdict for row in judge("hood", scene, SIMULATION).rows} == {AGREES}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), list(combinations((1, 2, 3, 4), 2)))
 def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
     one: int, other: int, monkeypatch: pytest.MonkeyPatch
@@ -241,6 +242,7 @@ def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
     assert rows["drive_force"].verdict == FAILS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["theta_3", "theta_4", "stroke of bar 2", "stroke of bar 4"])
 def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]

@@ -19,6 +19,7 @@ OTHERS = [Path(python) for python in filter(None, os.environ.get("SIMULATORS", "
 """Interpreters of simulators that are not installed here."""
 
 
+@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("finding", ALL, ids=lambda finding: finding.script.stem)
 def test_each_finding_holds_or_says_since_when_not(finding: module.Reproduction) -> None:

@@ -60,6 +60,7 @@ def test_there_are_fifteen_and_their_files_agree() -> None:
     assert len(NAMES) == 15 and {file.stem for file in PROBLEMS.glob("*.json")} == set(NAMES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in LONG])
 def test_the_files_are_those_of_today(name: str) -> None:
     old, new = kept(name), json.loads(json.dumps(collect_problem(name)))

@@ -223,6 +223,7 @@ def test_a_state_that_is_no_number_has_no_error_that_is_one(name: str) -> None:
     assert math.isnan(examine.compute_errors(fourbar.load(PROBLEM), answer["readings"][0])["torque"])
 
 
+@pytest.mark.slow
 def test_what_a_simulator_prints_is_no_part_of_its_answer(tmp_path: Path) -> None:
     (tmp_path / "loud.py").write_text(
         "import atexit, os\nfrom fourbar_validation.lab.simulators.motion import Readings\nVERSION = CHANGED = '-'\n"

@@ -133,6 +133,7 @@ HARD_AT_REST = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HARD_AT_REST)
 def test_right_equilibria_hold_where_they_are_hard_to_judge(name: str) -> None:
     rows = rows_of(HARD_AT_REST[name], "equilibria")
@@ -176,6 +177,7 @@ def commanding(name: str) -> Scene:
     return crank_rocker(motion=COMMANDS[name], drive=fourbar.LinearDrive(*ends), effects=(fourbar.Gravity(),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_other_commands_are_judged_too_and_what_is_not_is_named(name: str) -> None:
     record = judge.judge("", commanding(name), (), order=False, shipped=True)
@@ -203,6 +205,7 @@ def test_a_study_of_another_command_that_errs_fails(monkeypatch: pytest.MonkeyPa
     assert "drive_force" in failing(rows_of(scene, "study"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_bounds_that_are_narrower_fail(monkeypatch: pytest.MonkeyPatch, sign: float) -> None:
     call = fourbar.extremes
@@ -234,6 +237,7 @@ def test_a_file_with_another_number_fails(monkeypatch: pytest.MonkeyPatch, engin
     assert failing(rows_of(SHIPPED, engine))
 
 
+@pytest.mark.slow
 def test_what_breaks_down_costs_its_own_rows_and_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise RuntimeError("lost")
