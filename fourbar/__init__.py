@@ -64,6 +64,7 @@ if _TYPE_CHECKING:
     from fourbar.studies.enclosure import extremes as extremes
     from fourbar.studies.equilibrium import equilibrium as equilibrium
     from fourbar.studies.function import function as function
+    from fourbar.studies.internal_forces import internal_forces as internal_forces
     from fourbar.studies.spread import tolerances as tolerances
     from fourbar.studies.study import Study as Study
     from fourbar.studies.study import vary as vary
@@ -82,6 +83,7 @@ _ON_FIRST_USE = {
     "extremes": "fourbar.studies.enclosure",
     "equilibrium": "fourbar.studies.equilibrium",
     "function": "fourbar.studies.function",
+    "internal_forces": "fourbar.studies.internal_forces",
     "tolerances": "fourbar.studies.spread",
     "in_units": "fourbar.show.notebook",
     "units": "fourbar.show.units",
@@ -116,7 +118,7 @@ def _plot(
     Parameters
     ----------
     figure : "overview", "linkage", "coupler", "kinematics", "points", "torque", "stroke", "forces", "hodograph",
-        "energy", "transmission", "freebody" or "sensitivity".
+        "energy", "transmission", "freebody", "bars" or "sensitivity".
     position : what is commanded where linkage and free bodies are drawn, rad or m; left out: the scene's own.
     branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
     units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI with the prefix that suits, deg.

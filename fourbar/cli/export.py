@@ -27,7 +27,7 @@ without_loads_option = click.option(
     show_default=True,
     metavar="NAME",
     help="overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, transmission, freebody, "
-    "sensitivity, stroke.",
+    "bars, sensitivity, stroke.",
 )
 @click.option("--position", metavar="PLACE", help='Of the linkage and free bodies: what is commanded, like "135 deg".')
 @click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")

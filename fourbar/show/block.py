@@ -20,7 +20,7 @@ WIDTH = 80
 TIED = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
 COLUMN = 12
-"""Width of a pin's column."""
+"""Least width of a column."""
 LABEL = 11
 """Width of what stands before a row."""
 FOUR_DIGITS = 5e-5
@@ -58,7 +58,8 @@ class _Block:
 
     def write(self, pressure: float | None) -> list[str]:
         """Write all paragraphs, a blank line between two."""
-        paragraphs = [self._write_motion(), self._write_drive(pressure), self._write_pins(), self._write_remarks()]
+        paragraphs = [self._write_motion(), self._write_drive(pressure), self._write_pins()]
+        paragraphs += [self._write_bending(), self._write_remarks()]
         lines: list[str] = []
         for paragraph in (paragraph for paragraph in paragraphs if paragraph):
             for line in paragraph:
@@ -280,7 +281,7 @@ class _Block:
         if not one:
             rows.append(("  at", [self._place(load.peak.place, named=False) for load in facts.pins.values()]))
             rows.append(("  RMS", [force(load.rms) for load in facts.pins.values()]))
-        lines = [f"{label:<{LABEL}}{''.join(f'{cell:<{COLUMN}}' for cell in cells)}".rstrip() for label, cells in rows]
+        lines = _align(rows)
         if facts.kind == "list":
             lines.append("  peak and RMS are those of these positions")
         elif not one and (
@@ -288,6 +289,20 @@ class _Block:
         ):
             lines.append(f"  between these positions the loads of {', '.join(rough)} grow without bound")
         return lines
+
+    def _write_bending(self) -> list[str]:
+        """Write the largest bending moment of each bar, where along the bar, and where in the motion."""
+        facts = self.facts
+        most = max((peak.value for peak, _ in facts.bending.values()), default=0.0)
+        if not most:
+            return []
+        ends = facts.bending.values()
+        rows = [("bending", [f"bar {bar}" for bar in facts.bending])]
+        rows.append(("  moment", [self._value(peak.value, "N m", most) for peak, _ in ends]))
+        rows.append(("  at x", [self._value(x, "m", self.longest) for _, x in ends]))
+        if facts.kind != "position":
+            rows.append(("  at", [self._place(peak.place, named=False) for peak, _ in ends]))
+        return _align(rows)
 
     def _is_rough(self, name: str) -> bool:
         """Tell whether a peak is that of the positions alone: between them it grows, or nothing was looked for."""
@@ -334,6 +349,12 @@ class _Block:
     @staticmethod
     def _row(label: str, text: str) -> str:
         return f"  {label:<{LABEL - 2}}{text}"
+
+
+def _align(rows: list[tuple[str, list[str]]]) -> list[str]:
+    """Write rows of a label and cells that stand below each other."""
+    width = max(COLUMN, 2 + max(len(cell) for _, cells in rows for cell in cells))
+    return [f"{label:<{LABEL}}{''.join(f'{cell:<{width}}' for cell in cells)}".rstrip() for label, cells in rows]
 
 
 def static(scene: Scene) -> str:

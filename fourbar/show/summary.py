@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.formulas.mobility import TURN, find_intervals
-from fourbar.linkage import PIN_FORCE
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import OK, STATUS_NAMES
 from fourbar.scene import Scene, command_at
 from fourbar.scene.motion import Motion
@@ -18,6 +18,7 @@ from fourbar.show.between import CUTS, Between, locate_between
 from fourbar.show.duty import Driving, MotorDuty, bearing_load, is_once_round, motor_duty, read_drive
 from fourbar.solution import Array, Solution
 from fourbar.solve import solve
+from fourbar.studies.internal_forces import internal_forces
 
 FINE = 7200
 """Positions at which ranges are looked for, by the position formula alone."""
@@ -74,6 +75,8 @@ class Facts:
     held: tuple[float, float] | None
     """Least and greatest torque or force while dry friction holds a pin that is at rest."""
     pins: dict[str, PinLoad]
+    bending: dict[int, tuple[Peak, float]]
+    """Largest size of the bending moment of each bar, N m, and where along it, m from its first pin."""
     stroke: tuple[Peak, Peak] | None
     """Smallest and largest stroke of the motion."""
     strokes: tuple[float, float] | None
@@ -127,6 +130,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         motor_duty(solution, between.solution) if peak is not None and kind != "position" else None,
         None if drive is None else _find_held(solution, drive),
         _list_pin_loads(solution, between),
+        _list_bending(scene, between.solution),
         None if fine.stroke is None else find_range(fine.stroke),
         None if solution.stroke is None else _find_strokes(scene, solution),
         between,
@@ -210,6 +214,18 @@ def _list_pin_loads(solution: Solution, between: Between) -> dict[str, PinLoad]:
         worst = int(np.nanargmax(np.where(np.isfinite(size), size, np.nan)))
         loads[pin] = PinLoad(Peak(float(size[worst]), float(places[worst])), bearing_load(solution, pin).rms)
     return loads
+
+
+def _list_bending(scene: Scene, solution: Solution) -> dict[int, tuple[Peak, float]]:
+    if solution.F12 is None or not np.isfinite(solution.F12).any():
+        return {}
+    bending = dict[int, tuple[Peak, float]]()
+    for bar in MOVING_BARS:
+        moment, x = internal_forces(scene, solution, bar).largest
+        worst = int(np.nanargmax(np.abs(moment)))
+        place = float(_list_places(solution)[worst])
+        bending[bar] = Peak(abs(float(moment[worst])), place), float(x[worst])
+    return bending
 
 
 def _find_strokes(scene: Scene, solution: Solution) -> tuple[float, float]:

@@ -192,6 +192,7 @@ FAULT_SCENES: dict[str, Scene] = {
     "no torque": Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(np.array([0.5, 1.0]), 10.0), 3, effects=(WEIGHT,)),
     "shipped": Scene(SLENDER, TURN, effects=(WEIGHT,), points=POINTS),
     "shipped, limited": Scene(ROCKER, Motion(Sweep(0.3, 1.4, 22), 3.0), effects=(WEIGHT,)),
+    "shipped, loaded": Scene(SLENDER, TURN, 2, LOADS, (WEIGHT,)),
     "simulated": Scene(
         CRANK,
         Motion(Sweep(0.1, 6.0, 12), 10.0),

@@ -100,6 +100,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         "point_coefficients": (fourbar.point_coefficients, (link, np.array([1.0]), 1, 3, 0.1j)),
         "bearing_load": (fourbar.bearing_load, (solution, "A")),
         "in_units": (fourbar.in_units, (scene, "mm")),
+        "internal_forces": (fourbar.internal_forces, (scene, solution, 2, (0.0, 0.05))),
         "units": (fourbar.units, ("mm",)),
         "uniform": (lambda *x: fourbar.uniform(*x[:4], per_metre=x[4]), (0.3, 0.1, 0.25, 0.22, 1.0)),
         "load": (fourbar.load, (str(DOCS.parent / "models" / "thesis.toml"),)),

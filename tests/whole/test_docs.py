@@ -256,10 +256,12 @@ def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
     assert read("docs/theory.svg") == runpy.run_path(str(DOCS / "theory.py"))["text"]()
 
 
-def test_the_picture_of_the_readme_is_the_one_that_is_drawn(tmp_path: Path) -> None:
-    """By what is written in it: another matplotlib draws other paths."""
-    assert status(["plot", str(ROOT / "models" / "crank_rocker.toml"), "-o", str(tmp_path / "drawn.svg")]) == HOLDS
-    drawn, kept = (path.read_text(encoding="utf-8") for path in (tmp_path / "drawn.svg", DOCS / "crank_rocker.svg"))
+@pytest.mark.parametrize(("name", "options"), [("crank_rocker.svg", ()), ("bars.svg", ("--figure", "bars"))])
+def test_the_pictures_are_those_that_are_drawn(name: str, options: tuple[str, ...], tmp_path: Path) -> None:
+    """By what is written in them: another matplotlib draws other paths."""
+    command = ["plot", str(ROOT / "models" / "crank_rocker.toml"), "-o", str(tmp_path / "drawn.svg")]
+    assert status([*command, *options]) == HOLDS
+    drawn, kept = (path.read_text(encoding="utf-8") for path in (tmp_path / "drawn.svg", DOCS / name))
     assert re.findall("<!-- (.*) -->", drawn) == re.findall("<!-- (.*) -->", kept)
 
 

@@ -64,8 +64,8 @@ JUDGED_BY = {
     "validation/engines: exact; validation/engines/mujoco: shipped; "
     "validation/report: hard_page",
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives led monitor motions runner",
-    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls sensitivities equilibria files "
-    "variants",
+    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls cuts sensitivities equilibria "
+    "files variants",
     "validation/run/test_released.py": "validation/engines: pinocchio_forward; validation/engines/mujoco: released",
     "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
     "validation/run: printed",

@@ -94,11 +94,12 @@ FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {
     "energy": (_draw_single(curves.draw_energy), (5.6, 3.2), True),
     "transmission": (_draw_single(draw_transmission), (5.6, 3.2), False),
     "freebody": (freebody.draw_free_bodies, (9.6, 4.6), True),
+    "bars": (freebody.draw_internal_forces, (9.6, 6.2), True),
     "sensitivity": (studies.draw_influences, (9.6, 3.6), True),
 }
 """Each figure: its painter, the size of one branch in inches, and whether it needs omega_2."""
 TAKERS = {
-    "position": tuple(name for name in FIGURES if name not in ("hodograph", "sensitivity")),
+    "position": tuple(name for name in FIGURES if name not in ("hodograph", "bars", "sensitivity")),
     "dimensions": ("overview", "linkage", "points"),
 }
 """Figures in which one position is marked, and in which bars are numbered."""

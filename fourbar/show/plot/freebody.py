@@ -24,6 +24,7 @@ from fourbar.show.plot.style import (
     INK,
     MUTED,
     OPEN,
+    find_greatest,
     write_force_name,
     write_quantity,
 )
@@ -31,6 +32,7 @@ from fourbar.show.plot.symbols import place_of, split_components
 from fourbar.show.plot.view import View, where_in_words
 from fourbar.show.units import choose_unit
 from fourbar.solution import Conversion
+from fourbar.studies.internal_forces import internal_forces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,6 +43,9 @@ PANEL, LINE = 3.4, 0.16
 WINDOW = 1.3
 """The window is this much wider than what it shows: space for the labels."""
 Points = NDArray[np.float64]
+FINE = 401
+"""Stations along a bar."""
+NOWHERE = "they have a value at none of the positions"
 SHOWN = 0.02
 """Forces below this share of the largest would be shorter than their head: named in the caption only."""
 
@@ -161,6 +166,33 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
         "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a at G "
         "(d'Alembert), with which the forces and the moments on each bar add up to zero.",
     )
+
+
+def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> None:
+    """Draw N, V and M along each bar at the position where its bending moment is largest."""
+    panels = figure.subplots(3, 3, sharex="col")
+    for column, bar in zip(panels.T, MOVING_BARS, strict=True):
+        rough = internal_forces(view.scene, view.sweep, bar)
+        if not np.isfinite(rough.largest.moment).any():
+            raise InputError("figure", "bars", f"needs forces, and {NOWHERE}")
+        worst = int(np.nanargmax(np.abs(rough.largest.moment)))
+        x = np.linspace(0.0, view.scene.linkage.bar(bar).length, FINE)
+        found = internal_forces(view.scene, view.sweep, bar, x)
+        factor, unit = choose_unit(float(x[-1]), "m", view.units)
+        place = view.axis.words(float(view.sweep.at.places[worst]))
+        for axes, (name, si, curve) in zip(column, zip("NVM", ("N", "N", "N m"), found[1:4], strict=True), strict=True):
+            scale, shown = choose_unit(find_greatest(curve[worst]), si, view.units)
+            axes.plot(factor * x, scale * curve[worst], color=BAR_COLOURS[bar])
+            axes.fill_between(factor * x, scale * curve[worst], color=BAR_COLOURS[bar], alpha=0.15, lw=0.0)
+            axes.axhline(0.0, color=INK, lw=0.6)
+            axes.set_ylabel(f"${name}$ ({shown})")
+        column[0].set_title(f"Bar {bar} ({BAR_NAMES[bar]})\n{place}")
+        column[2].set_xlabel(f"$x$ from ${pin_name(ENDS[bar][0]).strip('$')}$ ({unit})")
+        largest = write_quantity(abs(float(found.largest.moment[worst])), "N m", view.units)
+        at = write_quantity(float(found.largest.x[worst]), "m", view.units)
+        spread = "weight and inertia as a uniform bar's" if found.uniform else "weight and inertia at G"
+        note(view, f"Bar {bar}: largest |M| = {largest} at x = {at}, {spread}.")
+    note(view, "x runs along the line between the pins, y to its left; N > 0 is tension.")
 
 
 def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:

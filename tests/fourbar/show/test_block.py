@@ -75,7 +75,8 @@ def test_peaks_and_means_are_those_of_much_finer_steps() -> None:
     assert row is not None and [float(x) for x in row.groups()] == pytest.approx(
         [torque, place, 1e3 * np.sqrt(np.mean(fine.torque[:-1] ** 2))], rel=6e-4
     )
-    cells = {line.split("  ")[1]: line[11:] for line in text.splitlines() if line.startswith("  ")}
+    pins = text[text.index("pins") : text.index("bending")]
+    cells = {line.split("  ")[1]: line[11:] for line in pins.splitlines() if line.startswith("  ")}
     for k, name in enumerate(("F12", "F32", "F43", "F14")):
         size = np.hypot(*getattr(fine, name).T)
         peak, at, rms = (float(cells[label][12 * k : 12 * k + 12].split()[0]) for label in ("peak", "at", "RMS"))
@@ -109,6 +110,17 @@ def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
     released = of(theta_2=0.5, omega_2=0.0, free=fourbar.Free(0.5, 50))
     assert "released for 0.5 s, without a drive" in released and not re.search("torque|power|motor", released)
     assert re.search(r"^  at       0?\S+ s", released, re.MULTILINE)
+
+
+def test_the_largest_bending_moment_of_each_bar_is_named_with_its_place() -> None:
+    """A crank without mass carries the torque of its drive at O2 as the largest moment of all."""
+    light = replace(TURN, linkage=replace(TURN.linkage, input=fourbar.Bar(A)), loads=())
+    text, s = block(light), fourbar.solve(light)
+    rows = {line.split("  ")[1]: line[11:].split() for line in text.splitlines() if line.startswith("  ")}
+    assert float(rows["moment"][0]) == pytest.approx(np.abs(s.torque).max(), rel=1e-3)
+    assert rows["at x"][:2] == ["0", "mm"] and rows["moment"][1:3] == ["N", "m"]
+    found = fourbar.internal_forces(light, s, 3).largest.moment
+    assert float(rows["moment"][3]) == pytest.approx(np.abs(found).max(), rel=2e-3)
 
 
 def test_friction_at_rest_gives_the_range_that_it_holds() -> None:
@@ -153,4 +165,4 @@ def test_a_new_scene_has_weight_and_sixty_turns_a_minute(tmp_path: Path, capsys:
     assert scene.motion.omega_2 == pytest.approx(math.tau) and [effect.key for effect in scene.effects] == ["gravity"]
     capsys.readouterr()
     assert status(["analyze", str(tmp_path / "a.toml")]) == 0
-    assert 15 <= len(capsys.readouterr().out.splitlines()) <= 20
+    assert 15 <= len(capsys.readouterr().out.splitlines()) <= 25

@@ -167,13 +167,13 @@ def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
     """Everything that acts on the bars but pins, inertia, drive and what depends on the pin forces."""
     wrenches = BodyWrenches(len(motion.theta_2))
     for load in scene.loads:
-        _load(load, motion, wrenches)
+        apply_load(load, motion, wrenches)
     for effect in scene.effects:
         WRENCH_OF[effect.key](effect, motion, wrenches)
     return wrenches
 
 
-def _load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
+def apply_load(load: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Apply a force at its point, from the mass centre, and a couple; in the bar's frame both rotate with the bar."""
     turned = motion.unit[load.bar] if load.frame == "bar" else 1.0
     factor = 1.0 if load.table is None else _interpolate_factor(load.table, motion.theta_2)

@@ -21,6 +21,7 @@ from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.released import check_released
 from fourbar_validation.run.shipped.bounds import extremes
 from fourbar_validation.run.shipped.calls import study
+from fourbar_validation.run.shipped.cuts import internal_forces
 from fourbar_validation.run.shipped.equilibria import equilibria
 from fourbar_validation.run.shipped.files import sdf, usd
 from fourbar_validation.run.shipped.sensitivities import sensitivity, tolerances
@@ -52,7 +53,7 @@ CHECKS = (
     Check(check_mjcf, theta_2="MJCF as shipped: it drives bar 2"),
     Check(compare_inertia),
     Check(check_released, free=True, theta_2="released motions: engines begin at theta_2"),
-    *(Check(rows, shipped=True) for rows in (study, sensitivity, extremes, tolerances, equilibria)),
+    *(Check(rows, shipped=True) for rows in (study, sensitivity, internal_forces, extremes, tolerances, equilibria)),
     *(Check(rows, shipped=True, theta_2=f"{rows.__name__}: the file opens at theta_2") for rows in (sdf, usd)),
 )
 """All that is checked of a scene; one that raises costs its own rows."""

@@ -21,7 +21,7 @@ from tests.support.scenes import crank_rocker
 
 SHIPPED = FAULT_SCENES["shipped"]
 CHECKS = [check.rows for check in judge.CHECKS if check.shipped]
-ENGINES = {"study", "sensitivity", "extremes", "tolerances", "equilibria", "sdf", "usd"}
+ENGINES = {"study", "sensitivity", "internal_forces", "extremes", "tolerances", "equilibria", "sdf", "usd"}
 
 
 def rows_of(scene: Scene, engine: str = "") -> list[Row]:
@@ -57,6 +57,10 @@ def steeper(found: Any) -> None:
     found.by["torque"] *= 1.000001
 
 
+def stiffer(found: Any) -> None:
+    found.V[1, 2] *= 1.0 + 1e-8
+
+
 def narrower(found: Any) -> None:
     found.spreads["torque"].deviation[:] *= 0.9
 
@@ -67,6 +71,7 @@ def narrower(found: Any) -> None:
         ("study", "solve", swapped, "torque"),
         ("sensitivity", "sensitivity", steeper, "torque"),
         ("tolerances", "tolerances", narrower, "torque"),
+        ("internal_forces", "internal_forces", stiffer, "V3"),
     ],
 )
 def test_a_public_call_that_errs_fails(

@@ -1,0 +1,249 @@
+"""Internal forces of a bar: normal force, shear force and bending moment along the line between its two pins.
+
+With x from the first pin (O2, A, O4) towards the second and y to the left of it, over all that acts at or before x,
+inertia (d'Alembert) and weight included:
+
+    N(x) = -sum F_x  (tension > 0),   V(x) = sum F_y,   M(x) = sum (F_y (x - x_i)) - sum of the couples (ccw > 0).
+
+A force beside the line acts at its foot on it, together with its couple about that foot.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.effects.actions import Actions, list_bodies
+from fourbar.errors import InputError, expect
+from fourbar.evaluation.case import Case
+from fourbar.formulas.arithmetic import cross, polar
+from fourbar.formulas.motion import State
+from fourbar.linkage import ENDS, PIN_FORCE, PINS, Bar, require_bar, require_numbers
+from fourbar.scene import Scene
+from fourbar.solution import Array, Solution
+
+STATIONS = 41
+"""Equal stations from pin to pin, where none are given."""
+SAME = 1e-9
+"""Part of the bar's length within which a foot is at a pin."""
+Complex = NDArray[np.complex128]
+
+
+class Bending(NamedTuple):
+    """Largest bending moment of a bar at each position."""
+
+    moment: Array
+    """Signed, N m, (n,)."""
+    x: Array
+    """Where along the bar, m, (n,)."""
+
+
+class InternalForces(NamedTuple):
+    """What `internal_forces` returns; NaN at positions without forces."""
+
+    x: Array
+    """Stations from the first pin along the line between the bar's pins, m, (k,)."""
+    N: Array
+    """Normal force, tension > 0, N, (n, k)."""
+    V: Array
+    """Shear force, N, (n, k)."""
+    M: Array
+    """Bending moment, N m, (n, k)."""
+    uniform: bool
+    """Whether weight and inertia are spread as those of a uniform slender bar; otherwise they act at G."""
+    largest: Bending
+    """Largest |M| of all x, on both sides of every foot and where V = 0."""
+
+
+def internal_forces(scene: Scene, solution: Solution, bar: int, stations: Array | None = None) -> InternalForces:
+    """Compute the internal forces of a moving bar.
+
+    A bar counts as uniform where its inertia and centre are left out; the weight and inertia of any other act at G,
+    its rotary inertia as a couple there. A load's couple acts at its `at`, the drive's at the bar's ground pin (of
+    bar 3 at A), the couples of effects at their pins.
+
+    Parameters
+    ----------
+    solution : of the scene, up to the forces.
+    bar : 2, 3 or 4.
+    stations : x, m, (k,); left out: 41 equal ones from pin to pin.
+    """
+    expect("scene", scene, Scene)
+    expect("solution", solution, Solution)
+    bar = require_bar("bar", bar)
+    if solution.F12 is None:
+        raise InputError("solution", "F12", "was not evaluated: solve up to the stage 'force'")
+    if solution.theta_2.ndim != 1:
+        raise InputError("solution", "a study", "must be of one scene: take one member")
+    described = scene.linkage.bar(bar)
+    x = np.linspace(0.0, described.length, STATIONS)
+    if stations is not None:
+        x = np.atleast_1d(require_numbers("stations", stations, "must be finite lengths", "m"))
+    beam = _collect(scene, solution, bar)
+    rows = np.broadcast_to(x, (len(solution), len(x)))
+    return InternalForces(x, *beam.at(rows), beam.uniform, beam.find_largest())
+
+
+class _Beam(NamedTuple):
+    """Everything that acts on a bar, by its foot on the line: (n, f); and what is spread over it."""
+
+    length: float
+    foot: Array
+    force: Complex
+    """In the bar's axes, x + i y."""
+    couple: Array
+    uniform: bool
+    density: float
+    """Of a uniform bar, kg/m; otherwise 0."""
+    pull: Complex
+    """Acceleration of the first pin less gravity, in the bar's axes, m/s^2, (n,)."""
+    omega: Array
+    alpha: Array
+
+    def at(self, x: Array, *, before: bool = False) -> tuple[Array, Array, Array]:
+        """Compute N, V, M at x, (n, k); with what acts at x itself, or just `before` it."""
+        N, V, M = (np.zeros(x.shape) for _ in range(3))
+        for foot, force, couple in zip(self.foot.T, self.force.T, self.couple.T, strict=True):
+            own = foot[:, None] < x if before else foot[:, None] <= x
+            N -= np.where(own, force.real[:, None], 0.0)
+            V += np.where(own, force.imag[:, None], 0.0)
+            M += np.where(own, force.imag[:, None] * (x - foot[:, None]) - couple[:, None], 0.0)
+        s, rest = np.clip(x, 0.0, self.length), np.maximum(x - self.length, 0.0)
+        along, across = self.pull.real[:, None], self.pull.imag[:, None]
+        omega, alpha = self.omega[:, None], self.alpha[:, None]
+        sheared = -self.density * s * (across + 0.5 * alpha * s)
+        N += self.density * s * (along - 0.5 * np.square(omega) * s)
+        V += sheared
+        M += -self.density * np.square(s) * (0.5 * across + alpha * s / 6.0) + sheared * rest
+        return N, V, M
+
+    def find_largest(self) -> Bending:
+        """Find the largest |M|: at every foot, on both sides, and where V = 0 between two."""
+        n = len(self.foot)
+        ends = np.broadcast_to([0.0, self.length], (n, 2))
+        feet = np.sort(np.concatenate([self.foot, ends], axis=1), axis=1)
+        places, moments = [feet, feet], [self.at(feet)[2], self.at(feet, before=True)[2]]
+        if self.density > 0.0:
+            across, bend = self.pull.imag[:, None], 0.5 * self.alpha[:, None]
+            single = self.at(feet)[1] / self.density + feet * (across + bend * feet)  # of the forces at feet alone
+            roots = _solve_quadratic(bend, across, -single)
+            after = np.concatenate([feet[:, 1:], feet[:, -1:]], axis=1)
+            for root in roots:
+                inside = (root > feet) & (root < after) & (root > 0.0) & (root < self.length)
+                places.append(np.where(inside, root, feet))
+                moments.append(np.where(inside, self.at(places[-1])[2], 0.0))
+        x, M = np.concatenate(places, axis=1), np.concatenate(moments, axis=1)
+        worst = np.argmax(np.nan_to_num(np.abs(M), nan=-1.0), axis=1)[:, None]
+        known = np.isfinite(M).all(axis=1)
+        return Bending(*(np.where(known, np.take_along_axis(of, worst, axis=1)[:, 0], np.nan) for of in (M, x)))
+
+
+def _solve_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
+    """Solve a x^2 + b x + c = 0 without cancellation; NaN where no root is real."""
+    with np.errstate(all="ignore"):
+        q = -0.5 * (b + np.copysign(np.sqrt(b * b - 4.0 * a * c), b))
+        return q / a, c / q
+
+
+class _Recorder(Actions):
+    """Forces and couples on one bar, each where it acts."""
+
+    def __init__(self, state: State, scene: Scene, bar: int) -> None:
+        super().__init__(state, list_bodies(scene.linkage))
+        self.bar, self.length = bar, scene.linkage.bar(bar).length
+        self.items: list[tuple[Any, Any, Any]] = []
+        """Place from the first pin and force in the bar's axes, and couple."""
+        self.place: Any = 0.0j
+        """Where a pure couple acts, in the bar's axes."""
+
+    def force(self, bar: int, force: Any, arm: Any = 0.0j) -> None:
+        """Record a force on the bar, world axes."""
+        if bar == self.bar:
+            back = np.conj(self.state.direction(bar))
+            self.items.append((arm * back, force * back, 0.0))
+
+    def moment(self, bar: int, moment: Any) -> None:
+        """Record a couple on the bar."""
+        if bar == self.bar:
+            self.items.append((self.place, 0.0j, moment))
+
+    def couple(self, pin: str, couple: Any) -> None:
+        """Record a couple between two bars at their pin."""
+        for bar, sign in zip(PINS[pin], (-1.0, 1.0), strict=True):
+            if bar == self.bar:
+                self.items.append((0.0j if pin == ENDS[bar][0] else self.length + 0.0j, 0.0j, sign * couple))
+
+    def pull(self, start: Any, end: Any, force: Any) -> None:
+        """Record both forces where they act, between bars that meet too: inside a bar it matters."""
+        self.pull_ends(start, end, force)
+
+
+def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
+    """Collect all that acts on a bar."""
+    described, n = scene.linkage.bar(bar), len(solution)
+    with np.errstate(all="ignore"):
+        case = Case.of(scene, solution.at.bar).with_start(solution.at)
+        state = case.at(solution.at)
+        recorder = _Recorder(state, scene, bar)
+        _record_pins(recorder, solution)
+        _record_drive(recorder, scene, solution)
+        gravity = 0.0j
+        uniform = described.inertia is None and described.centre is None
+        terms: tuple[Any, ...] = case.terms
+        for term in terms:
+            if term.key == "gravity" and uniform:
+                gravity = gravity + term.field
+                continue
+            if term.key == "load" and term.bar == bar:
+                recorder.place = _find_load(described, term, state)
+            term.act(recorder, state)
+            recorder.place = 0.0j
+            term.act_known(recorder, {name: getattr(solution, name) for name in PIN_FORCE.values()})
+        back = np.conj(state.direction(bar))
+        a_A = solution.a_A
+        assert a_A is not None
+        own = (a_A[:, 0] + 1j * a_A[:, 1] if bar == 3 else np.zeros(n)) - gravity
+        omega, alpha = (np.zeros(n) + getattr(solution, f"{letter}_{bar}") for letter in ("omega", "alpha"))
+        if not uniform:
+            a_G = getattr(solution, f"a_G{bar}")
+            recorder.items.append((described.to_centre, -described.mass * (a_G[:, 0] + 1j * a_G[:, 1]) * back, 0.0))
+            recorder.items.append((described.to_centre, 0.0j, -described.moment_of_inertia * alpha))
+        for term in terms:  # a flywheel turns about the bar's ground pin
+            recorder.items += [(0.0j, 0.0j, -inertia * alpha) for on, inertia in term.carried.items() if on == bar]
+        zero = np.zeros(n)
+        rows = [(zero + place, zero + force, zero + couple) for place, force, couple in recorder.items]
+        place, force, couple = (np.stack(column, axis=1) for column in zip(*rows, strict=True))
+        foot = place.real
+        for pin in (0.0, described.length):
+            foot = np.where(np.abs(foot - pin) <= SAME * described.length, pin, foot)
+        beside = couple + cross(-force, 1j * place.imag)  # the couple of a force beside the line
+        density = described.mass / described.length if uniform else 0.0
+        return _Beam(described.length, foot, force, beside, uniform, density, own * back, omega, alpha)
+
+
+def _record_pins(recorder: _Recorder, solution: Solution) -> None:
+    """Record the forces at both pins."""
+    for pin in ENDS[recorder.bar]:
+        name = PIN_FORCE[pin]
+        force = getattr(solution, name)
+        sign = 1.0 if name[2] == str(recorder.bar) else -1.0
+        back = np.conj(recorder.state.direction(recorder.bar))
+        place = 0.0 if pin == ENDS[recorder.bar][0] else recorder.length
+        recorder.items.append((place, sign * (force[:, 0] + 1j * force[:, 1]) * back, 0.0))
+
+
+def _record_drive(recorder: _Recorder, scene: Scene, solution: Solution) -> None:
+    """Record the couple of the drive at the bar's first pin, or the force along its line."""
+    if scene.motion.free is not None:
+        return
+    if scene.drive is not None:
+        assert solution.drive_force is not None
+        scene.drive.act(recorder, solution.drive_force)
+    elif scene.drive_bar == recorder.bar:
+        recorder.moment(recorder.bar, solution.torque)
+
+
+def _find_load(bar: Bar, load: Any, state: State) -> Any:
+    """Find where a load acts, in the bar's axes."""
+    arm = polar(*load.at)
+    return bar.to_centre + (arm if load.frame == "bar" else arm * np.conj(state.direction(load.bar)))

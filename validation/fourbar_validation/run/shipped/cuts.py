@@ -1,0 +1,178 @@
+"""Internal forces: each bar is cut, and the piece beyond the cut freed; nothing of the formulas' beam is used.
+
+The free bodies give pin forces and the drive. A piece of a uniform bar is a rigid bar of its own, with a mass, a
+centre and an inertia; of any other bar all of that is in the piece that has G's foot on the line.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import fourbar
+from fourbar.linkage import ENDS, MOVING_BARS, PIN_FORCE, PINS
+from fourbar.scene import Command, Scene, command
+from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.compare.line import place_line
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.compare.tolerance import ErrorBound, divide
+from fourbar_validation.engines.description import find_centre
+from fourbar_validation.engines.free_body import move
+from fourbar_validation.engines.free_body_effects import (
+    WRENCH_OF,
+    BodyMotion,
+    BodyWrenches,
+    apply_load,
+    list_sliding_pins,
+    make_vector,
+)
+from fourbar_validation.run.question import Question
+from fourbar_validation.run.shipped.variants import ask_free_bodies, make_row, take_few
+
+WHERE = (0.0, 0.137, 0.479, 0.863)
+"""Cuts, in parts of the bar's length from its first pin; just beyond that pin, and none at another foot."""
+CUT = ErrorBound(
+    "cut bars",
+    "1e-10 of the sum of the absolute terms: pin forces at conditions of at least 0.1 differ by some 1e-14, and "
+    "terms that cancel in the balance of a piece stand in the sum",
+    1e-10,
+    conditioned=False,
+)
+
+
+def internal_forces(question: Question) -> list[Row]:
+    """Judge N, V, M of each bar at a few cuts and positions, and that no cut bends more than the largest moment."""
+    scene = take_few(question)
+    at = command(scene)
+    answer, solution = ask_free_bodies(scene, at), fourbar.solve(scene)
+    motion = _move(scene, at, answer)
+    rows = []
+    for bar in MOVING_BARS:
+        length = scene.linkage.bar(bar).length
+        cuts = np.array([part * length for part in WHERE])
+        pieces = [_free(scene, motion, answer, bar, cut) for cut in cuts]
+        result = fourbar.internal_forces(scene, solution, bar, cuts)
+        for name, ours in (("N", result.N), ("V", result.V), ("M", result.M)):
+            theirs = np.stack([getattr(piece, name) for piece in pieces], axis=1)
+            size = np.stack([piece.turning if name == "M" else piece.pushing for piece in pieces], axis=1)
+            error = divide(np.abs(ours - theirs), size).max(axis=1)
+            if name == "M":
+                beyond = np.abs(theirs).max(axis=1) - np.abs(result.largest.moment)
+                error = np.maximum(error, divide(beyond, size.max(axis=1)))
+            reason = f"bar {bar} cut at {len(cuts)} places, at {len(error)} positions"
+            rows.append(make_row(question, "internal_forces", f"{name}{bar}", error, CUT, solution.theta_2, reason))
+    return rows
+
+
+def _move(scene: Scene, at: Command, answer: Answer) -> BodyMotion:
+    """Move the bars as the free bodies have them."""
+    theta = [answer.quantities[f"theta_{bar}"] for bar in MOVING_BARS]
+    omega, alpha = (answer.quantities[f"{name}_{at.bar}"] for name in ("omega", "alpha"))
+    return move(scene.linkage, theta[0], omega, alpha, theta[1], theta[2], at.bar)
+
+
+@dataclass
+class _Piece(BodyWrenches):
+    """The piece of a bar beyond a cut: forces in the bar's axes and their moment about the cut, counter-clockwise."""
+
+    bar: int
+    cut: float
+    motion: BodyMotion
+    place: Any = 0.0
+    """Foot of a pure couple."""
+
+    def __post_init__(self) -> None:
+        n = len(self.motion.theta_2)
+        super().__init__(n)
+        self.N, self.V, self.M = np.zeros(n), np.zeros(n), np.zeros(n)
+        self.pushing, self.turning = np.zeros(n), np.zeros(n)
+        """Sums of the absolute terms of the whole bar, N and N m."""
+
+    def push(self, bar: int, force: Any, arm: Any) -> None:
+        """Add a force, world axes, at an arm from the bar's first pin, to the piece on which its foot lies."""
+        if bar != self.bar:
+            return
+        own, at = (np.conj(self.motion.unit[bar]) * vector for vector in (force, arm))
+        beyond = at.real > self.cut
+        self.N += np.where(beyond, own.real, 0.0)
+        self.V -= np.where(beyond, own.imag, 0.0)
+        self.M += np.where(beyond, (at.real - self.cut) * own.imag - at.imag * own.real, 0.0)
+        self.pushing += np.abs(own)
+        self.turning += np.abs(own) * (np.abs(at) + abs(self.cut))
+
+    def twist(self, bar: int, couple: Any) -> None:
+        """Add a couple, to the piece on which its place lies."""
+        if bar == self.bar:
+            self.M += np.where(self.place > self.cut, couple, 0.0)
+            self.turning += np.abs(couple)
+
+    def twist_at(self, pin: str, couple: Any) -> None:
+        """Add a couple between two bars at their pin."""
+        if self.bar in PINS[pin]:
+            length = self.motion.linkage.bar(self.bar).length
+            self.place = 0.0 if ENDS[self.bar][0] == pin else length
+            super().twist_at(pin, couple)
+            self.place = 0.0
+
+
+def _free(scene: Scene, motion: BodyMotion, answer: Answer, bar: int, cut: float) -> _Piece:
+    """Free the piece of a bar beyond a cut."""
+    described = scene.linkage.bar(bar)
+    piece, length = _Piece(bar, cut, motion), described.length
+    uniform = described.inertia is None and described.centre is None
+    for pin in ENDS[bar]:
+        name = PIN_FORCE[pin]
+        force = answer.quantities[name] @ np.array([1.0, 1.0j])
+        along = 0.0 if ENDS[bar][0] == pin else length
+        piece.push(bar, force if name.endswith(str(bar)) else -force, along * motion.unit[bar])
+    _push_drive(scene, motion, answer, piece)
+    for load in scene.loads:
+        if load.bar == bar:
+            turned = motion.unit[bar] if load.frame == "bar" else 1.0
+            arm = motion.to_centre(bar) + turned * make_vector(load.at)
+            piece.place = (np.conj(motion.unit[bar]) * arm).real
+            apply_load(load, motion, piece)
+            piece.place = 0.0
+    gravity: Any = 0.0
+    for effect in scene.effects:
+        if effect.key == "gravity" and uniform:
+            gravity = make_vector((effect.magnitude, effect.angle))  # type: ignore[attr-defined]
+        else:
+            WRENCH_OF[effect.key](effect, motion, piece)
+    for pin, radius in list_sliding_pins(scene).items():
+        piece.twist_at(pin, -motion.sense(pin) * radius * np.hypot(*answer.quantities[PIN_FORCE[pin]].T))
+    a_pin: Any = motion.swing(2, motion.first_pin[3]) if bar == 3 else 0.0
+    if uniform:
+        for start, end in ((0.0, cut), (cut, length)):
+            _push_rigid(piece, described.mass * (end - start) / length, (start, end), a_pin, gravity)
+    else:
+        centre = make_vector(find_centre(described))
+        to_G = motion.unit[bar] * centre
+        piece.push(bar, -described.mass * (a_pin + motion.swing(bar, to_G)), to_G)
+        piece.place = centre.real
+        piece.twist(bar, -described.moment_of_inertia * motion.alpha[bar])
+    return piece
+
+
+def _push_rigid(piece: _Piece, mass: float, ends: tuple[float, float], a_pin: Any, gravity: Any) -> None:
+    """Put weight and inertia of a piece of a uniform bar on it, as of a rigid bar between two places."""
+    start, end = ends
+    middle, bar = 0.5 * (start + end), piece.bar
+    arm = middle * piece.motion.unit[bar]
+    piece.push(bar, mass * (gravity - a_pin - piece.motion.swing(bar, arm)), arm)
+    piece.place = middle
+    piece.twist(bar, -mass * (end - start) ** 2 / 12.0 * piece.motion.alpha[bar])
+    piece.place = 0.0
+
+
+def _push_drive(scene: Scene, motion: BodyMotion, answer: Answer, piece: _Piece) -> None:
+    """Put the couple of the drive at the first pin of its bar, or its force at the ends of its line."""
+    if scene.drive is None:
+        if scene.drive_bar == piece.bar:
+            piece.twist(piece.bar, answer.quantities["torque"])
+        return
+    theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
+    line = place_line(scene.linkage, scene.drive, theta)
+    force: Array = answer.quantities["drive_force"]
+    for sense, point, arm in zip((-1.0, 1.0), (line.drive.start, line.drive.end), line.arms, strict=True):
+        piece.push(point.bar, sense * force * line.unit, arm)
