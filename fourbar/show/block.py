@@ -316,10 +316,10 @@ class _Block:
             name = facts.solution.commanded
             lines.append(f"dry friction reverses, and the pin forces jump, at {name} = {where}")
         lines += self._warn()
-        if facts.error is not None and facts.error < FOUR_DIGITS:
-            lines.append(f"rounding changes none of these digits (worst error bar {facts.error:.1g} of the value)")
-        elif facts.error is not None:
-            lines.append(f"rounding changes digits: the worst error bar is {facts.error:.1g} of the value")
+        if facts.error is not None:
+            below = f"below 1e{math.ceil(math.log10(facts.error)):+03d}" if facts.error else "zero"
+            changed = "none of these" if facts.error < FOUR_DIGITS else "some"
+            lines.append(f"rounding changes {changed} digits (worst error bar {below} of the value)")
         return lines
 
     def _warn(self) -> list[str]:
