@@ -49,6 +49,8 @@ if _TYPE_CHECKING:
     from fourbar.effects import Table as Table
     from fourbar.effects import Torsion as Torsion
     from fourbar.effects import Viscous as Viscous
+    from fourbar.evaluation.free_motion import Released as Released
+    from fourbar.evaluation.free_motion import release as release
     from fourbar.files import dump as dump
     from fourbar.files import load as load
     from fourbar.files import save as save
@@ -79,6 +81,7 @@ _ON_FIRST_USE = {
     **{name: "fourbar.show.duty" for name in ("bearing_load", "motor_duty", "shaking_force", "shaking_moment")},
     **{name: "fourbar.studies.derivatives" for name in ("Sensitivity", "sensitivity")},
     **{name: "fourbar.studies.study" for name in ("Study", "vary")},
+    **{name: "fourbar.evaluation.free_motion" for name in ("Released", "release")},
     "Picture": "fourbar.files.pictures",
     "extremes": "fourbar.studies.enclosure",
     "equilibrium": "fourbar.studies.equilibrium",

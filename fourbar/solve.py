@@ -1,17 +1,16 @@
 """From a scene to its solution: block by block over the positions, stage by stage, no further than wanted."""
 
 import cmath
-from collections.abc import Iterable, KeysView, Mapping
+from collections.abc import Iterable, Iterator, KeysView, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
-from fourbar.evaluation.blocks import choose_block_size, keep
-from fourbar.evaluation.case import Case
-from fourbar.evaluation.stages import FORCE, Part, evaluate_command, evaluate_freely
+from fourbar.evaluation.case import BLOCK, Case, Evaluated
+from fourbar.evaluation.evaluate import ERROR, FORCE, evaluate, withhold_in_place
 from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
 from fourbar.quantities import (
     ANGLES,
@@ -27,17 +26,34 @@ from fourbar.quantities import (
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.point import OF_POINTS
+from fourbar.scene.scene import Independent
 from fourbar.solution import Array, Solution, unwrap
 
-if TYPE_CHECKING:
-    from fourbar.evaluation.free_motion import FreeMotion
+LONG_BLOCK = BLOCK // 4
+"""Positions with error bars evaluated at a time: longer numbers fill the cache sooner."""
+Part = tuple[Any, ...]
+"""Index of some positions in the arrays of all."""
 
 
 class Members(Protocol):
-    """What else can be solved: many linkages, which evaluate themselves block by block (`fourbar.vary`)."""
+    """What else can be solved: the scenes of m linkages, whose numbers are arrays (`fourbar.vary`)."""
 
-    def solved(self, stage: str | None, *, out: Mapping[str, Array] | None, side: int) -> Solution:
-        """Every quantity as (m, n) or (m, n, 2)."""
+    @property
+    def scene(self) -> Scene:
+        """What does not vary."""
+
+    @property
+    def at(self) -> Command:
+        """What is commanded, (m, n)."""
+
+    def members(self, rows: slice | None, count: int, begins: Scene | None = None) -> Scene:
+        """Make the scene of some members, or of all as columns, each repeated for `count` positions."""
+
+    def begin(self, rows: slice) -> Scene:
+        """Make the scene with effects that begin where each member's motion does."""
+
+    def refuse(self, result: Mapping[str, Array], code: NDArray[np.uint8]) -> None:
+        """Mark the members that no scene could be."""
 
 
 def solve(
@@ -66,34 +82,123 @@ def solve(
         the omega_2 that is needed, or a study, which states its own positions, is given others.
     """
     require_whole("side", side, (-1, 0, 1), "must be -1, 0 or 1")
+    study: Members | None = None
+    stopped_at = None
     if not isinstance(scene, Scene):
-        if not hasattr(scene, "solved"):
+        if not hasattr(scene, "members"):
             raise InputError("scene", scene, "must be a Scene, or a Study of `vary`")
         if at is not None:
             raise InputError("at", "a command", "a study states its own positions: vary the commanded angle")
-        return scene.solved(stage, out=out, side=side)
-    if at is not None:
+        study = scene
+        scene, where = study.scene, study.at
+    elif at is not None:
         _refuse(at)
-    moved = _solve_released(scene) if scene.motion.free is not None and at is None else None
-    where = moved.command if moved is not None else command(scene) if at is None else at
-    n = len(where.angle)
-    wanted, names = find_requested(scene, (n,), where, stage, out)
-    code = np.zeros(n, dtype=np.uint8)
-    with np.errstate(all="ignore"):
-        case = Case.of(scene, where.bar)._replace(side=side)
-        if wanted >= FORCE and scene.counts_turns:
-            case = case.with_start(_find_beginning(scene, where, moved))
-        result = None
-        if n == 1 and moved is None and out is None:
-            result = _solve_alone(case, where, wanted, names, code)
-    if result is None:
-        result = make_arrays(names, (n,), out)
-        _solve_by_parts(case, where, moved, wanted, names, result, code)
+        where = at
+    elif scene.motion.free is not None:
+        from fourbar.evaluation.free_motion import release
 
+        released = release(scene)
+        where, stopped_at = released.command, released.stopped_at
+    else:
+        where = command(scene)
+    shape = where.angle.shape
+    wanted, names = find_requested(scene, shape, where, stage, out)
+    code = np.zeros(shape, dtype=np.uint8)
+    with np.errstate(all="ignore"):
+        result = None
+        if shape == (1,) and study is None and where.independent is None and out is None:
+            result = _solve_alone(_begin(scene, where, wanted, side), where, wanted, names, code)
+        if result is None:
+            result, found = make_arrays(names, shape, out), None
+            blocks = _list_members(study, wanted, side) if study else _list_blocks(scene, where, wanted, side)
+            for part, case, block in blocks:
+                # what a block found is freed when the next has its own: else its memory goes back to the system
+                found = evaluate(case, block, wanted, names)
+                _store_block(case, found, result, code, part)
     unwrap_angles(result, where.bar)
-    solution = make_solution(scene, where, code, result)
-    solution.time, solution.stopped_at = where.time, None if moved is None else moved.stopped_at
+    if study is not None:
+        study.refuse(result, code)
+    solution = make_solution(scene if study is None else study.members(None, 1), where, code, result)
+    solution.time, solution.stopped_at = where.time, stopped_at
     return solution
+
+
+def _begin(scene: Scene, where: Command, wanted: int, side: int) -> Case:
+    """Make the case of one linkage, with effects that count turns from where the motion begins."""
+    case = Case.of(scene, where.bar)._replace(side=side)
+    if wanted < FORCE or not scene.counts_turns:
+        return case
+    if where.independent is not None:
+        return case.with_start(where.part(slice(0, 1)))
+    own = command(scene)
+    return case.with_start(own if own.bar == where.bar else where)
+
+
+def _list_blocks(scene: Scene, where: Command, wanted: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
+    """List the positions of one linkage block by block, those of a released one by their independent angle."""
+    case, free = _begin(scene, where, wanted, side), where.independent
+    if free is None:
+        for part in _split(len(where.angle), BLOCK if wanted < ERROR else LONG_BLOCK):
+            yield (part,), case, where.part(part)
+        return
+    for bar in (2, 4):
+        index = np.flatnonzero(free.bar == bar)
+        if index.size:
+            yield (index,), case.freed(bar, free.side[index]), where.part(index)
+
+
+def _list_members(study: Members, wanted: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
+    """List the positions of many linkages block by block, each number repeated for the positions of its member."""
+    (m, n), size = study.at.angle.shape, BLOCK if wanted < ERROR else LONG_BLOCK
+    for rows in _split(m, max(1, size // n)):
+        begins = study.begin(rows) if wanted >= FORCE else study.scene
+        for columns in _split(n, size):
+            scene = study.members(rows, columns.stop - columns.start, begins)
+            yield (
+                (rows, columns),
+                Case.of(scene, study.at.bar)._replace(side=side),
+                take_members(study.at, rows, columns),
+            )
+
+
+def _split(size: int, most: int) -> Iterator[slice]:
+    """Split so many into slices of as many at most."""
+    return (slice(start, min(start + most, size)) for start in range(0, size, most))
+
+
+def take_members(at: Command, rows: slice, columns: slice) -> Command:
+    """Take some positions of some members, one after the other, (k,)."""
+    count = columns.stop - columns.start
+
+    def flat(value: Any) -> Any:
+        if np.ndim(value) < 2:
+            return value
+        if value.shape[1] == 1:
+            return value[rows, 0] if count == 1 else np.repeat(value[rows, 0], count)
+        return value[rows, columns].reshape(-1, *value.shape[2:])
+
+    return Command(*(flat(value) for value in at))
+
+
+def _store_block(
+    case: Case, found: Evaluated, result: Mapping[str, Array], code: NDArray[np.uint8], part: Part
+) -> None:
+    """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so."""
+    codes, values, _ = found
+    withhold_in_place(case, found)
+    shape = code[part].shape
+    code[part] = codes.reshape(shape)
+    for name, value in values.items():
+        if len(shape) > 1 and np.ndim(value):
+            value = value.reshape(shape)  # noqa: PLW2901
+        if name in SCALARS:
+            result[name][part] = value
+        else:
+            array = result[name]
+            if array.strides[-1] == array.itemsize:  # x and y next to each other: one copy
+                array.view(complex)[*part, 0] = value
+            else:
+                array[*part, 0], array[*part, 1] = value.real, value.imag
 
 
 RATES = ("acceleration", "speed", "stroke_speed")
@@ -126,6 +231,17 @@ def _refuse(at: Command) -> None:
     if at.remainder is not None:
         require("at.remainder", at.remainder)
     expect("at.time", at.time, np.ndarray, type(None))
+    expect("at.independent", at.independent, Independent, type(None))
+    n = len(at.angle)
+    parts = (
+        {}
+        if at.independent is None
+        else {f"independent.{name}": (of, (n,)) for name, of in at.independent._asdict().items()}
+    )
+    for key, (value, wanted) in (parts | ({} if at.lost is None else {"lost": (at.lost, (n, 3))})).items():
+        expect(f"at.{key}", value, np.ndarray)
+        if value.shape != wanted or value.dtype.kind not in "iuf":
+            raise InputError(f"at.{key}", value, f"must be numbers, shape {wanted}")
 
 
 def find_last_stage(scene: Scene) -> str:
@@ -218,30 +334,6 @@ def unwrap_angles(result: Mapping[str, Array], bar: int) -> None:
             unwrap(result[name])
 
 
-def _solve_by_parts(
-    case: Case,
-    where: Command,
-    moved: "FreeMotion | None",
-    wanted: int,
-    names: KeysView[str],
-    result: Mapping[str, Array],
-    code: NDArray[np.uint8],
-) -> None:
-    """Evaluate all positions block by block, those of a free motion by their independent angle."""
-    size = choose_block_size(wanted)
-    parts: list[Part] = [(slice(start, start + size),) for start in range(0, len(code), size)]
-    if moved is not None:
-        parts = [(np.flatnonzero(moved.bar == bar),) for bar in (2, 4)]
-    found = None  # freed when the next part has its own: else the memory of each goes back to the system
-    with np.errstate(all="ignore"):
-        for part in parts:
-            if moved is not None:
-                found = evaluate_freely(case, moved, part, wanted, names)
-            else:
-                found = evaluate_command(case, where, part, wanted, names)
-            keep(case, found, result, code, part)
-
-
 def _solve_alone(
     case: Case, where: Command, wanted: int, names: KeysView[str], code: NDArray[np.uint8]
 ) -> dict[str, Array] | None:
@@ -250,7 +342,7 @@ def _solve_alone(
     None where any is no number: there NumPy goes on with inf and NaN, and statuses follow.
     """
     try:
-        codes, values, _ = evaluate_command(case, where, (0,), wanted, names)
+        codes, values, _ = evaluate(case, where.part((0,)), wanted, names)
     except ArithmeticError:
         return None
     code[0] = codes
@@ -260,38 +352,6 @@ def _solve_alone(
     vectors = table.view(float).reshape(-1, 1, 2)
     scalars = vectors[:, :, 0]
     return {name: (scalars if name in SCALARS else vectors)[i] for i, name in enumerate(values)}
-
-
-def _solve_released(scene: Scene) -> "FreeMotion":
-    """Compute the motion that the linkage makes when it is released."""
-    from fourbar.evaluation.free_motion import release
-
-    free, start = scene.motion.free, command(scene)
-    assert free is not None
-    if len(start.angle) != 1:
-        raise InputError(f"motion.{start.commanded}", scene.motion.angle, "a free motion is released at one angle")
-    moved = release(
-        scene.linkage,
-        (*scene.loads, *scene.effects),
-        float(start.angle[0]),
-        scene.motion.speed or 0.0,
-        int(start.branch[0]),
-        np.linspace(0.0, free.duration, free.steps + 1),
-        follow=scene.motion.through == "follow",
-        bar=start.bar,
-    )
-    if scene.counts_turns:
-        with np.errstate(all="ignore"):
-            Case.of(scene).with_start(_find_beginning(scene, moved.command, moved)).refuse_wound(moved.command)
-    return moved
-
-
-def _find_beginning(scene: Scene, where: Command, moved: "FreeMotion | None") -> Command:
-    """Return the positions among which effects that count turns find where the motion begins, of the bar of `where`."""
-    if moved is not None:
-        return Command(where.angle[:1], where.branch[:1], 0.0, 0.0)
-    own = command(scene)
-    return own if own.bar == where.bar else where
 
 
 def _list_foreign(scene: Scene) -> tuple[str, ...]:

@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, list_bodies
 from fourbar.effects.effect import SolvedFriction
-from fourbar.errors import LimitError
 from fourbar.formulas.arithmetic import angle, is_any, polar, select
 from fourbar.formulas.longer import change_numbers, lengthen
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import Path, prepare_path
+from fourbar.formulas.path import Path, meet_change_points, prepare_path
 from fourbar.formulas.pin_forces import (
     Bodies,
     PinForces,
@@ -124,14 +123,12 @@ class Case(NamedTuple):
         lever, most = self.drive.leverage(state, self.sines(state.at))
         return abs(lever) / most
 
-    def state(
-        self, path: Path, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
-    ) -> State:
+    def state(self, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True) -> State:
         """Positions and, where more than they is wanted, motion.
 
         `at`: in the order in which the path reads the loop.
         """
-        k = NO_MOTION
+        k, path = NO_MOTION, self.path
         if moving:
             at, k = path.motion(at, branch)
         else:
@@ -144,7 +141,13 @@ class Case(NamedTuple):
         half, _ = self.half_angle(where.angle, where.remainder)
         found = self.path.position(where.angle, half, where.branch)
         speed = 0.0 if where.speed is None else where.speed
-        return self.state(self.path, where.angle, found, where.branch, speed, where.acceleration)
+        return self.state(where.angle, found, where.branch, speed, where.acceleration)
+
+    def freed(self, bar: int, side: Any) -> "Case":
+        """Return the case of a linkage that is released, read in the angle of bar 2 or 4, which nothing drives."""
+        path = prepare_path(Loop(*self.linkage.lengths, 0.0, 0.0), self.linkage.ground_angle, bar)
+        path = path._replace(lengths=meet_change_points(path.lengths))
+        return self._replace(drive_bar=bar, drive=None, path=path, side=side)
 
     def started(self, at: Command) -> "Case":
         """With effects that know that the motion begins at a position, of as many linkages as there are."""
@@ -159,18 +162,6 @@ class Case(NamedTuple):
             return self
         first = int(np.argmax(assembled))
         return self.started(Command(motion.angle[first], motion.branch[first], 0.0, 0.0, motion.remainder))
-
-    def refuse_wound(self, at: Command) -> None:
-        """Raise a LimitError where a free motion winds a spring: from there on it is no longer the spring's."""
-        state = self.at(at)
-        for term in self.terms:
-            codes = term.status(state, at.branch) if term.counts_turns else None
-            if codes is not None and codes.any():
-                assert at.time is not None
-                raise LimitError(
-                    f"effects.{term.key}: at {at.time[np.argmax(codes)]:.6g} s the free motion has turned a pin "
-                    "by more than half a turn from the rest of its spring, which is not modelled"
-                )
 
     def half_angle(self, q: Array, remainder: Any) -> tuple[HalfAngle, NDArray[np.intp]]:
         """Compute the half angles, and the indices of those evaluated in many digits."""

@@ -13,18 +13,19 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.actions import Actions, list_bodies
 from fourbar.effects.effect import Effect
-from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, say_install
+from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, expect, say_install
+from fourbar.evaluation.case import Case
 from fourbar.formulas.motion import Coefficients, State, rates
-from fourbar.formulas.path import Path, drive_sine, find_smooth_branch, prepare_path
+from fourbar.formulas.path import drive_sine, find_smooth_branch, meet_change_points, prepare_path
 from fourbar.formulas.pin_forces import Body
-from fourbar.formulas.position import HalfAngle, Loop, Position, loop
+from fourbar.formulas.position import HalfAngle, Position, loop
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.scene import Command
+from fourbar.scene import Command, Scene, command
+from fourbar.scene.scene import Independent
 from fourbar.solution import Array
 
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
@@ -38,41 +39,86 @@ STEPS = 200_000
 take a thousand, so it is thousands of turns long, or something makes it infinitely fast."""
 VANISHING = 2.0**-300
 """A speed at which a couple of viscous damping is nothing and dry friction has its sense."""
-TOUCHING = 2.0**-53
-"""Lengths that miss a change point by this times their sum meet it: each was itself rounded by that."""
 
 
 @dataclass(slots=True, eq=False)
-class FreeMotion:
+class Released:
     """What the linkage did at the times of the scene, until it stopped."""
 
     command: Command
-    """theta_2 (continuous), branch, omega_2, alpha_2 and time; ends before `stopped_at` where the motion did."""
-    bar: NDArray[np.int8]
-    """Whose angle is the independent one, 2 or 4, (n,)."""
-    paths: dict[int, Path]
-    """Of bars 2 and 4."""
-    q: Array
-    """The independent angle (rad), its speed and its acceleration, each (n,)."""
-    speed: Array
-    acceleration: Array
-    sign: Array
-    """Of the root on the path, (n,)."""
-    side: Array
-    """At a standstill the part of its torque, -1 to 1, that dry friction holds with; +-1: it moves on; else 0, (n,)."""
+    """theta_2 (continuous), branch, omega_2, alpha_2, time and the independent angle, for `solve(scene, at=...)`."""
     energy_drift: float
     """Largest |kinetic energy - work done| over the motion, by the largest of either; 0 where nothing moves."""
     stopped_at: float | None = None
     """Time at which a limit position or change point was reached, s; None: the whole duration was run."""
 
+    @property
+    def time(self) -> Array:
+        """Times of the instants, (n,), s; they end before `stopped_at` where the motion did."""
+        assert self.command.time is not None
+        return self.command.time
 
-def _meet_change_points(lengths: Loop) -> Loop:
-    """E1 and E2 zero where the lengths miss a change point by rounding."""
-    d, a, b, c, E1, E2 = lengths
-    total = d + a + b + c
-    largest = max(abs((d - a) - (b - c)), abs((d - a) + (b - c)))
-    met = abs(E1) <= TOUCHING * total * total, abs(E2) <= TOUCHING * total * largest
-    return lengths._replace(E1=0.0 if met[0] else E1, E2=0.0 if met[1] else E2)
+    @property
+    def theta_2(self) -> Array:
+        """Angle of the input, continuous, (n,), rad."""
+        return self.command.angle
+
+    @property
+    def omega_2(self) -> Array:
+        """Speed of the input, (n,), rad/s."""
+        return np.asarray(self.command.speed)
+
+    @property
+    def alpha_2(self) -> Array:
+        """Acceleration of the input, (n,), rad/s^2."""
+        return np.asarray(self.command.acceleration)
+
+
+def release(scene: Scene) -> Released:
+    """Compute the motion that a linkage makes when it is released, as its scene says (`free`), by SciPy.
+
+    Raises
+    ------
+    InputError : the scene says nothing of a release, or names more than one angle; and as of `integrate`.
+    LimitError : it winds a spring beyond half a turn from its rest; and as of `integrate`.
+
+    >>> import fourbar
+    >>> free = fourbar.Free(duration=0.2, steps=2)
+    >>> linkage = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
+    >>> scene = fourbar.Scene(linkage, fourbar.Motion(1.0, 5.0, free=free), effects=(fourbar.Gravity(),))
+    >>> released = release(scene)
+    >>> fourbar.solve(scene, at=released.command).torque
+    array([0., 0., 0.])
+    """
+    expect("scene", scene, Scene)
+    free, start = scene.motion.free, command(scene)
+    if free is None:
+        raise InputError("motion.free", None, "is needed for a release: its duration and steps")
+    if len(start.angle) != 1:
+        raise InputError(f"motion.{start.commanded}", scene.motion.angle, "a free motion is released at one angle")
+    released = integrate(
+        scene.linkage,
+        (*scene.loads, *scene.effects),
+        float(start.angle[0]),
+        scene.motion.speed or 0.0,
+        int(start.branch[0]),
+        np.linspace(0.0, free.duration, free.steps + 1),
+        follow=scene.motion.through == "follow",
+        bar=start.bar,
+    )
+    if scene.counts_turns:
+        at = released.command
+        with np.errstate(all="ignore"):
+            begun = Case.of(scene).with_start(at.part(slice(0, 1)))
+            state = begun.at(at)
+            for term in begun.terms:
+                codes = term.status(state, at.branch) if term.counts_turns else None
+                if codes is not None and codes.any():
+                    raise LimitError(
+                        f"effects.{term.key}: at {released.time[np.argmax(codes)]:.6g} s the free motion has turned a "
+                        "pin by more than half a turn from the rest of its spring, which is not modelled"
+                    )
+    return released
 
 
 def _make_plain(numbers: Any) -> Any:
@@ -85,7 +131,7 @@ class _Reading:
 
     def __init__(self, linkage: FourBar, bar: int) -> None:
         found = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
-        lengths = _make_plain(_meet_change_points(found.lengths))
+        lengths = _make_plain(meet_change_points(found.lengths))
         self.path = found._replace(lengths=lengths, u1=complex(found.u1), unit=float(found.unit))
         self.bar, self.sign = bar, 1.0
         self.changes = 0.0 in (self.path.lengths.E1, self.path.lengths.E2)
@@ -122,7 +168,7 @@ def _compute_sines(at: Position) -> dict[int, float]:
     return {bar: float(drive_sine(at, bar)) for bar in MOVING_BARS}
 
 
-def release(
+def integrate(
     linkage: FourBar,
     terms: Iterable[Effect],
     theta: float,
@@ -132,7 +178,7 @@ def release(
     *,
     follow: bool = False,
     bar: int = 2,
-) -> FreeMotion:
+) -> Released:
     """Integrate the motion from theta_2 with omega_2 under the effects, with no driving torque.
 
     To 1e-9 rad over 5 s wherever the motion itself does not amplify errors by more than 1000.
@@ -266,7 +312,7 @@ class _Run:
         self.side = math.copysign(1.0, rate)
         return True
 
-    def through(self, times: Array) -> FreeMotion:
+    def through(self, times: Array) -> Released:
         """Integrate over the times and report."""
         try:
             from scipy.integrate import DOP853
@@ -314,19 +360,10 @@ class _Run:
                 if rested or self._change_over():
                     moves = self._starts()
                     break
-        theta_2, omega_2, alpha_2, branch, bar, q, speed, growth, sign, side = np.array(rows).reshape(-1, 10).T
-        return FreeMotion(
-            Command(theta_2, branch.astype(np.int8), omega_2, alpha_2, None, np.asarray(times[: len(rows)])),
-            bar.astype(np.int8),
-            {each: reading.path for each, reading in self.readings.items()},
-            q,
-            speed,
-            growth,
-            sign,
-            side,
-            worst / largest if largest else 0.0,
-            stopped,
-        )
+        theta_2, omega_2, alpha_2, branch, bar, *independent = np.array(rows).reshape(-1, 10).T
+        at = Command(theta_2, branch.astype(np.int8), omega_2, alpha_2, None, np.asarray(times[: len(rows)]))
+        at = at._replace(independent=Independent(bar.astype(np.int8), *independent))
+        return Released(at, worst / largest if largest else 0.0, stopped)
 
     @staticmethod
     def _find_root(

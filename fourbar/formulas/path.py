@@ -43,6 +43,8 @@ from fourbar.linkage import FourBar
 
 NO_DIGIT_LEFT = 16.0 * 2.0**-53
 """|sin mu| at or below this: the directions of bars 3 and 4 are the same in doubles."""
+TOUCHING = 2.0**-53
+"""Lengths that miss a change point by this times their sum meet it: each was itself rounded by that."""
 ROLES = {2: (2, 3, 4), 3: (3, 2, 4), 4: (4, 3, 2)}
 """The bars that are input, coupler and output of the loop read from a bar; and back."""
 
@@ -147,6 +149,15 @@ def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     own, u1 = loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit))), polar(1.0, theta_1)
     meets = is_any(is_zero(own.E1) & is_zero(own.E2))
     return Path(bar, own, theta_1, -u1 if bar == 4 else u1, unit, meets)
+
+
+def meet_change_points(lengths: Loop) -> Loop:
+    """Return the lengths of one linkage with E1 and E2 zero where they miss a change point by rounding."""
+    d, a, b, c, E1, E2 = lengths
+    total = d + a + b + c
+    largest = max(abs((d - a) - (b - c)), abs((d - a) + (b - c)))
+    met = abs(E1) <= TOUCHING * total * total, abs(E2) <= TOUCHING * total * largest
+    return lengths._replace(E1=0.0 if met[0] else E1, E2=0.0 if met[1] else E2)
 
 
 def find_singular(at: Position) -> Number:

@@ -97,6 +97,26 @@ class Scene:
         return any(effect.counts_turns for effect in self.effects)
 
 
+class Independent(NamedTuple):
+    """The angle in which a released motion is read at each of n instants, that of bar 2 or 4, whichever does not stop.
+
+    At a limit of theta_2 bar 4's alone holds the forces, and dry friction at a standstill has a side of its own.
+    """
+
+    bar: NDArray[np.int8]
+    """2 or 4, (n,), as all that follows."""
+    angle: Array
+    """rad."""
+    speed: Array
+    """rad/s."""
+    acceleration: Array
+    """rad/s^2."""
+    sign: Array
+    """Sign of the root on the path."""
+    side: Array
+    """At a standstill the part of its torque, -1 to 1, that dry friction holds with; +-1: it moves on; else 0."""
+
+
 class Command(NamedTuple):
     """What one bar, the input unless another is named, must do at each of n independent positions."""
 
@@ -121,6 +141,8 @@ class Command(NamedTuple):
     """m/s; None where no stroke is commanded, or positions only."""
     lost: Array | None = None
     """What angle, speed and acceleration leave out as doubles, (n, 3), where they follow from a stroke."""
+    independent: Independent | None = None
+    """Of a released motion."""
 
     @property
     def commanded(self) -> str:
@@ -136,7 +158,10 @@ class Command(NamedTuple):
     def part(self, where: Any) -> "Command":
         """Take some of the positions."""
         rows: Any = (value[where] if isinstance(value, np.ndarray) and value.ndim else value for value in self)
-        return Command(*rows)
+        part = Command(*rows)
+        if self.independent is None:
+            return part
+        return part._replace(independent=Independent(*(value[where] for value in self.independent)))
 
     @property
     def theta_2(self) -> Array:

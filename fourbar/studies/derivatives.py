@@ -14,7 +14,7 @@ from fourbar.effects.cones import solve_sliding
 from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
-from fourbar.evaluation.stages import list_kinematics, name_of_command
+from fourbar.evaluation.evaluate import list_kinematics, name_of_command
 from fourbar.formulas.arithmetic import polar
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Position, find_parallel_pairs, put_parallel_pairs
@@ -313,7 +313,7 @@ def _compute_derivatives(
         q, speed, acceleration, lever = turned
     case, branch = Case.of(scene, at.bar), at.branch[index].astype(float)
     position = _compute_position(case.path, q, branch)
-    state = case.state(case.path, q, position, branch, speed, acceleration, moving=moving)
+    state = case.state(q, position, branch, speed, acceleration, moving=moving)
     found = list_kinematics(case, state, names) | name_of_command(case, position, state, q)
     if at.stroke is not None:
         found |= {"theta_2": state.theta_2, "condition": found["condition"] * lever, **commanded}

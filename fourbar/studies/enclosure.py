@@ -190,7 +190,7 @@ class _Search:
         path = Path(2, lengths, theta_1, u1)
         case = Case(link, lengths, list_bodies(link, terms), terms, scene.drive_bar, path, drive=scene.drive)
         acceleration = numbers["motion.alpha_2"]
-        state = case.state(path, q, at, self.branch, numbers["motion.omega_2"], acceleration)
+        state = case.state(q, at, self.branch, numbers["motion.omega_2"], acceleration)
         found = case.dynamics(state, acceleration)
         forces = {f"|{name}|": dot(force, force) for name, force in found.pins._asdict().items()}
         cosine = dot(at.u3, at.u4)

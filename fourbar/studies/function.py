@@ -8,7 +8,7 @@ import numpy as np
 
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.evaluation.case import Case, find_undecided
-from fourbar.evaluation.stages import list_kinematics, name_of_command
+from fourbar.evaluation.evaluate import list_kinematics, name_of_command
 from fourbar.formulas.arithmetic import make_like, namespace
 from fourbar.formulas.mobility import change_points
 from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, SCALARS, STAGE_OF
@@ -143,7 +143,7 @@ def _evaluate(
     half = half._replace(outer=xp.where(ok, half.outer, square), inner=xp.where(ok, half.inner, square))
     stages = set(wanted.values())
     at = path.position(q, half, branch)
-    state = case.state(path, q, at, branch, speed, acceleration, moving=stages != {"position"})
+    state = case.state(q, at, branch, speed, acceleration, moving=stages != {"position"})
     found = {"theta_2": state.theta_2, **list_kinematics(case, state, wanted.keys())}
     found |= name_of_command(case, at, state, q)
     if "force" in stages:

@@ -1,6 +1,6 @@
 """A scene with arrays in the place of some of its numbers: one linkage for each entry."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,19 +9,17 @@ from numpy.typing import NDArray
 
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
-from fourbar.evaluation.blocks import choose_block_size, keep
-from fourbar.evaluation.case import BLOCK, Case
-from fourbar.evaluation.stages import FORCE, evaluate_command
+from fourbar.evaluation.case import Case
 from fourbar.formulas.mobility import follow_smooth_path
 from fourbar.formulas.position import loop, reorder_lengths
 from fourbar.linkage import convert_to_unit
-from fourbar.quantities import ANGLES, INVALID, NOT_ASSEMBLED
+from fourbar.quantities import INVALID, NOT_ASSEMBLED
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import find_unit
 from fourbar.scene.stroke import turn_bar
-from fourbar.solution import Array, Solution
-from fourbar.solve import find_requested, make_arrays, make_solution, unwrap_angles
+from fourbar.solution import Array
+from fourbar.solve import take_members
 from fourbar.studies.keys import COMMAND_KEYS, command_key, list_entries, refuse_key, replace_numbers, replace_place
 from fourbar.writing import describe_extent, list_names
 
@@ -50,77 +48,43 @@ class Study:
         """Say what varies."""
         return f"Study {self.scene.title!r}: {describe_extent(self.at.angle)}\n" + list_names("varied", self.values)
 
-    def solved(self, stage: str | None, *, out: Mapping[str, Array] | None = None, side: int = 0) -> Solution:
-        """Return what `fourbar.solve` does for a study: every quantity as (m, n) or (m, n, 2)."""
-        at, shape = self.at, self.at.angle.shape
-        wanted, names = find_requested(self.scene, shape, at, stage, out)
-        result = make_arrays(names, shape, out)
-        code = np.zeros(shape, dtype=np.uint8)
-        size = choose_block_size(wanted)
+    def members(self, rows: slice | None, count: int, begins: Scene | None = None) -> Scene:
+        """Make the scene of some members whose numbers are arrays, each repeated for `count` positions.
 
-        def evaluate(rows: slice) -> None:
-            begins = self._make_started(rows) if wanted >= FORCE else self.scene
-            for columns in _split(shape[1], size):
-                block = (rows.stop - rows.start, columns.stop - columns.start)
-                case = Case.of(self._make_members(rows, block[1], begins), at.bar)._replace(side=side)
-                where = self._list_command(rows, columns)
-                found = evaluate_command(case, where, (...,), wanted, names)
-                keep(case, found, result, code, (rows, columns), block)
-            unwrap_angles({name: result[name][rows] for name in ("theta_2", *ANGLES) if name in result}, at.bar)
-
-        with np.errstate(all="ignore"):
-            for rows in _split(len(self), max(1, size // shape[1])):
-                evaluate(rows)
-        code[np.isnan(at.angle)] = NOT_ASSEMBLED  # the cylinder cannot have the stroke
-        code[self.invalid] = INVALID
-        for array in result.values():
-            array[self.invalid] = np.nan
-        numbers = {key: values[:, None] for key, values in self.values.items()}
-        return make_solution(replace_numbers(self.scene, numbers), at, code, result)
-
-    def _list_command(self, rows: slice, columns: slice) -> Command:
-        """List some positions of some members, one after the other, (k,)."""
-        count = columns.stop - columns.start
-
-        def flat(value: Any) -> Any:
-            if np.ndim(value) == 3:
-                return value[rows, columns].reshape(-1, value.shape[2])
-            if np.ndim(value) != 2:
-                return value
-            return _repeat(value[rows, 0], count) if value.shape[1] == 1 else value[rows, columns].ravel()
-
-        return Command(*(flat(value) for value in self.at))
-
-    def _make_members(self, rows: slice, count: int, scene: Scene) -> Scene:
-        """Make the scene of some members whose numbers are arrays, each repeated for `count` positions."""
+        `rows`: None: of all, as columns (m, 1). `begins`: the scene with effects that know where the motion begins.
+        """
+        if rows is None:
+            return replace_numbers(self.scene, {key: values[:, None] for key, values in self.values.items()})
+        scene = self.scene if begins is None else begins
         scene = replace_numbers(scene, {key: _repeat(values[rows], count) for key, values in self.values.items()})
         for index, turns in _find_turns(scene.effects).items():
             scene = replace_place(scene, ("effects", index, "turns"), tuple(_repeat(turn, count) for turn in turns))
         return scene
 
-    def _make_started(self, rows: slice) -> Scene:
+    def begin(self, rows: slice) -> Scene:
         """Make the scene with effects that begin where each member's motion does: where it first assembles."""
-        if not self.scene.counts_turns:
-            return self.scene
-        count = rows.stop - rows.start
-        first = np.full(count, -1)
-        for columns in _split(self.at.angle.shape[1], BLOCK):
-            width = columns.stop - columns.start
-            half, _ = Case.of(self._make_members(rows, width, self.scene), self.at.bar).half_angle(
-                self._list_command(rows, columns).angle, None
-            )
-            assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(count, width)
-            here = (first < 0) & assembled.any(axis=1)
-            first[here] = columns.start + np.argmax(assembled, axis=1)[here]
-        member = np.arange(count)
-        angle = np.where(first < 0, np.nan, self.at.angle[rows][member, first])
-        one_branch = np.ptp(self.at.branch[rows], axis=1) == 0
-        at = Command(np.where(one_branch, angle, np.nan), self.at.branch[rows, 0], 0.0, 0.0, bar=self.at.bar)
-        scene = self.scene
-        counted = Case.of(self._make_members(rows, 1, scene), at.bar).started(at).terms[len(scene.loads) :]
+        scene, at = self.scene, self.at
+        if not scene.counts_turns:
+            return scene
+        count, n = rows.stop - rows.start, at.angle.shape[1]
+        flat = take_members(at, rows, slice(0, n)).angle
+        half, _ = Case.of(self.members(rows, n), at.bar).half_angle(flat, None)
+        assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(count, n)
+        first = np.argmax(assembled, axis=1)
+        begins = assembled.any(axis=1) & (np.ptp(at.branch[rows], axis=1) == 0)
+        angle = np.where(begins, at.angle[rows][np.arange(count), first], np.nan)
+        start = Command(angle, at.branch[rows, 0], 0.0, 0.0, bar=at.bar)
+        counted = Case.of(self.members(rows, 1), at.bar).started(start).terms[len(scene.loads) :]
         for index, turns in _find_turns(counted).items():
             scene = replace_place(scene, ("effects", index, "turns"), turns)
         return scene
+
+    def refuse(self, result: Mapping[str, Array], code: NDArray[np.uint8]) -> None:
+        """Mark the members that a scene would refuse, and the strokes that a cylinder cannot have."""
+        code[np.isnan(self.at.angle)] = NOT_ASSEMBLED
+        code[self.invalid] = INVALID
+        for array in result.values():
+            array[self.invalid] = np.nan
 
 
 def _find_turns(effects: Iterable[Effect]) -> dict[int, Any]:
@@ -131,10 +95,6 @@ def _find_turns(effects: Iterable[Effect]) -> dict[int, Any]:
 
 def _repeat(values: Array, count: int) -> Array:
     return values if count == 1 else np.repeat(values, count)
-
-
-def _split(size: int, most: int) -> Iterator[slice]:
-    return (slice(start, min(start + most, size)) for start in range(0, size, most))
 
 
 def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
@@ -193,7 +153,7 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         stroke, stroke_speed = angle, speed
         angle, speed, acceleration, lever, lost = turn_bar(varied, stroke, speed, acceleration)
     branch = _find_branches(scene, numbers, angles if stroke is None else angle, m)
-    of_stroke = {"stroke": stroke, "lever": lever, "stroke_speed": stroke_speed, "lost": lost}
+    of_stroke: Any = {"stroke": stroke, "lever": lever, "stroke_speed": stroke_speed, "lost": lost}
     at = Command(angle, branch, speed, acceleration, bar=scene.motion.bar, **of_stroke)
     return Study(scene, numbers, invalid, at)
 

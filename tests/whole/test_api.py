@@ -49,7 +49,7 @@ ALWAYS_WRONG = (5j, [[1, 2], [3]], np.zeros((3, 3)), object())
 TEXTS = ("", ".", "no/such", "1", ["1", "2"])
 WRONG = (*ALWAYS_WRONG, None, False, math.nan, -1, 10**400, Decimal(1), *TEXTS, (), {}, {"m": 1}, {5: 1})
 """Not for every argument: some are allowed somewhere, and then the call goes through."""
-OF_OTHERS = {"Solution", "Sensitivity", "Study"}
+OF_OTHERS = {"Solution", "Sensitivity", "Study", "Released"}
 """What functions return; nobody constructs them."""
 
 
@@ -108,6 +108,14 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
         "vary": (fourbar.vary, (scene, {"lengths.input": [0.1]})),
         "vary, a value": (lambda x: fourbar.solve(fourbar.vary(scene, {"lengths.input": x})), (0.1,)),
         "equilibrium": (fourbar.equilibrium, (scene,)),
+        "release": (
+            fourbar.release,
+            (
+                fourbar.Scene(
+                    fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 5.0, free=fourbar.Free(0.1, 2))
+                ),
+            ),
+        ),
         "extremes": (fourbar.extremes, (scene, ("torque",))),
         "function": (fourbar.function, (scene, ["lengths.input"], ["torque"])),
         "tolerances": (

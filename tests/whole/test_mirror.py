@@ -33,8 +33,7 @@ JUDGED_BY = {
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve holding zeros; fourbar/show: equilibrium; "
     "fourbar/formulas: closed_curve",
     "fourbar/formulas/test_mobility.py": "fourbar/formulas: circuits linkage_type",
-    "fourbar/test_solve.py": "fourbar: linkage solution; "
-    "fourbar/scene: motion; fourbar/evaluation: blocks case stages withheld",
+    "fourbar/test_solve.py": "fourbar: linkage solution; fourbar/scene: motion; fourbar/evaluation: case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion_law numbers; fourbar/studies: keys",
     "fourbar/studies/test_spread.py": "fourbar/scene: tolerance; fourbar/files: tolerances",
     "fourbar/studies/test_derivatives.py": "fourbar/show: influence",

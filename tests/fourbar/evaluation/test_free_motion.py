@@ -8,7 +8,7 @@ import pytest
 
 import fourbar
 from fourbar.evaluation import free_motion
-from fourbar.evaluation.free_motion import release
+from fourbar.evaluation.free_motion import integrate
 from fourbar.solve import solve
 
 HANGING = fourbar.FourBar(
@@ -21,7 +21,7 @@ def test_one_window_of_iftomm_a02() -> None:
     """Ten seconds through the change points (lim.ii.udc.es/mbsbenchmark, A02)."""
     bar = fourbar.Bar(1.0, 1.0)
     linkage = fourbar.FourBar(1.0, bar, bar, bar)
-    m = release(linkage, (fourbar.Gravity(),), math.pi / 2, -1.0, 1, np.array([0.0, 10.0]), follow=True)
+    m = integrate(linkage, (fourbar.Gravity(),), math.pi / 2, -1.0, 1, np.array([0.0, 10.0]), follow=True)
     x, y, w = math.cos(m.command.theta_2[-1]), math.sin(m.command.theta_2[-1]), m.command.omega_2[-1]
     printed = (0.478385058, 0.878150179, 1.727264076, -0.940952179)
     for ours, theirs in zip((x, y, -y * w, x * w), printed, strict=True):
@@ -31,7 +31,7 @@ def test_one_window_of_iftomm_a02() -> None:
 
 def test_needs_no_driving_torque() -> None:
     terms = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001))
-    m = release(HANGING, terms, 0.3, 2.0, -1, np.linspace(0.0, 2.0, 41))
+    m = integrate(HANGING, terms, 0.3, 2.0, -1, np.linspace(0.0, 2.0, 41))
     s = solve(fourbar.Scene(HANGING, effects=terms), "force", at=m.command)
     assert s.torque is not None
     assert np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1  # of all the weights at one metre
@@ -42,10 +42,10 @@ def test_needs_no_driving_torque() -> None:
 def test_stops_at_a_limit_unless_set_to_follow(coupler: float) -> None:
     linkage = fourbar.FourBar(0.3, fourbar.Bar(0.2, 0.2), fourbar.Bar(coupler, 0.5), fourbar.Bar(0.22, 0.4))
     times = np.linspace(0.0, 1.0, 21)  # there, back and there again
-    halted = release(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times)
+    halted = integrate(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times)
     assert halted.stopped_at is not None and halted.command.time[-1] <= halted.stopped_at < 0.5
     assert set(halted.command.branch) == {1}
-    passed = release(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times, follow=True)
+    passed = integrate(linkage, (fourbar.Gravity(),), 1.0, 0.0, 1, times, follow=True)
     assert passed.stopped_at is None and set(passed.command.branch) == {1, -1} and passed.energy_drift < 1e-11
     n = len(halted.command.time)
     assert np.array_equal(passed.command.theta_2[:n], halted.command.theta_2)
@@ -55,7 +55,7 @@ def test_stops_at_a_limit_unless_set_to_follow(coupler: float) -> None:
 def test_a_flywheel_alone_turns_evenly_faster_under_a_constant_couple(bar: int) -> None:
     """Bars without mass: alpha = M/J."""
     linkage, times = fourbar.uniform(0.1, 0.25, 0.3, 0.28, per_metre=0.0), np.linspace(0.0, 2.0, 21)  # a drag link
-    m = release(linkage, (fourbar.Flywheel(0.5, bar), fourbar.Load(bar, moment=0.2)), 0.3, 1.0, 1, times)
+    m = integrate(linkage, (fourbar.Flywheel(0.5, bar), fourbar.Load(bar, moment=0.2)), 0.3, 1.0, 1, times)
     angle = solve(fourbar.Scene(linkage), "position", at=m.command).theta_4 if bar == 4 else m.command.theta_2
     start = solve(fourbar.Scene(linkage, fourbar.Motion(0.3, 1.0)), "velocity")
     speed = start.omega_4[0] if bar == 4 else 1.0
@@ -63,7 +63,7 @@ def test_a_flywheel_alone_turns_evenly_faster_under_a_constant_couple(bar: int) 
 
 
 def test_dry_friction_holds() -> None:
-    m = release(HANGING, (fourbar.Gravity(), fourbar.Friction.at(O2=0.3)), 0.3, 1.0, 1, np.linspace(0.0, 5.0, 51))
+    m = integrate(HANGING, (fourbar.Gravity(), fourbar.Friction.at(O2=0.3)), 0.3, 1.0, 1, np.linspace(0.0, 5.0, 51))
     assert (
         m.command.omega_2[-1] == 0.0 and m.command.alpha_2[-1] == 0.0 and m.command.theta_2[-1] == m.command.theta_2[-2]
     )
@@ -131,6 +131,29 @@ def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
     return np.linalg.solve(left, right)[9:].reshape(4, 2)
 
 
+def test_a_release_is_computed_once_and_solved_as_any_command() -> None:
+    released, whole = fourbar.release(SWING), solve(SWING, "force")
+    again = solve(SWING, "force", at=released.command)
+    for name in whole.evaluated():
+        np.testing.assert_array_equal(getattr(again, name), getattr(whole, name), err_msg=name)
+    np.testing.assert_array_equal(released.time, whole.time)
+    np.testing.assert_array_equal(released.theta_2, whole.theta_2)
+    np.testing.assert_allclose(released.omega_2, whole.omega_2, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(released.alpha_2, whole.alpha_2, rtol=0.0, atol=1e-9)
+    some = np.array([3, 70, 4])  # positions of both independent angles, in an order of their own
+    few = solve(SWING, "force", at=released.command.part(some))
+    np.testing.assert_array_equal(few.F43, whole.F43[some])
+
+
+@pytest.mark.parametrize(
+    ("motion", "says"),
+    [(fourbar.Motion(1.0, 2.0), "motion.free"), (replace(SWING.motion, theta_2=np.array([1.0, 2.0])), "at one angle")],
+)
+def test_what_is_not_released_is_refused(motion: fourbar.Motion, says: str) -> None:
+    with pytest.raises(fourbar.InputError, match=says):
+        fourbar.release(replace(SWING, motion=motion))
+
+
 @pytest.mark.slow
 def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPatch) -> None:
     """theta_2, omega_2, alpha_2 as doubles do not hold the forces there, the angle of bar 4 does."""
@@ -141,8 +164,8 @@ def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPat
     evenly = np.linspace(0.0, 1.2, 121)
     dense = halted.stopped_at + np.concatenate([-distances[::-1], [0.0], distances])
     times = np.unique(np.concatenate([evenly, dense]))
-    true = free_motion.release
-    monkeypatch.setattr(free_motion, "release", lambda *given, **how: true(*given[:-1], times, **how))
+    true = free_motion.integrate
+    monkeypatch.setattr(free_motion, "integrate", lambda *given, **how: true(*given[:-1], times, **how))
     s = solve(SWING, "force")
     assert set(s.status) == {"ok"} and np.array_equal(s.time, times)
     assert set(s.branch) == {1, -1} and np.abs(s.sin_mu).min() < 1e-12

@@ -12,7 +12,8 @@ import pytest
 
 import fourbar
 from fourbar.evaluation import free_motion
-from fourbar.evaluation.free_motion import FreeMotion, release
+from fourbar.evaluation.free_motion import Released as OurMotion
+from fourbar.evaluation.free_motion import integrate
 from tests.support.released_reference import released
 
 PROMISED = 1e-9
@@ -126,10 +127,10 @@ def motion(kind: str, number: int) -> Released:
             return Released(linkage, tuple(terms), theta_2, omega_2, branch, follow)
 
 
-def ours(of: Released, nudge: Sequence[float] = (0.0, 0.0)) -> FreeMotion:
+def ours(of: Released, nudge: Sequence[float] = (0.0, 0.0)) -> OurMotion:
     """The motion of the formulas."""
     start = (of.theta_2 + nudge[0], of.omega_2 + nudge[1])
-    return release(of.linkage, of.terms, *start, of.branch, TIMES, follow=of.follow)
+    return integrate(of.linkage, of.terms, *start, of.branch, TIMES, follow=of.follow)
 
 
 def amplification(of: Released) -> float:

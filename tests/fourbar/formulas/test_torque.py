@@ -9,11 +9,11 @@ from scipy.optimize import brentq
 import fourbar
 from fourbar.effects.actions import Actions, list_bodies
 from fourbar.evaluation.case import compute_state
-from fourbar.evaluation.free_motion import _meet_change_points, release
+from fourbar.evaluation.free_motion import integrate
 from fourbar.formulas.mobility import follow_smooth_path, limit_positions
 from fourbar.formulas.motion import State, rates
 from fourbar.formulas.path import compute_state as state_of
-from fourbar.formulas.path import find_smooth_branch, prepare_path
+from fourbar.formulas.path import find_smooth_branch, meet_change_points, prepare_path
 from fourbar.formulas.position import half_angle, loop
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.scene import Command, command
@@ -146,7 +146,7 @@ def free_acceleration(
     terms: tuple = (),  # type: ignore[type-arg]
 ) -> float:
     """alpha_2 of the linkage just released, rad/s^2."""
-    return float(release(linkage, terms, theta_2, omega_2, branch, np.zeros(1)).command.alpha_2[0])
+    return float(integrate(linkage, terms, theta_2, omega_2, branch, np.zeros(1)).command.alpha_2[0])
 
 
 def test_four_bar_of_gtdynamics() -> None:
@@ -405,11 +405,11 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
     """The lengths add up to 2: what misses a change point by 2 U = EPS touches, by twice that it does not."""
     exact, beyond = (0.5, 0.5 + EPS, 0.5, 0.5), (0.5, 0.5 + 2 * EPS, 0.5, 0.5)
     for lengths, touches in ((exact, True), (beyond, False)):
-        assert (_meet_change_points(loop(*lengths)).E1 == 0.0) == touches
-        assert (_meet_change_points(loop(*lengths)).E2 == 0.0) == touches
+        assert (meet_change_points(loop(*lengths)).E1 == 0.0) == touches
+        assert (meet_change_points(loop(*lengths)).E2 == 0.0) == touches
         assert loop(*lengths).E1 < 0.0
     wide = loop(0.3, 0.1, 0.25, 0.22)
-    assert _meet_change_points(wide) == wide
+    assert meet_change_points(wide) == wide
     products = 0.47**2 - 0.4**2, 0.2**2 - 0.03**2
     assert wide[4:] == pytest.approx(products)
 

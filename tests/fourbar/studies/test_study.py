@@ -1,6 +1,7 @@
 """Studies: a member of many linkages is that linkage alone, to the last digit; what no scene takes has a status."""
 
 import tomllib
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,6 @@ from fourbar.scene import command
 from fourbar.scene.motion import Free, FromLimit
 from fourbar.scene.motion_law import Law
 from fourbar.scene.point import Point
-from fourbar.studies import study as studying
 from fourbar.studies.keys import list_entries, replace_place
 from fourbar.studies.study import Study, vary
 
@@ -117,8 +117,7 @@ def test_blocks_over_members_and_positions_change_no_digit(monkeypatch: pytest.M
     study = vary(whole, spread(whole))
     at_once = solve(study)
     for size in (3, 12):  # positions of one member, and members
-        monkeypatch.setattr(studying, "choose_block_size", lambda wanted, size=size: size)
-        monkeypatch.setattr(studying, "BLOCK", size)
+        monkeypatch.setattr(import_module("fourbar.solve"), "BLOCK", size)
         piece = solve(study)
         for name in at_once.evaluated():
             np.testing.assert_array_equal(getattr(piece, name), getattr(at_once, name), err_msg=name)

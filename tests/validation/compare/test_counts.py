@@ -15,7 +15,7 @@ from fourbar.formulas.mobility import limit_positions
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.check.mjcf import ModelReport
 from fourbar_validation.cli import status
-from fourbar_validation.compare.answer import Answer, Released
+from fourbar_validation.compare.answer import Answer, ReleasedAnswer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.counts import Counts
@@ -240,8 +240,8 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest
         def __init__(self, step: float) -> None:
             self.step = step
 
-        def release(self, scene: Scene, times: object) -> Released:
-            return Released.refused("refusing", "-", "a declared limit")
+        def release(self, scene: Scene, times: object) -> ReleasedAnswer:
+            return ReleasedAnswer.refused("refusing", "-", "a declared limit")
 
     monkeypatch.setattr(free, "ENGINES", {name: (Refusing, *rest) for name, (_, *rest) in free.ENGINES.items()})
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))

@@ -65,7 +65,7 @@ def explain_refusal(engine: Engine, at: Command) -> str:
 
 
 @dataclass(slots=True, eq=False)
-class Released:
+class ReleasedAnswer:
     """A free motion as one engine integrated it, at stated times."""
 
     engine: str
@@ -83,7 +83,7 @@ class Released:
     """A declared limit that the scene meets; then the arrays are empty."""
 
     @classmethod
-    def refused(cls, engine: str, setting: str, reason: str) -> "Released":
+    def refused(cls, engine: str, setting: str, reason: str) -> "ReleasedAnswer":
         """No motion, and why."""
         none = np.empty(0)
         return cls(engine, setting, none, none, none, none, refusal=reason)

@@ -45,11 +45,12 @@ def evaluate_single(scene: Scene, at: Command) -> Quantities:
     """Evaluate the formulas on float32 arrays."""
     case = change_numbers(Case.of(scene), _round_single)
     path = case.path._replace(u1=np.complex64(case.path.u1))
+    case = case._replace(path=path)
     with np.errstate(all="ignore"):
         theta_2 = at.theta_2.astype(np.float32)
         speed, growth = (np.float32(value) for value in (at.omega_2 or 0.0, at.alpha_2))
         position = path.position(theta_2, path.half_angle(theta_2), at.branch)
-        state = case.state(path, theta_2, change_numbers(position, _round_single), at.branch, speed, growth)
+        state = case.state(theta_2, change_numbers(position, _round_single), at.branch, speed, growth)
         state = change_numbers(state, _round_single)
         result = case.dynamics(state, growth)
     assert result.drive.dtype == np.float32

@@ -24,7 +24,7 @@ from typing import IO, Any
 from fourbar.errors import InputError
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Answer, Array, Released, WitnessError
+from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer, WitnessError
 from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.rows import FORMULAS, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
@@ -293,10 +293,10 @@ class Asked:
         except InputError as error:
             raise WitnessError(str(error)) from None
 
-    def release(self, scene: Scene, times: Array) -> Released:
+    def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Return the released motion as the guest integrates it."""
         if refusal := self._explain_refusal(["release", *find_needs(scene)]):
-            return Released.refused(self.name, "-", refusal)
+            return ReleasedAnswer.refused(self.name, "-", refusal)
         data = {"ask": "release", "scene": protocol.scene_to_json(scene), **protocol.release_to_json(scene)}
         data |= {} if self.step is None else {"step": self.step}
         reply = self._ask(data, len(times))

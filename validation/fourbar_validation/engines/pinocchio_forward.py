@@ -12,7 +12,7 @@ from fourbar.effects import Gravity
 from fourbar.errors import LimitError
 from fourbar.mjcf import Settings, choose_run, size_flywheel
 from fourbar.scene import Command, Scene, command
-from fourbar_validation.compare.answer import Array, Released
+from fourbar_validation.compare.answer import Array, ReleasedAnswer
 from fourbar_validation.engines.loaded import make_no_wrenches
 from fourbar_validation.engines.loop import Assembler, LimitDetector, Trial, make_blank, split_answer
 from fourbar_validation.engines.pinocchio import PinocchioTree
@@ -149,16 +149,16 @@ class PinocchioReleased:
     def __init__(self, step: float = 2e-3) -> None:
         self.step = step
 
-    def release(self, scene: Scene, times: Array) -> Released:
+    def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Integrate the motion at the given times, rising from 0 (s)."""
         setting = f"RK4 {self.step:g} s"
         if scene.loads or any(not isinstance(effect, Gravity) for effect in scene.effects):
-            return Released.refused(NAME, setting, "in forward dynamics only gravity has a model here")
+            return ReleasedAnswer.refused(NAME, setting, "in forward dynamics only gravity has a model here")
         tree, start, none = PinocchioTree(scene), command(scene), np.zeros(3)
         loop, detector = ClosedTree(tree, TIME_CONSTANT_STEPS * self.step), LimitDetector(int(start.branch[0]))
         state = loop.start(float(start.theta_2[0]), int(start.branch[0]), scene.motion.omega_2 or 0.0)
         if state is None:
-            return Released.refused(NAME, setting, "the loop does not close at the start")
+            return ReleasedAnswer.refused(NAME, setting, "the loop does not close at the start")
         (q, v), rows, now = state, [], 0.0
         for t in times:
             steps = math.ceil((t - now) / self.step - 1e-6)
@@ -169,4 +169,4 @@ class PinocchioReleased:
             energy, data = pin.computeMechanicalEnergy(tree.model, tree.data, q, v), tree.data
             rows.append((q[0], v[0], energy, data.kinetic_energy + abs(data.potential_energy)))
         theta_2, omega, energy, terms = np.array(rows).T
-        return Released(NAME, setting, theta_2, omega, energy, terms, detector.stopped_at)
+        return ReleasedAnswer(NAME, setting, theta_2, omega, energy, terms, detector.stopped_at)

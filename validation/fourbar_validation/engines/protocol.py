@@ -21,7 +21,7 @@ from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import OF_STROKE, Free, Motion
 from fourbar.scene.motion_law import COMMANDS
-from fourbar_validation.compare.answer import Answer, Array, Released, WitnessError
+from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer, WitnessError
 from fourbar_validation.compare.rows import write_one_line
 
 PROTOCOL = 1
@@ -380,7 +380,7 @@ def release_from_json(scene: Scene, command: Any, times: Any) -> Scene:
     return replace(scene, motion=Motion(theta, omega, 0.0, branch, command.get("through", "sign"), free))
 
 
-def released_to_json(released: Released) -> dict[str, Any]:
+def released_to_json(released: ReleasedAnswer) -> dict[str, Any]:
     """Write a released motion as an engine integrated it."""
     if released.refusal is not None:
         return {"refusal": released.refusal, "setting": released.setting}
@@ -388,15 +388,15 @@ def released_to_json(released: Released) -> dict[str, Any]:
     return {"answers": answers, "setting": released.setting, "stopped_at": released.stopped_at}
 
 
-def released_from_json(engine: str, n: int, data: Any) -> Released:
+def released_from_json(engine: str, n: int, data: Any) -> ReleasedAnswer:
     """Read and check a released motion at n times, as `answer_from_json` does."""
     data = _read_reply(data)
     setting = _read_text("setting", data.get("setting", "exact"))
     if "refusal" in data:
-        return Released.refused(engine, setting, _read_reason(data["refusal"]))
+        return ReleasedAnswer.refused(engine, setting, _read_reason(data["refusal"]))
     answers = dict(_read_object("answers", data))
     theta, omega, energy, terms = (_read_values("answers", name, answers.get(name), n) for name in OF_RELEASED)
     stopped_at = data.get("stopped_at")
     if stopped_at is not None:
         stopped_at = _read_seconds("stopped_at", stopped_at)
-    return Released(engine, setting, theta, omega, energy, terms, stopped_at)
+    return ReleasedAnswer(engine, setting, theta, omega, energy, terms, stopped_at)

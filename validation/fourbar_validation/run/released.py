@@ -19,7 +19,7 @@ from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
-from fourbar_validation.compare.answer import Array, Released
+from fourbar_validation.compare.answer import Array, ReleasedAnswer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, FORMULAS, REFUSES, UNDECIDED, Row
 from fourbar_validation.compare.scales import make_reference
@@ -121,7 +121,7 @@ def check_released(question: Question) -> Iterator[Row]:
         phi, rate = pendulum.motion(times)
         truth = _Truth(phi + math.pi / 2, rate)
         none = np.zeros(len(solution))
-        ours = Released("formulas", "exact", solution.theta_2, solution.omega_2, none, none)
+        ours = ReleasedAnswer("formulas", "exact", solution.theta_2, solution.omega_2, none, none)
         yield from _make_rows(question, ours, None, truth)
 
     def rows(engine: Callable[[float], Any], longest: float) -> list[Row]:
@@ -235,7 +235,7 @@ class _Truth(NamedTuple):
     stopped_at: float | None = None
 
 
-def _make_rows(question: Question, fine: Released, coarse: Released | None, truth: _Truth) -> list[Row]:
+def _make_rows(question: Question, fine: ReleasedAnswer, coarse: ReleasedAnswer | None, truth: _Truth) -> list[Row]:
     free, through, n = question.scene.motion.free, question.scene.motion.through, len(truth.theta_2)
     assert free is not None
     who = (question.name, fine.engine, fine.setting)
@@ -244,7 +244,7 @@ def _make_rows(question: Question, fine: Released, coarse: Released | None, trut
     if len(fine.theta_2) < n:
         return [Row.unmeasured(*who, "all", FAILS, f"it stopped after {len(fine.theta_2)} of {n} instants")]
 
-    def numbers(of: Released) -> dict[str, Array]:
+    def numbers(of: ReleasedAnswer) -> dict[str, Array]:
         result = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
         if coarse is not None:  # the formulas integrate the energy equation itself; their drift is part of their test
             result["energy"] = of.energy[:n] - of.energy[0]

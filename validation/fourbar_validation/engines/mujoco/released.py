@@ -9,7 +9,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.scene import Scene, command
-from fourbar_validation.compare.answer import Array, Released
+from fourbar_validation.compare.answer import Array, ReleasedAnswer
 from fourbar_validation.engines.loop import Assembler, LimitDetector
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import Stepper
@@ -29,7 +29,7 @@ class MujocoForward:
     def __init__(self, step: float = 1e-3) -> None:
         self.step = step
 
-    def release(self, scene: Scene, times: Array) -> Released:
+    def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Integrate the motion at the given times, rising from 0 (s)."""
         setting, start = f"RK4 {self.step:g} s", command(scene)
         interval = float(times[1] - times[0])  # the times are evenly spaced; the step divides the interval
@@ -39,10 +39,10 @@ class MujocoForward:
         try:
             loop = ClosedLoop(write_mjcf(bare, settings, keyframe=False))
         except InputError as error:
-            return Released.refused(NAME, setting, str(error))
+            return ReleasedAnswer.refused(NAME, setting, str(error))
         q_0 = Assembler(loop).find(float(start.theta_2[0]), int(start.branch[0]))
         if q_0 is None:
-            return Released.refused(NAME, setting, "the loop does not close at the start")
+            return ReleasedAnswer.refused(NAME, setting, "the loop does not close at the start")
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
         rows, q, detector = [], loop.data.qpos, LimitDetector(int(start.branch[0]))
@@ -58,7 +58,7 @@ class MujocoForward:
             terms = np.array([*loop.data.energy, -work.done])
             rows.append((loop.data.qpos[O2], loop.data.qvel[O2], terms.sum(), np.abs(terms).sum()))
         theta_2, omega, energy, terms = np.array(rows).T
-        return Released(NAME, setting, theta_2, omega, energy, terms, detector.stopped_at)
+        return ReleasedAnswer(NAME, setting, theta_2, omega, energy, terms, detector.stopped_at)
 
 
 class _Work:

@@ -1,0 +1,325 @@
+"""Positions of a case evaluated stage by stage: kinematics, forces, error bars, and what has no value.
+
+The error bars are what the forces differ by from the same formulas in longer numbers. What is stated of the bars,
+loads, effects and of the command is exact, as doubles; everything else is computed again, with numbers whose own
+roundings are a thousandth of those of doubles or less.
+"""
+
+import cmath
+from collections.abc import Callable, KeysView, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.evaluation.case import NOWHERE, Case, Dynamics, Evaluated
+from fourbar.formulas.arithmetic import angle, is_any, select
+from fourbar.formulas.longer import lengthen, shorten
+from fourbar.formulas.motion import State
+from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.formulas.position import HalfAngle, Position
+from fourbar.quantities import (
+    ANGLES,
+    JAMMED,
+    NO_DIRECTION,
+    NO_LEVER,
+    NO_TORQUE,
+    NOT_ASSEMBLED,
+    OF_LINE,
+    OK,
+    OVERFLOW,
+    SEVERAL,
+    SINGULAR,
+    STAGE_OF,
+    STAGES,
+    WOUND,
+)
+from fourbar.scene import Command
+from fourbar.scene.point import OF_POINTS
+
+FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
+WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
+"""Statuses of positions at which an effect or the drive has no value, and so the forces have none."""
+LAST_ROUNDING = 2.0**-53
+"""Relative: half the distance to the next double, or more; the result itself was rounded by as much."""
+
+
+def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) -> Evaluated:
+    """Evaluate a command, up to the last stage that the quantities named need.
+
+    `command`: positions (n,), or one in plain numbers. Of a released motion the independent angle decides, and the
+    drive does nothing.
+    """
+    free, branch = command.independent, find_sign(command.branch)
+    q: Any = command.angle
+    speed, acceleration = command.speed, command.acceleration
+    if free is not None:
+        q, speed, acceleration, branch = free.angle, free.speed, free.acceleration, free.sign
+    elif q.ndim == 0:
+        q = q.item()  # with Python's own numbers a formula takes half the time
+    speed = 0.0 if speed is None else speed
+    half, exact = case.half_angle(q, command.remainder) if free is None else (case.path.half_angle(q), NOWHERE)
+    of_angles = command.bar == 2 and len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
+    if of_angles and free is None and command.remainder is None and not case.path.may_stay_parallel:
+        return _evaluate_angles(case, half, branch, names)
+    at = case.path.position(q, half, branch)
+    codes = _compute_codes(at.sin_mu, half, command) if free is None else np.zeros(q.shape, dtype=np.uint8)
+    if is_any(codes):  # velocities are 0/0
+        at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
+    state = case.state(q, at, branch, speed, acceleration, moving=wanted > 0)
+    if free is not None:
+        state = state._replace(theta_2=command.angle)
+    values = list_kinematics(case, state, names)
+    if command.bar != 2 or command.lever is not None:
+        commanded = name_of_command(case, at, state, q) | _list_commanded(command, values, abs(at.sin_mu))
+        values |= {name: value for name, value in commanded.items() if name in names}
+    if wanted >= FORCE:
+        dynamics = case.dynamics(state, acceleration, case.side)
+        counted = command.branch if free is None else None
+        bars = {}
+        if wanted == ERROR:
+            bars = compute_error_bars(case, command, state, acceleration, branch, dynamics, exact)
+        codes, forces = _list_forces(case, state, acceleration, counted, codes, names, dynamics, bars)
+        if free is not None:
+            forces |= {name: np.zeros(codes.shape) for name in (*case.names, "power")}
+        values |= {name: value for name, value in forces.items() if name in names}
+    return codes, values, state.at
+
+
+def name_of_command(case: Case, at: Position, state: State, q: Any) -> dict[str, Any]:
+    """Quantities that a command of bar 3 or 4 has in the place of others: its angle as commanded, theta_2, its sine.
+
+    `at`: in the order in which the path reads the loop.
+    """
+    if case.path.bar == 2:
+        return {}
+    return {f"theta_{case.path.bar}": q, "theta_2": state.theta_2, "condition": abs(at.sin_mu)}
+
+
+def _list_commanded(command: Command, values: dict[str, Any], sine: Any) -> dict[str, Any]:
+    """List the stroke and its speed as commanded, wherever they have a value, and the condition of their command."""
+    given = {"stroke": command.stroke, "stroke_speed": command.stroke_speed}
+    stated = {name: own + 0.0 * values[name] for name, own in given.items() if own is not None and name in values}
+    return stated if command.lever is None else {**stated, "condition": sine * command.lever}
+
+
+def _compute_codes(sine: Any, half: HalfAngle, command: Command | None, unit: float = 1.0) -> Any:
+    """Compute statuses of positions from the sine of the transmission angle, or a multiple of it by `unit`."""
+    size, margin = abs(sine), NO_DIGIT_LEFT * unit
+    if command is not None and command.remainder is not None:
+        margin = 0.0  # known in many digits
+    elif command is not None and command.lever is not None:
+        size = np.where(np.isnan(size), size, np.minimum(size, command.lever))
+    if type(size) is float and size > margin:
+        return OK
+    codes = np.zeros(np.shape(sine), dtype=np.uint8)
+    if not np.min(size, initial=np.inf) > margin:  # NaN where the loop does not close
+        codes[size <= margin] = SINGULAR
+        codes[np.isnan(sine)] = NOT_ASSEMBLED
+        codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
+    return codes
+
+
+def find_sign(branch: NDArray[np.int8]) -> Any:
+    """Return the branch of each position, or one number where all have the same."""
+    if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
+        return float(branch.flat[0]) if branch.ndim else float(branch)
+    return branch
+
+
+def _evaluate_angles(case: Case, half: HalfAngle, branch: Any, names: KeysView[str]) -> Evaluated:
+    """Evaluate the two angles only: without vectors and the rest of the triangle."""
+    theta_3, theta_4, root = case.path.angles(half, branch)
+    codes = _compute_codes(root, half, None, 2.0 * case.path.lengths.b * case.path.lengths.c)
+    found = {"theta_3": theta_3, "theta_4": theta_4}
+    return codes, {name: found[name] for name in names}, None
+
+
+def _list_forces(
+    case: Case,
+    state: State,
+    acceleration: Any,
+    branch: NDArray[np.int8] | None,
+    codes: Any,
+    names: KeysView[str],
+    found: Dynamics,
+    bars: dict[str, Any],
+) -> tuple[Any, dict[str, Any]]:
+    """List the quantities of the force stage, error bars among them, with the statuses of the effects.
+
+    `branch`: of each position; None where no effect counts turns by it.
+    """
+    own = case.names
+    values: dict[str, Any] = {**found.pins._asdict(), own.value: found.drive, **bars}
+    if "power" in names:
+        values["power"] = found.drive * case.drive_speed(state)
+    if "drive_condition" in names:
+        condition = case.drive_condition(state)
+        values["drive_condition"] = condition if found.from_jamming is None else condition * found.from_jamming
+    if "friction_residual" in names:
+        values["friction_residual"] = 0.0 if found.residual is None else found.residual
+    if own.low in names or own.high in names:
+        *ends, held = case.drive_interval(state, acceleration, found.drive)
+        values |= zip(own[2:], ends, strict=True)
+        if held is not None and found.status is not None:
+            found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
+    without: list[Any] = [status for term in case.terms if (status := term.status(state, branch)) is not None]
+    if found.status is not None:
+        without.append(found.status)
+    if case.drive is not None and (status := case.drive.status(state, case.sines(state.at))) is not None:
+        without.append(status)
+    if without:
+        codes = np.where(codes == OK, np.max(without, axis=0), codes).astype(np.uint8)
+    if is_any(codes > SINGULAR):
+        gone = np.isin(codes, WITHOUT_FORCES)
+        values |= {
+            name: np.where(gone, make_no_value(value), value)
+            for name, value in values.items()
+            if name != "drive_condition"
+        }
+    return codes, values
+
+
+def compute_error_bars(
+    case: Case,
+    command: Command,
+    state: State,
+    acceleration: Any,
+    sign: Any,
+    found: Dynamics,
+    exact: NDArray[np.intp],
+) -> dict[str, Any]:
+    """Compute that of the drive (N m or N) and `force_error` (N, worst of the four pin forces), by name, each (n,).
+
+    Parameters
+    ----------
+    state, acceleration, sign, found : the evaluation that the error bars are for; the sign is that of the path's root.
+    exact : indices of the positions whose half angle is known in many digits.
+    """
+    longer, angle = case.lengthened(), state.theta_2 if state.q is None else state.q
+    lost, remainder = command.lost, command.remainder
+    if lost is None:
+        lost = np.array([0.0 if remainder is None else float(remainder), 0.0, 0.0])
+    given = enumerate((angle, state.speed, acceleration))
+    q, speed, growth = (lengthen(number) + lost[..., place] for place, number in given)
+    half = longer.path.half_angle(q)
+    if exact.size:
+        from fourbar.formulas.many_digits import decide_half_angles
+
+        left_out = 0.0 if remainder is not None else lost[..., 0]
+        half = decide_half_angles(case.linkage, case.path.unit, half, exact, angle, remainder, case.path.bar, left_out)
+    position = longer.path.position(q, half, sign)
+    near = longer.state(q, position, sign, speed, growth)
+    other = longer.dynamics(near, growth, case.side)
+    pairs = zip((*found.pins, found.drive), (*other.pins, other.drive), strict=True)
+    *gaps, drive_gap = (np.abs(shorten(after - before)) for before, after in pairs)
+    drive_error = compute_bar(drive_gap, np.abs(found.drive))
+    force_error = compute_bar(_find_largest(gaps), _find_largest([np.abs(pin) for pin in found.pins]))
+    return {case.names.error: drive_error, "force_error": force_error}
+
+
+def _find_largest(sizes: list[Any]) -> Any:
+    """Find the largest of several numbers, or arrays that broadcast, NaN where one is."""
+    return np.maximum(np.maximum(sizes[0], sizes[1]), np.maximum(sizes[2], sizes[3]))
+
+
+def compute_bar(gap: Any, size: Any) -> Any:
+    """Compute the error bar from the distance to the longer number and the size of the value.
+
+    Where there is no longer number, or none in the range of a double, no digit of the value itself is left.
+    """
+    width = np.maximum(gap, LAST_ROUNDING * size)
+    return select(np.isfinite(width), width, size)
+
+
+def is_finite(values: Mapping[str, Any]) -> bool:
+    """Whether every entry is a number, from their squares; False also where a square leaves the range of doubles."""
+    squares = (np.vdot(value, value) if isinstance(value, np.ndarray) else value for value in values.values())
+    return all(cmath.isfinite(square) for square in squares)
+
+
+def withhold_in_place(case: Case, found: Evaluated) -> None:
+    """Write `withhold` in place wherever a result is no number."""
+    codes, values, driven = found
+    if not is_finite(values):
+        in_line: Any = False
+        if driven is not None and case.drive is None:
+            in_line = np.abs(case.path.drive_sine(driven, case.drive_bar)) <= NO_DIGIT_LEFT
+        withhold(values, codes, np.broadcast_to(in_line, codes.shape))
+
+
+def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:
+    """Where a quantity is no number and the status promises one: the status that says so, and NaN from that stage on.
+
+    `code`: status of each position, changed in place. `in_line`: where the two bars that are not driven are in line:
+    there no forces hold them in balance.
+    """
+    gone = np.zeros(code.shape, dtype=bool)
+    for stage in STAGES:
+        names = [name for name in values if STAGE_OF.get(name, OF_POINTS.get(name[:2], "position")) == stage]
+        of_forces = stage in STAGES[3:]
+        promised = np.isin(code, (OK, SEVERAL)) if of_forces else ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
+        found = np.zeros_like(gone)
+        for name in names:
+            found |= ~np.isfinite(values[name])
+            values[name] = np.where(np.isfinite(values[name]), values[name], make_no_value(values[name]))
+        found &= promised & ~gone
+        code[found] = OVERFLOW
+        if of_forces:
+            code[found & in_line] = NO_TORQUE
+        gone |= found
+        for name in names:
+            if name != "drive_condition":
+                values[name] = np.where(gone, make_no_value(values[name]), values[name])
+
+
+def make_no_value(quantity: Any) -> complex:
+    """NaN; of a vector in both components."""
+    return complex(np.nan, np.nan) if np.iscomplexobj(quantity) else np.nan
+
+
+OF_BARS: dict[str, Callable[[State], Any]] = {
+    "theta_3": lambda state: angle(state.at.u3),
+    "theta_4": lambda state: angle(state.at.u4),
+    "sin_mu": lambda state: state.at.sin_mu,
+    "condition": lambda state: abs(state.at.sin_mu),
+    "omega_2": lambda state: state.moving.omega_2,
+    "omega_3": lambda state: state.moving.omega_3,
+    "omega_4": lambda state: state.moving.omega_4,
+    "alpha_2": lambda state: state.moving.alpha_2,
+    "alpha_3": lambda state: state.moving.alpha_3,
+    "alpha_4": lambda state: state.moving.alpha_4,
+}
+"""The scalars before the forces."""
+PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G2", "G3", "G4"))
+"""The vectors before the forces, of the linkage's own points."""
+
+
+def list_kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
+    """Those of the quantities that come before the forces, a scene's own points among them."""
+    values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
+    if case.drive is not None and not wanted.isdisjoint(OF_LINE):
+        stroke, unit = case.drive.line(state)
+        own = {"stroke": stroke, "drive_line": unit, "stroke_speed": case.drive_speed(state)}
+        values |= {name: value for name, value in own.items() if name in wanted}
+    if not case.points and wanted.isdisjoint(PLACES):
+        return values
+    lengths, (two, three, four) = case.lengths, case.bodies
+    places: dict[int, list[tuple[str, Any]]] = {
+        2: [("A", lengths.a), ("G2", two.z)],
+        3: [("G3", three.z)],
+        4: [("B", lengths.c), ("G4", four.z)],
+    }
+    for name, bar, z in case.points:
+        places.setdefault(bar, []).append((name, z))
+    for bar, of_bar in places.items():
+        frame = state.frame(bar)
+        for name, z in of_bar:
+            r = z * frame.u
+            if name in wanted:
+                values[name] = frame.pin + r
+            if (velocity := f"v_{name}") in wanted:
+                values[velocity] = frame.velocity(r)
+            if (acceleration := f"a_{name}") in wanted:
+                values[acceleration] = frame.acceleration(r)
+    return values
