@@ -126,8 +126,7 @@ def _check_sums(question: Question) -> Iterator[Row]:
     for number in MOVING_BARS:
         bar = scene.linkage.bar(number)
         force_on, couple = acting.on(number)
-        # what the ground pulls at bars 2 and 4 goes through their pins; between moving bars it cancels
-        resultant = np.broadcast_to(force_on + actions.through.get({2: "O2", 4: "O4"}.get(number, ""), 0.0), n)
+        resultant = np.broadcast_to(force_on, n)
         load = np.stack([resultant.real, resultant.imag], axis=1)
         centre, acceleration = getattr(solution, f"G{number}"), getattr(solution, f"a_G{number}")
         alpha = getattr(solution, f"alpha_{number}")
