@@ -10,7 +10,6 @@ from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import dot, is_any, namespace, polar, select, sine_of, vector
-from fourbar.formulas.longer import Pair
 from fourbar.formulas.motion import State
 from fourbar.linkage import (
     AT_LEAST_ZERO,
@@ -56,7 +55,7 @@ class SpringEnd(NamedTuple):
     def in_bar(self) -> Any:
         """In the bar's frame, along + i across its line, m; an array, whose products all round alike."""
         point = polar(self.distance, self.angle)
-        return point if isinstance(point, Pair) else np.asarray(point)
+        return np.asarray(point) if isinstance(point, complex) else point
 
     def of(self, state: State) -> Any:
         """In the bar's frame, in the numbers of a state's library."""
