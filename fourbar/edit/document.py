@@ -12,12 +12,17 @@ from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
 
 from fourbar.effects import list_kinds
 from fourbar.errors import InputError
+from fourbar.files.scene_file import THROUGH
 from fourbar.files.scene_text import BRANCHES
 from fourbar.linkage import PINS
 from fourbar.scene.motion_law import ENDS
+from fourbar.scene.stroke import SIDES
 
 Path = Sequence[str | int]
-WORDS = {"branch": [*BRANCHES], "through": ["sign", "follow"], "frame": ["world", "bar"], "ends": [*ENDS]}
+WORDS = {
+    **{"branch": [*BRANCHES], "through": [*THROUGH], "side": [*SIDES], "ends": [*ENDS]},
+    "frame": ["world", "bar"],
+}
 """Entries that are one of a few words."""
 LONGEST_TEXT = 10_000
 """Characters of one entry."""
@@ -45,6 +50,10 @@ class SceneDocument:
             self.tree = tomlkit.parse(text)
         except (TOMLKitError, RecursionError) as error:
             raise InputError("TOML", text[:60], f"cannot be read: {error}") from None
+
+    def become(self, text: str) -> None:
+        """Hold another file."""
+        self.tree = SceneDocument(text).tree
 
     def text(self) -> str:
         """Write the file."""

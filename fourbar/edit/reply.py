@@ -30,7 +30,11 @@ def evaluate_scene(scene: Scene, plain: dict[str, Any], units: Conversion, *, se
     own = solve(scene, stage)
     if not own.assembled.any():
         raise NotAssembledError("motion.theta_2: the linkage assembles at none of the positions requested")
-    data = collect_live_data(scene, units, stage=stage) | {"tolerances": None, "pictures": {}, "toml": None}
+    data = collect_live_data(scene, units, stage=stage, midway=True) | {
+        "tolerances": None,
+        "pictures": {},
+        "toml": None,
+    }
     data["handles"] = [handle.drawn() for handle in list_handles(scene, plain)]
     if settled:
         data["summary"] = write_summary(scene, own, units)

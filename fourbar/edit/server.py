@@ -140,10 +140,10 @@ class Workbench:
 
     async def _settle(self) -> None:
         """Send error bars and summary, unless something has changed again; changes are answered meanwhile."""
-        state, units = self.session.now, self.session.units
+        state, units, names = self.session.now, self.session.units, self.session.unit_names
 
         def is_present() -> bool:
-            return state is self.session.now and units is self.session.units
+            return state is self.session.now and names == self.session.unit_names
 
         def evaluate() -> dict[str, Any] | None:
             return evaluate_scene(state.scene, state.plain, units, settled=True) if is_present() else None

@@ -1,16 +1,22 @@
 """One scene that is being changed: its text, its history, and what is kept of it next to the file."""
 
+import cmath
 import hashlib
 import json
+import math
 import os
 import secrets
 import tomllib
 from collections.abc import Callable
+from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from fourbar.edit.document import SceneDocument, list_offers
-from fourbar.edit.dragging import Dragged, drag
+from fourbar.edit.dragging import Dragged, drag, find_unit, write_rounded
 from fourbar.edit.exports import Exports
 from fourbar.edit.reply import evaluate_scene
 from fourbar.errors import FourBarError, InputError
@@ -18,10 +24,16 @@ from fourbar.files import loads, read_text
 from fourbar.files.new import write_new_scene
 from fourbar.files.reading import read_bytes
 from fourbar.files.scene_file import LARGEST_FILE
+from fourbar.files.scene_text import BRANCHES
+from fourbar.linkage import BAR_NAMES
+from fourbar.quantities.units import to_si
 from fourbar.scene import Scene
-from fourbar.scene.motion import require_steps
+from fourbar.scene.motion import OF_STROKE, require_steps
+from fourbar.scene.motion_law import COMMANDS
+from fourbar.scene.stroke import SIDES
 from fourbar.show.units import units
 from fourbar.solution import Conversion
+from fourbar.solve import solve
 from fourbar.studies.keys import list_entries, read_place
 from fourbar.writing import write_bytes
 
@@ -39,6 +51,19 @@ LARGEST_STATE = 100_000_000
 """Bytes of a state file."""
 NEW = ("300 mm", "100 mm", "250 mm", "220 mm")
 """Ground, input, coupler and output of a new scene."""
+AS_THE_FILE = "as the file"
+"""Units of results that follow those of lengths.ground."""
+UNITS = (
+    AS_THE_FILE,
+    "SI",
+    "imperial",
+    "mm N N.mm deg",
+    "mm N N.m deg rpm",
+    "cm N N.cm deg rpm",
+    "in lbf lbf.ft deg rpm",
+)
+"""Units of results to choose from; any other list can be typed."""
+FEET_AND_INCHES = ("in", "inch", "inches", "ft", "foot", "feet")
 
 
 class SceneState(NamedTuple):
@@ -56,7 +81,7 @@ class Session:
         self.path, self.exports = Path(os.path.realpath(path)), Exports(exports, path.stem)
         self.state_file = self.path.with_name(self.path.name + ENDING)
         self.token = secrets.token_urlsafe(32)  # of this process alone
-        self.unit_names, self.units = "SI", units("SI")
+        self.unit_names = AS_THE_FILE
         text = read_text(self.path) if self.path.exists() else write_new_scene(NEW)
         self.disk = self._read_disk()
         self.texts, self.place, self.kept = [text], 0, {"start": text}
@@ -64,7 +89,7 @@ class Session:
         if self.state_file.exists():
             self._resume()
         else:
-            self.now = self._read(text)
+            self.now = self.read(text)
         self.document = SceneDocument(self.now.text)
         self.base = self.now
 
@@ -78,10 +103,11 @@ class Session:
             self.texts, self.place = [str(text) for text in state["texts"]], int(state["place"])
             self.kept = {str(name): str(text) for name, text in state["kept"].items()}
             self.reference, self.unit_names, self.disk = str(state["reference"]), str(state["units"]), state["disk"]
-            self.units = units(self.unit_names)
+            if self.unit_names != AS_THE_FILE:
+                _read_units(self.unit_names)
             if self.place < 0 or self.reference not in self.kept:
                 raise ValueError("it names a state that it does not hold")
-            self.now = self._read(self.texts[self.place])
+            self.now = self.read(self.texts[self.place])
         except (
             ValueError,
             LookupError,
@@ -110,6 +136,19 @@ class Session:
             self.keep()
 
     @property
+    def units(self) -> Conversion:
+        """Units of results: as chosen, or those of the file."""
+        if self.unit_names != AS_THE_FILE:
+            return _read_units(self.unit_names)
+        own = find_unit(self.now.plain["lengths"]["ground"], "m")
+        return _read_units("imperial" if own in FEET_AND_INCHES else "SI")
+
+    @property
+    def fresh(self) -> bool:
+        """Whether nothing has been stated yet: a page begins with an empty drawing."""
+        return self.disk is None and len(self.texts) == 1
+
+    @property
     def saved(self) -> bool:
         """Whether the file on the disk holds the present state."""
         return self._read_disk() == _hash_text(self.now.text.encode())
@@ -117,7 +156,8 @@ class Session:
     def _read_disk(self) -> str | None:
         return _hash_text(read_bytes(self.path, "scene file", LARGEST_FILE)) if self.path.exists() else None
 
-    def _read(self, text: str) -> SceneState:
+    def read(self, text: str) -> SceneState:
+        """Read the text of a scene; InputError where the workbench takes none such."""
         if len(text.encode()) > LARGEST_FILE:
             raise InputError("scene file", len(text), f"must not exceed {LARGEST_FILE} bytes")
         scene = loads(text, str(self.path))
@@ -141,6 +181,7 @@ class Session:
             "undo": self.place > 0,
             "redo": self.place + 1 < len(self.texts),
             "reference": self.reference,
+            "changed": self.now.text != self.kept[self.reference],
             "kept": [*self.kept],
             "keys": {key: entry.unit for key, entry in list_entries(self.now.scene).items()},
             **({"saved": self.saved} if settled else {}),
@@ -148,7 +189,7 @@ class Session:
 
     def compared(self) -> dict[str, Any]:
         """Describe the state that the present one is held against."""
-        kept = self._read(self.kept[self.reference])
+        kept = self.read(self.kept[self.reference])
         return {"compared": self.reference, "data": evaluate_scene(kept.scene, kept.plain, self.units)}
 
     def do(self, asked: dict[str, Any]) -> dict[str, Any]:
@@ -174,7 +215,7 @@ class Session:
         if not goes_on:
             self.base = self.now
         alter(self.document)
-        self._step_through_history(self._read(self.document.text()), goes_on)
+        self._step_through_history(self.read(self.document.text()), goes_on)
         self.gesture = gesture
 
     def _step_through_history(self, now: SceneState, goes_on: bool) -> None:
@@ -186,6 +227,9 @@ class Session:
         while len(self.texts) > MOST_STATES or sum(map(len, self.texts)) > MOST_CHARACTERS:
             self.texts, self.place = self.texts[1:], self.place - 1
         self.now = now
+
+
+_read_units = cache(units)
 
 
 def _hash_text(data: bytes) -> str:
@@ -219,7 +263,7 @@ def _drag(session: Session, asked: dict[str, Any]) -> None:
 
 
 def _write_text(session: Session, asked: dict[str, Any]) -> None:
-    now = session._read(str(asked["text"]))
+    now = session.read(str(asked["text"]))
     session._step_through_history(now, False)
     session.document, session.gesture = SceneDocument(now.text), ""
 
@@ -228,7 +272,7 @@ def _move(session: Session, by: int) -> None:
     place = session.place + by
     if not 0 <= place < len(session.texts):
         raise InputError("history", place, "there is nothing more to undo or redo")
-    session.now, session.place, session.gesture = session._read(session.texts[place]), place, ""
+    session.now, session.place, session.gesture = session.read(session.texts[place]), place, ""
     session.document = SceneDocument(session.now.text)
 
 
@@ -247,10 +291,90 @@ def _refer(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"refer": True}
 
 
-def _list_units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    found: Conversion = units(str(asked["units"]))
-    session.unit_names, session.units = str(asked["units"]), found
+def _choose_units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
+    name = str(asked["units"])
+    if name != AS_THE_FILE:
+        _read_units(name)
+    session.unit_names = name
     return {"refer": True}
+
+
+def _command(session: Session, asked: dict[str, Any]) -> None:
+    """Command another bar, or the cylinder, over what the present motion covers of it without turning back."""
+    place = str(asked["command"])
+    names = {**{names[0]: names for names in COMMANDS.values()}, OF_STROKE[0]: OF_STROKE}
+    if place not in names:
+        raise InputError("command", place, "must be one of " + ", ".join(names))
+    scene, document = session.now.scene, SceneDocument(session.now.text)
+    before = solve(scene, "force" if scene.motion.speed is not None else "position")
+    values = getattr(before, place)
+    if values is None:
+        raise InputError("command", place, "needs a cylinder: add one in place of the bar first")
+    first, last = _find_monotone(values)
+    if last == first:
+        raise InputError("command", place, "needs a motion that moves it")
+    middle = (first + last) // 2
+    inset = 1e-3 * (values[last] - values[first])  # so that rounding leads to no position beyond
+    ground = find_unit(session.now.plain["lengths"]["ground"], "m")
+    unit, si = (ground, "m") if place == "stroke" else ("deg", "rad")
+    factor = to_si(f"1 {si}", unit)
+    ends = [write_rounded(factor * x, abs(factor * inset), unit) for x in (values[first] + inset, values[last] - inset)]
+    rate = getattr(before, names[place][1], None)
+    speed = 0.1 * abs(values[last] - values[first]) if rate is None else float(rate[middle])
+    for name in {*(one for row in names.values() for one in row), "side", "free", "law"} & session.now.plain[
+        "motion"
+    ].keys():
+        document.remove(["motion", name])
+    document.put(["motion", place], {"from": ends[0], "to": ends[1], "steps": max(60, min(last - first, 360))})
+    if scene.motion.speed is not None:
+        document.put(
+            ["motion", names[place][1]], write_rounded(factor * speed, abs(factor * speed) / 100.0, f"{unit}/s")
+        )
+    tried: list[tuple[float, str]] = []
+    for branch, side in product(BRANCHES, SIDES if place == "stroke" else [""]):
+        document.put(["motion", "branch"], branch)
+        if side:
+            document.put(["motion", "side"], side)
+        after = solve(session.read(document.text()).scene, "position")
+        pose = np.array([after.theta_2, after.theta_3, after.theta_4])[:, len(after) // 2]
+        wanted = np.array([before.theta_2, before.theta_3, before.theta_4])[:, middle]
+        tried.append(
+            (float(np.nan_to_num(np.abs(np.exp(1j * pose) - np.exp(1j * wanted)).sum(), nan=np.inf)), document.text())
+        )
+    text = min(tried)[1]
+    session.change(lambda of: of.become(text))
+
+
+def _find_monotone(values: Any) -> tuple[int, int]:
+    """Return the ends of the longest run in which numbers exist and rise, or fall, throughout."""
+    signs = np.nan_to_num(np.sign(np.diff(values)))
+    best = (0, 0)
+    start = 0
+    for n in range(1, len(signs) + 1):
+        if n == len(signs) or signs[n] != signs[start]:
+            if signs[start] and n - start > best[1] - best[0]:
+                best = (start, n)
+            start = n
+    return best
+
+
+def _draw(session: Session, asked: dict[str, Any]) -> None:
+    """State the lengths, the angle of the ground and the branch of four pins in the plane, given in a unit."""
+    O2, A, B, O4 = (complex(*map(float, pin)) for pin in asked["pins"])
+    unit, grain = str(asked["unit"]), float(asked["grain"])
+    bars = dict(zip(BAR_NAMES.values(), (O4 - O2, A - O2, B - A, B - O4), strict=True))
+    lengths = [write_rounded(abs(bar), grain, unit) for bar in bars.values()]
+    text = write_new_scene(lengths) if session.fresh else session.now.text
+
+    def alter(document: SceneDocument) -> None:
+        document.become(text)
+        for name, length in zip(bars, lengths, strict=True):
+            document.put(["lengths", name], length)
+        angle = write_rounded(math.degrees(cmath.phase(O4 - O2)), math.degrees(grain / max(abs(O4 - O2), grain)), "deg")
+        document.put(["lengths", "ground_angle"], angle)
+        document.put(["motion", "branch"], "open" if ((B - A).conjugate() * (B - O4)).imag >= 0.0 else "crossed")
+
+    session.change(alter)
 
 
 def _save(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
@@ -275,7 +399,9 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
     "redo": lambda session, asked: _move(session, 1),
     "keep": _keep,
     "refer": _refer,
-    "units": _list_units,
+    "units": _choose_units,
+    "command": _command,
+    "draw": _draw,
     "save": _save,
     "export": lambda session, asked: {
         "note": f"wrote {session.exports.write(session.now.scene, str(asked['format']), session.units)}"
@@ -283,6 +409,11 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
     "bodies": lambda session, asked: {
         "bodies": session.exports.free_bodies(session.now.scene, float(asked["position"]), session.units)
     },
-    "hello": lambda session, asked: {"offers": list_offers(), "file": session.path.name, "refer": True},
+    "hello": lambda session, asked: {
+        "offers": list_offers() | {"units": UNITS},
+        "file": session.path.name,
+        "fresh": session.fresh,
+        "refer": True,
+    },
 }
 """What a page can ask for."""

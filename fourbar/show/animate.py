@@ -94,7 +94,9 @@ def write_page(
         panel=asset("edit.html") if live else "",
         results=asset("bench.html") if live else "",
         data=embed_json(
-            collect_page_data(replace(scene, tolerances=()) if live else scene, pictures or {}, units)
+            collect_page_data(
+                replace(scene, tolerances=()) if live else scene, pictures or {}, units, midway=bool(live)
+            )
             | {"vectors": vectors, "live": live}
         ),
     )

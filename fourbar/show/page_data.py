@@ -42,9 +42,14 @@ SCALARS = (
 )
 
 
-def collect_page_data(scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI) -> dict[str, Any]:
-    """Everything the page's script needs: SI units, radians, null where there is no value."""
-    data = collect_live_data(scene, units, signs=(1, -1))
+def collect_page_data(
+    scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI, *, midway: bool = False
+) -> dict[str, Any]:
+    """Collect everything the page's script needs: SI units, radians, null where there is no value.
+
+    `midway`: the page opens in the middle of a motion, not at its beginning.
+    """
+    data = collect_live_data(scene, units, signs=(1, -1), midway=midway)
     for columns in data["branches"].values():
         columns |= {name: null_nan(each) for name, each in columns.items() if isinstance(each, np.ndarray)}
     given = {str(number): picture for number, picture in _encode_pictures(scene, pictures).items()}
@@ -53,7 +58,12 @@ def collect_page_data(scene: Scene, pictures: Mapping[str, str | Path], units: C
 
 
 def collect_live_data(
-    scene: Scene, units: Conversion = SI, *, signs: tuple[int, ...] = (), stage: str | None = None
+    scene: Scene,
+    units: Conversion = SI,
+    *,
+    signs: tuple[int, ...] = (),
+    stage: str | None = None,
+    midway: bool = False,
 ) -> dict[str, Any]:
     """Collect what the page's script draws, columns as arrays, without tolerances, pictures and the file.
 
@@ -68,7 +78,9 @@ def collect_live_data(
     closes = np.isfinite(shown["branches"][str(motion.branch)]["theta_3"])
     if not closes.any():
         raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
-    shown["start"] = int(closes.argmax()) if shown["start"] is None else shown["start"]
+    if shown["start"] is None:
+        rows = np.flatnonzero(closes)
+        shown["start"] = int(rows[len(rows) // 2 if midway else 0])
     factor, unit = choose_unit(max(linkage.lengths), "m", units)
     return {
         "type": classify(linkage).name,

@@ -58,9 +58,10 @@ function captured(name) {
   return { name, over: axis().values, axis: axis().name, values };
 }
 const peakOf = values => values.reduce((most, v) => Math.abs(v) > Math.abs(most) ? v : most, 0);
+let unchanged = false;   // whether the scene is the one it is compared with
 function comparison(name, values) {
   const before = reference?.values[name];
-  if (!before) return "";
+  if (!before || unchanged) return "";
   const [then, now] = [peakOf(before), peakOf(values)].map(Math.abs), label = QUANTITIES.find(q => q[0] === name)[1], cut = label.lastIndexOf(", ");
   const change = then > 0 ? ` (${now < then ? "\u2212" : "+"}${Math.abs(100 * (now / then - 1)).toFixed(Math.abs(now / then - 1) < 0.1 ? 1 : 0)} %)` : "";
   return `peak ${label.slice(0, cut)} ${text(then, 3)} \u2192 ${text(now, 3)} ${label.slice(cut + 2)}${change}, against ${reference.name}`;

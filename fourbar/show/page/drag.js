@@ -36,10 +36,6 @@ function drawHandles() {
 
 function handleOf() {
   const circle = make(parts.handles, "circle", { class: "handle", r: 12, tabindex: 0, role: "button" });
-  const here = event => {
-    const box = picture.getBoundingClientRect();
-    return [(event.clientX - box.left) * view.width / box.width, (event.clientY - box.top) * view.height / box.height];
-  };
   circle.addEventListener("pointerdown", event => {
     event.preventDefault();
     circle.focus();
@@ -48,7 +44,7 @@ function handleOf() {
     holding = { ...circle.given, gesture: `drag:${++drags}` };
     held = true;
   });
-  circle.addEventListener("pointermove", event => { if (holding) dragged(here(event)); });
+  circle.addEventListener("pointermove", event => { if (holding) dragged(placeOf(event)); });
   const end = () => {
     if (!holding) return;
     circle.classList.remove("held");
@@ -75,3 +71,65 @@ function dragged(place) {
   if (holding.foot) asked.stretch = Math.max(0.02, Math.hypot(place[0] - holding.foot[0], place[1] - holding.foot[1]) / arrowLength());
   ask(asked, null, holding.what === "A" ? Math.atan2(to[1], to[0]) : null);
 }
+
+// ---- a linkage drawn by four clicks ----------------------------------------------------------------
+const PINS_IN_TURN = ["O2", "A", "B", "O4"], PURPOSES = { O2: "of the input in the ground", A: "of input and coupler", B: "of coupler and output", O4: "of the output in the ground" };
+const sketched = make(picture, "g", { id: "sketched" });
+const sketchBar = element("div", { id: "sketch-bar", className: "bar", hidden: true },
+  element("p", { id: "next-pin", className: "hint", role: "status" }),
+  element("label", {}, "Width of the drawing", element("input", { id: "sketch-width", value: "500 mm", size: 8, spellcheck: false })),
+  element("button", { type: "button", id: "no-sketch", textContent: "Keep the linkage as it is" }));
+picture.before(sketchBar);
+let sketch = null;   // pins placed so far, and where the next one would be
+function beginSketch() {
+  if (playing) play(false);
+  sketch = { pins: [], here: [0.35 * view.width, 0.6 * view.height] };
+  document.body.classList.add("sketching");
+  sketchBar.hidden = false;
+  picture.focus();
+  drawSketch();
+}
+function endSketch() {
+  sketch = null;
+  document.body.classList.remove("sketching");
+  sketchBar.hidden = true;
+  sketched.replaceChildren();
+}
+function drawSketch() {
+  const next = PINS_IN_TURN[sketch.pins.length];
+  byId("next-pin").textContent = `Click where pin ${next} is, ${PURPOSES[next]}; or move the cross by the arrow keys and press Enter.`;
+  sketched.replaceChildren();
+  for (let x = 0.1; x < 1; x += 0.1) make(sketched, "line", { class: "grid", x1: x * view.width, x2: x * view.width, y1: 0, y2: view.height });
+  for (let y = 0.1 * view.width; y < view.height; y += 0.1 * view.width) make(sketched, "line", { class: "grid", x1: 0, x2: view.width, y1: y, y2: y });
+  const chain = [...sketch.pins, sketch.here];
+  chain.slice(1).forEach((q, n) => make(sketched, "line", { class: `bar b${n + 2}`, x1: chain[n][0], y1: chain[n][1], x2: q[0], y2: q[1] }));
+  sketch.pins.forEach(([x, y], n) => {
+    make(sketched, "circle", { class: "pin", r: 6, cx: x, cy: y });
+    make(sketched, "text", { class: "label", x: x + 16, y: y - 10 }).textContent = PINS_IN_TURN[n];
+  });
+  const [x, y] = sketch.here;
+  make(sketched, "path", { class: "cross", d: `M${x - 9} ${y}H${x + 9}M${x} ${y - 9}V${y + 9}` });
+}
+function putPin() {
+  if (sketch.pins.push([...sketch.here]) < PINS_IN_TURN.length) { drawSketch(); return; }
+  const [, wide, unit] = /^\s*([\d.]+)\s*(.*)$/.exec(byId("sketch-width").value) ?? [null, "500", "mm"], grain = Number(wide) / view.width;
+  const pins = sketch.pins.map(([x, y]) => [x * grain, -y * grain]);
+  endSketch();
+  ask({ do: "draw", pins, unit, grain }, null, Math.atan2(pins[1][1] - pins[0][1], pins[1][0] - pins[0][0]));
+}
+const placeOf = event => {
+  const box = picture.getBoundingClientRect();
+  return [(event.clientX - box.left) * view.width / box.width, (event.clientY - box.top) * view.height / box.height];
+};
+picture.addEventListener("pointermove", event => { if (sketch) { sketch.here = placeOf(event); drawSketch(); } });
+picture.addEventListener("click", event => { if (sketch) { sketch.here = placeOf(event); putPin(); } });
+picture.addEventListener("keydown", event => {
+  if (!sketch || event.target !== picture || event.ctrlKey || event.metaKey) return;
+  const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key], far = event.shiftKey ? 1 : 10;
+  if (way) { sketch.here = sketch.here.map((x, j) => x + far * way[j]); drawSketch(); }
+  else if (event.key === "Enter" || event.key === " ") putPin();
+  else if (event.key === "Escape") endSketch();
+  else return;
+  event.preventDefault(); event.stopPropagation();
+});
+byId("no-sketch").addEventListener("click", endSketch);

@@ -67,7 +67,7 @@ function take(about) {
   if (own) inFlight = null;
   if (about.check) showCheck(about.check);
   if (about.compared) { keptData = about; compareAnew(); }
-  if (about.offers) { offers = about.offers; fileName = about.file; shape = ""; }
+  if (about.offers) { if (about.fresh && !offers) beginSketch(); offers = about.offers; fileName = about.file; shape = ""; }
   if (about.refused !== undefined) refuse(own?.request.do === "text" ? TEXT : own?.path ?? null, about.refused);
   else if (own) { refuse(own.path, ""); refuse(null, ""); if (own.request.do === "text") refuse(TEXT, ""); }
   if (about.ask) { byId("ask").firstElementChild.textContent = about.ask; byId("ask").hidden = false; }
@@ -96,16 +96,17 @@ function show(about, own) {
   const theta = own?.theta ?? grid[row], same = about.data.theta_2.length === grid.length && about.data.theta_2[0] === grid[0] && about.data.theta_2[grid.length - 1] === grid[grid.length - 1];
   const keep = row;
   adopt(about.data);
+  unchanged = !about.changed;
   row = same && own?.theta == null ? keep : single() ? Math.min(keep, grid.length - 1) : nearest(theta);
   if (!playing) phase = row;
   furnish();
   refresh();
   if (playing) { run = { bounds: stretch(row), wraps: turnsFully() }; if (run.bounds[0] === run.bounds[1]) play(false); }
-  plain = about.plain;
+  plain = about.plain; keysOfScene = Object.keys(about.keys);
   if (offers) showFields();
   if ([fileText, about.text].includes(byId("file-text").value) || own?.request.do === "text") byId("file-text").value = about.text;   // a draft stays
   fileText = about.text;
-  if (document.activeElement !== byId("units")) byId("units").value = about.units;
+  showUnits(about.units);
   byId("undo").disabled = !about.undo; byId("redo").disabled = !about.redo;
   byId("reference").replaceChildren(...about.kept.map(name => new Option(name, name, false, name === about.reference)));
   document.querySelector("h1").textContent = document.title = about.plain.title || "Four-bar linkage";
@@ -117,7 +118,6 @@ function show(about, own) {
     if (line.includes("  ")) shown.className = "columns";
     return shown;
   }));
-  byId("keys")?.replaceChildren(...Object.keys(about.keys).map(key => new Option(key)));
   if (about.saved !== undefined) say(about.saved ? `${fileName} is saved` : `${fileName}: not saved yet; kept in ${fileName}.edit`);
   else if (own && own.request.do !== "hello") say(`${fileName}: changed`);
   showPositions();
@@ -174,7 +174,19 @@ press("apply", () => ({ do: "text", text: byId("file-text").value }));
 press("export", () => ({ do: "export", format: byId("format").value }));
 press("bodies", () => ({ do: "bodies", position: timed() ? valuesAt(row)[data.over.commanded] : axis().values[row] }));
 byId("reference").addEventListener("change", event => ask({ do: "refer", to: event.target.value }));
-byId("units").addEventListener("change", event => ask({ do: "units", units: event.target.value }));
+const OTHER = "another list";
+function showUnits(name) {
+  const names = [...offers?.units ?? [], ...offers?.units.includes(name) ? [] : [name]];
+  byId("units").replaceChildren(...[...names, OTHER].map(one => new Option(one, one, false, one === name)));
+  byId("unit-list").parentElement.hidden = document.activeElement !== byId("unit-list");
+}
+byId("units").addEventListener("change", event => {
+  if (event.target.value !== OTHER) { ask({ do: "units", units: event.target.value }); return; }
+  byId("unit-list").parentElement.hidden = false;
+  byId("unit-list").focus();
+});
+byId("unit-list").addEventListener("change", event => ask({ do: "units", units: event.target.value }));
+byId("sketch").addEventListener("click", beginSketch);
 byId("every").addEventListener("change", showPositions);
 byId("table-of").addEventListener("toggle", showPositions);
 document.addEventListener("keydown", event => {

@@ -5,19 +5,52 @@ let offers = null, plain = {}, shape = "", typing = 0;
 const fieldId = path => `field:${path.join("/")}`;
 const entryAt = (node, path) => path.reduce((inner, step) => inner?.[step], node);
 const scalar = value => typeof value !== "object" || value === null;
-const nameOfKey = key => typeof key === "number" ? String(key + 1) : key.replace(/^(theta|omega|alpha)_(\d)$/, (_, letter, n) => ({ theta: "\u03b8", omega: "\u03c9", alpha: "\u03b1" })[letter] + "\u2080\u2081\u2082\u2083\u2084"[n]).replaceAll("_", " ");
+const LETTERS = { theta: "angle \u03b8", omega: "speed \u03c9", alpha: "acceleration \u03b1" };
+const nameOfKey = key => key.replace(/^(theta|omega|alpha)_(\d)$/, (_, letter, n) => LETTERS[letter] + "\u2080\u2081\u2082\u2083\u2084"[n]).replaceAll("_", " ");
+// The name of the entry at a path as it is written beside it: one of a list has the name of the list and its number.
+function labelOf(path) {
+  const key = path[path.length - 1], holder = path[path.length - 2];
+  return PAIRS[holder]?.[key] ?? (typeof key === "number" ? `${nameOfKey(holder).replace(/s$/, "")} ${key + 1}` : nameOfKey(key));
+}
+const BARS = { 1: "1 ground", 2: "2 input", 3: "3 coupler", 4: "4 output" };
+// What an entry can be, as rows of value and name; undefined where it is not one of a few.
+function choicesOf(path) {
+  const key = path[path.length - 1], moving = path[0] === "loads" || path[1] === "flywheel" || path[0] === "drive" && path.length === 2;
+  if (key === "bar") return Object.entries(BARS).slice(moving ? 1 : 0);
+  return offers.words[key]?.map(word => [word, word]);
+}
+// What is commanded: theta_2 to theta_4, or the stroke of a cylinder.
+function commanded() {
+  const stated = Object.keys(plain.motion ?? {});
+  if (stated.some(key => key.startsWith("stroke") || key === "side")) return "stroke";
+  const bar = stated.map(key => /^(?:theta|omega|alpha)_([34])$/.exec(key)?.[1]).find(Boolean) ?? Object.keys(plain.motion?.law ?? {}).map(key => /^theta_([34])$/.exec(key)?.[1]).find(Boolean);
+  return `theta_${bar ?? 2}`;
+}
+// The empty fields of a table: those that apply beside what is stated.
+function fieldsAt(path, example) {
+  if (path.length !== 1) return example;
+  if (path[0] === "drive" && plain.drive?.from) return {};
+  if (path[0] !== "motion") return example;
+  const fields = offers.commands[commanded()].fields;
+  return plain.motion?.law ? Object.fromEntries(Object.entries(fields).filter(([key]) => ["branch", "through"].includes(key))) : fields;
+}
+function commandField() {
+  const input = element("select", { id: "command" }, ...Object.entries(offers.commands).filter(([key]) => key !== "stroke" || plain.drive?.from).map(([key, { label }]) => new Option(label, key, false, key === commanded())));
+  input.addEventListener("change", () => ask({ do: "command", command: input.value }));
+  return element("label", { className: "field long" }, "commanded", input);
+}
 const element = (name, attributes = {}, ...inner) => {
   const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) if (key in made && key !== "list") made[key] = value; else made.setAttribute(key, value);
+  for (const [key, value] of Object.entries(attributes)) if (key in made) made[key] = value; else made.setAttribute(key, value);
   made.append(...inner);
   return made;
 };
 
 function field(path, value, example) {
-  const key = path[path.length - 1], words = offers.words[key], id = fieldId(path), long = ["title", "source"].includes(key);
-  const input = words ? element("select", { id }, ...["", ...words].map(word => new Option(word || `(${example ?? "left out"})`, word))) : element("input", { id, placeholder: example ?? "", spellcheck: false, autocomplete: "off" });
+  const key = path[path.length - 1], words = choicesOf(path), id = fieldId(path), long = ["title", "source"].includes(key);
+  const needed = key === "side" || key === "bar" && example === undefined, without = `(${words?.find(([word]) => word === String(example))?.[1] ?? "left out"})`;
+  const input = words ? element("select", { id }, ...needed ? [] : [new Option(without, "")], ...words.map(([word, name]) => new Option(name, word))) : element("input", { id, placeholder: example ?? "", spellcheck: false, autocomplete: "off" });
   input.value = value ?? "";
-  input.setAttribute("aria-label", path.map(nameOfKey).join(" "));
   input.setAttribute("aria-describedby", `${id}!`);
   let gesture = "";
   input.addEventListener("focus", () => { gesture = `type:${id}:${++typing}`; });
@@ -36,8 +69,7 @@ function field(path, value, example) {
     if (event.key === "Escape") restore(input);
   });
   input.addEventListener("wheel", event => { if (document.activeElement === input) by(event.deltaY < 0 ? 1 : -1, event); }, { passive: false });
-  const shown = PAIRS[path[path.length - 2]]?.[key] ?? nameOfKey(key);
-  return element("label", { className: long ? "field long" : "field" }, shown, input, element("span", { id: `${id}!`, className: "warning", hidden: true }));
+  return element("label", { className: long ? "field long" : "field" }, labelOf(path), input, element("span", { id: `${id}!`, className: "warning", hidden: true }));
 }
 
 // A number a hundredth larger or smaller, in round steps; the unit stays. Null where there is no number.
@@ -67,7 +99,8 @@ function restore(input) {
 const entryPath = input => input.id.slice(6).split("/").map((step, n, all) => /^\d+$/.test(step) && Array.isArray(entryAt(plain, all.slice(0, n))) ? Number(step) : step);
 
 function group(path, node, example) {
-  const box = element("div", { className: "group" });
+  example = fieldsAt(path, example);
+  const box = element("div", { className: "group" }, ...path.length === 1 && path[0] === "motion" ? [commandField()] : []);
   const keys = Array.isArray(node) ? node.keys() : new Set([...(path.length ? [] : ORDER), ...Object.keys(node ?? {}), ...Object.keys(example ?? {})]);
   for (const key of keys) {
     const inner = node?.[key], own = [...path, key], model = scalar(example) ? undefined : example[key];
@@ -75,15 +108,15 @@ function group(path, node, example) {
     else if (path.length || inner !== undefined || model !== undefined || partsAt(own).length) box.append(branchOf(own, inner, model));
   }
   for (const part of partsAt(path)) box.append(part);
-  if ((path.length > 1 || path[0] === "drive" && node?.from) && entryAt(plain, path) !== undefined && !(path[0] === "bars" && path.length === 2)) {
-    const name = path.map(nameOfKey).join(" "), take = element("button", { type: "button", className: "take", textContent: "Remove", ariaLabel: `Remove ${name}` });
+  if ((path.length > 1 || path[0] === "drive" && node?.from) && entryAt(plain, path) !== undefined && !(path[0] === "bars" && path.length === 2) && !["from", "to"].includes(path[path.length - 1])) {
+    const take = element("button", { type: "button", className: "take", textContent: `Remove ${labelOf(path)}` });
     take.addEventListener("click", () => ask({ do: "remove", path }));
     box.append(take);
   }
   return box;
 }
 
-const branchOf = (path, node, model) => element("fieldset", { className: "group" }, element("legend", {}, nameOfKey(path[path.length - 1])), group(path, node, scalar(model) ? {} : model));
+const branchOf = (path, node, model) => element("fieldset", { className: "group" }, element("legend", {}, labelOf(path)), group(path, node, scalar(model) ? {} : model));
 
 // Buttons for what can be added here.
 function partsAt(path) {
@@ -91,6 +124,7 @@ function partsAt(path) {
   const free = rows.filter(([{ at }]) => {
     const last = at[at.length - 1], inner = entryAt(plain, at);
     if (last === "drive") return !plain.drive?.from;
+    if (path[0] === "motion" && commanded() !== "theta_2") return false;
     return last === -1 || last === "" ? path.length === 1 || entryAt(plain, path) !== undefined : path.length === 2 && path[0] === "effects" ? entryAt(plain, path) !== undefined && inner === undefined : inner === undefined || (at[0] === "motion" && last === "theta_2" && scalar(inner));
   });
   if (!free.length) return [];
@@ -99,9 +133,8 @@ function partsAt(path) {
     const last = at[at.length - 1], button = element("button", { type: "button", textContent: `+ ${label ?? nameOfKey(last)}` });
     let name = null;
     if (last === "") {
-      name = element("input", { value: path[0] === "points" ? ["P", "Q", "R", "S"].find(letter => !(letter in (plain.points ?? {}))) ?? "T" : "lengths.input", list: path[0] === "tolerances" ? "keys" : "", spellcheck: false });
-      name.setAttribute("aria-label", `name of the ${label}`);
-      made.append(name);
+      name = path[0] === "tolerances" ? element("select", { className: "tolerated" }, ...tolerated()) : element("input", { value: ["P", "Q", "R", "S"].find(letter => !(letter in (plain.points ?? {}))) ?? "T", spellcheck: false });
+      made.append(element("label", { className: "field" }, path[0] === "tolerances" ? "number" : "name", name));
     }
     button.addEventListener("click", () => ask({ do: "add", part: n, name: name?.value ?? "" }));
     made.append(button);
@@ -109,17 +142,21 @@ function partsAt(path) {
   return [made];
 }
 
+let keysOfScene = [];   // of its numbers, as tolerances name them
+const tolerated = () => keysOfScene.map(key => new Option(key, key, false, key === "lengths.input"));
+
 // Build the fields anew where the file has other entries than before; otherwise only their values.
 function showFields() {
+  for (const list of byId("fields").querySelectorAll(".tolerated")) if (list.length !== keysOfScene.length) list.replaceChildren(...tolerated());
   const outline = (node, path) => scalar(node) ? path.join("/") : Object.keys(node).map(key => outline(node[key], [...path, key])).join();
   const now = outline(plain, []);
   if (now !== shape) {
     const focused = document.activeElement?.id, open = shape !== "";
     shape = now;
-    byId("fields").replaceChildren(group([], plain, offers.fields), element("datalist", { id: "keys" }));
+    byId("fields").replaceChildren(group([], plain, offers.fields));
     if (open && focused) document.getElementById(focused)?.focus();
   }
-  for (const input of byId("fields").querySelectorAll("input[id],select[id]")) {
+  for (const input of byId("fields").querySelectorAll("[id^='field:']:is(input,select)")) {
     if (input === document.activeElement && !input.dataset.follows) continue;
     const value = entryAt(plain, entryPath(input));
     if (!scalar(value ?? null) || input.value === String(value ?? "")) continue;

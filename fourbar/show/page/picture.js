@@ -111,14 +111,15 @@ function fitted(points, tips, margin) {
   const ends = [0, 1].map(j => [-1, 1].map(sign => ({ point: points.reduce((most, point) => Math.max(most, sign * point[j]), -Infinity), tips: far(j, sign), sign })));
   const reach = (j, k, arrow) => ends[j].map(({ point, tips, sign }) => sign * Math.max(k * point + margin, ...tips.map(([foot, share]) => k * foot + arrow * share + edge)));
   const fits = (k, arrow) => [view.width, view.height].every((size, j) => { const [low, high] = reach(j, k, arrow); return high - low <= size; });
+  // the scale at which it would fill the picture without margins
+  const full = Math.min(...[view.width, view.height].map((size, j) => size / Math.max(1e-9 * lengths[0], ends[j].reduce((sum, { point }) => sum + point, 0))));
   const largest = arrow => {
     let low = 0, high = side / Math.max(...lengths);
     for (let n = 0; n < 24; n++) { const k = 0.5 * (low + high); if (fits(k, arrow)) low = k; else high = k; }
     return low;
   };
-  const bare = largest(0);
   let arrow = 0.3 * side, k = largest(arrow);
-  while (k < 0.6 * bare && arrow > 0.1 * side) { arrow *= 0.85; k = largest(arrow); }   // a linkage too small to see is worse than short arrows
+  while (k < 0.6 * full && arrow > 12) { arrow *= 0.85; k = largest(arrow); }   // a linkage too small to see is worse than short arrows
   const [left, right] = reach(0, k, arrow), [bottom, top] = reach(1, k, arrow);
   return { k, arrow, x: 0.5 * (view.width - left - right), y: 0.5 * (view.height + bottom + top) };
 }

@@ -28,6 +28,22 @@ PIXELS = 4.0
 """px between a pin dropped and its place: the grain, and the browser's own rounding."""
 
 
+OVERLAPS = """
+const boxes = [...picture.querySelectorAll('text')].map(e => [e.textContent, e.getBoundingClientRect()])
+  .filter(([words, box]) => words.trim() && box.width), found = [];
+boxes.forEach(([a, p], n) => boxes.slice(n + 1).forEach(([b, q]) => {
+  const wide = Math.min(p.right, q.right) - Math.max(p.left, q.left);
+  const high = Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top);
+  if (wide > 1.5 && high > 3.5) found.push([a, b]);
+}));
+return found;
+"""
+"""Pairs of labels in the picture whose boxes overlap by more than the space around letters."""
+
+
+MODELS = Path(__file__).parents[3] / "models"
+
+
 class Opened:
     """The command, and what it says."""
 
@@ -48,6 +64,14 @@ def wait_for(driver, expression: str):
         assert time.monotonic() < deadline, f"{expression} stays {found!r}"
         time.sleep(0.02)
     return found
+
+
+def open_scene(driver, server: Opened) -> None:
+    """Open the page; where it is a new scene, with the linkage that it begins with."""
+    driver.get(server.address)
+    wait_for(driver, "offers && document.getElementById('field:lengths/input')")
+    if driver.execute_script("return Boolean(sketch)"):
+        driver.find_element("id", "no-sketch").click()
 
 
 def type_into(driver, field: str, text: str) -> None:
@@ -111,8 +135,7 @@ def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(chromium, open
 def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, tmp_path: Path) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     server = opened(path)
-    driver.get(server.address)
-    wait_for(driver, "offers && document.getElementById('field:lengths/input')")
+    open_scene(driver, server)
     type_into(driver, "field:title", "<b>Mine</b><script>alert(1)</script>")
     type_into(driver, "field:lengths/input", "4 in")
     wait_for(driver, "data.lengths[1] === 0.1016")
@@ -160,11 +183,171 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, t
     assert not driver.get_log("browser")
 
 
+SHOWN_FIELDS = (
+    "[...document.querySelectorAll('.editor :is(input, select, textarea, button)')].filter(e => e.checkVisibility())"
+)
+
+
+@pytest.mark.slow
+def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(chromium, opened, tmp_path: Path) -> None:
+    path, driver = tmp_path / "mine.toml", chromium
+    driver.get(opened(path).address)
+    wait_for(driver, "offers && sketch")
+    assert not driver.find_element("id", "bar-2").is_displayed()  # the drawing is empty
+    type_into(driver, "sketch-width", "50 in")
+    picture = driver.find_element("id", "picture")
+    corner = picture.size["width"] / 2, picture.size["height"] / 2
+    scale = 50.0 / picture.size["width"]
+    pixels = {"O2": (120, 300), "A": (170, 220), "B": (400, 120), "O4": (380, 330)}
+    for x, y in pixels.values():
+        ActionChains(driver).move_to_element_with_offset(picture, x - corner[0], y - corner[1]).click().perform()
+    wait_for(driver, "!sketch && plain.lengths.ground.endsWith(' in')")
+    pins = {name: complex(x - 120, 300 - y) * scale for name, (x, y) in pixels.items()}
+    drawn = {
+        "ground": pins["O4"],
+        "input": pins["A"],
+        "coupler": pins["B"] - pins["A"],
+        "output": pins["B"] - pins["O4"],
+    }
+    for name, bar in drawn.items():
+        length = float(driver.execute_script(f"return plain.lengths.{name}").split()[0])
+        assert length == pytest.approx(abs(bar), abs=PIXELS * scale)
+    shown = driver.execute_script("const p = at(row); return [p.A, p.B]")  # the position shown is the one drawn
+    for place, pin in zip(shown, ("A", "B"), strict=True):
+        assert complex(*place) / 0.0254 == pytest.approx(pins[pin], abs=2 * PIXELS * scale)
+    assert "lbf" in driver.find_element("id", "forces").text  # results follow the file
+    type_into(driver, "field:lengths/input", "6 in")
+    wait_for(driver, "Math.abs(data.lengths[1] - 0.1524) < 1e-12")
+    driver.find_element("id", "sketch").click()
+    wait_for(driver, "sketch")
+    driver.find_element("id", "no-sketch").click()
+    wait_for(driver, "!sketch && document.getElementById('bar-2').checkVisibility()")
+    assert not driver.get_log("browser")
+
+
+@pytest.mark.slow
+def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(chromium, opened, tmp_path: Path) -> None:
+    path, driver = tmp_path / "mine.toml", chromium
+    driver.get(opened(path).address)
+    wait_for(driver, "offers && sketch && document.activeElement === picture")
+
+    def press(*keys: str) -> None:
+        ActionChains(driver).send_keys(*keys).perform()
+
+    def with_control(key: str) -> None:
+        ActionChains(driver).key_down(Keys.CONTROL).send_keys(key).key_up(Keys.CONTROL).perform()
+
+    def tab_to(goal: str) -> None:
+        for _ in range(200):
+            if driver.execute_script(f"return document.activeElement.matches({goal!r})"):
+                return
+            press(Keys.TAB)
+        raise AssertionError(f"{goal} is not reached by Tab")
+
+    press(Keys.ENTER, *[Keys.ARROW_UP] * 5, Keys.ENTER, *[Keys.ARROW_RIGHT] * 14, *[Keys.ARROW_UP] * 6, Keys.ENTER)
+    press(*[Keys.ARROW_DOWN] * 12, Keys.ENTER)
+    wait_for(driver, "!sketch && plain.lengths.ground !== '300 mm'")
+    lengths = driver.execute_script("return data.lengths")
+    driver.execute_script("document.activeElement.blur(); window.scrollTo(0, 0)")
+    reached = set()
+    for _ in range(200):  # every field and button of the editor, in turn
+        press(Keys.TAB)
+        reached.add(driver.execute_script("return document.activeElement.id || document.activeElement.textContent"))
+        if driver.execute_script("return document.activeElement === document.querySelector('.editor summary')"):
+            break
+    missing = driver.execute_script(
+        f"return {SHOWN_FIELDS}.filter(e => !e.disabled && e.id !== 'file-text').map(e => e.id || e.textContent)"
+    )
+    assert set(missing) - reached == {""} - reached
+    driver.execute_script("document.activeElement.blur()")
+    tab_to("[id='field:bars/coupler/mass']")
+    with_control("a")
+    press("2 kg")
+    wait_for(driver, "plain.bars.coupler.mass === '2 kg'")
+    press(Keys.ARROW_UP)
+    wait_for(driver, "plain.bars.coupler.mass === '2.01 kg'")
+    tab_to("[id='field:motion/branch']")
+    press(Keys.ARROW_DOWN)
+    tab_to(".handle[aria-label^='pin B']")
+    before = driver.execute_script("return plain.lengths.coupler")
+    press(Keys.ARROW_RIGHT)
+    wait_for(driver, f"plain.lengths.coupler !== {before!r}")
+    with_control("z")
+    wait_for(driver, f"plain.lengths.coupler === {before!r}")
+    assert driver.execute_script("return data.lengths") == lengths
+    with_control("s")
+    wait_for(driver, "/^saved|is saved/.test(document.getElementById('bench').textContent)")
+    assert fourbar.load(path).linkage.coupler.mass == 2.01
+
+
+@pytest.mark.slow
+def test_each_label_is_what_a_screen_reader_says_and_each_choice_a_list(chromium, opened, tmp_path: Path) -> None:
+    path, driver = tmp_path / "bucket.toml", chromium
+    path.write_text((MODELS / "gallery" / "excavator_bucket.toml").read_text())
+    open_scene(driver, opened(path))
+    visible = (
+        "e => [...e.labels].map(l => [...l.childNodes].filter(n => n.nodeType === 3).map(n => n.data).join('')).join()"
+    )
+    for command in ("theta_2", "stroke"):
+        if command == "stroke":
+            driver.find_element("css selector", "#command option[value=stroke]").click()
+            wait_for(driver, "plain.motion.stroke && document.getElementById('field:motion/side')")
+        entries = driver.find_elements("css selector", "#fields :is(input, select)")
+        words = driver.execute_script(f"return arguments[0].map({visible})", entries)
+        assert len(entries) > 20 and all(words)
+        for entry, word in list(zip(entries, words, strict=True))[::3]:
+            assert entry.accessible_name == word
+        ids = [entry.get_attribute("id") for entry in entries]
+        lists = {
+            name.rpartition("/")[2] for entry, name in zip(entries, ids, strict=True) if entry.tag_name == "select"
+        }
+        assert {"branch", "bar", "frame"} <= lists and not any(
+            name.endswith("theta_2") for name in ids if command != "theta_2"
+        )
+        if command == "stroke":  # what does not apply is not there
+            assert "side" in lists and not {"field:motion/omega_2", "field:motion/through", "field:drive/bar"} & {*ids}
+            assert not driver.find_elements("xpath", "//button[.='+ sweep' or .='+ released' or .='+ law over time']")
+    side = driver.find_element("id", "field:motion/side")
+    assert [option.text for option in side.find_elements("tag name", "option")] == ["left", "right"]
+    assert len(driver.find_elements("css selector", "#units option")) > 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1440, 390])
+def test_it_opens_in_the_middle_with_a_linkage_that_fills_half_and_labels_apart(
+    chromium, opened, tmp_path: Path, width: int
+) -> None:
+    driver = chromium
+    driver.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride", {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    )
+    for model in ("crank_rocker", "gallery/excavator_bucket", "gallery/tailgate", "gallery/landing_gear"):
+        path = tmp_path / f"{model.rpartition('/')[2]}.toml"
+        path.write_text((MODELS / f"{model}.toml").read_text())
+        driver.get(opened(path).address)
+        wait_for(driver, "data.summary")
+        rows = driver.execute_script("return [row, grid.length]")
+        assert abs(rows[0] - rows[1] / 2) <= 1, model
+        assert driver.find_element("id", "compared").text == ""  # nothing has changed
+        share = driver.execute_script(
+            "const own = p => [2, 3, 4].filter(k => data.centres[k]).map(k => barPoint(p, k, data.centres[k]));"
+            "const points = p => data.points.map(point => framed(p, point.bar, point.at));"
+            "const P = grid.map((_, i) => at(i)).filter(p => p)"
+            ".flatMap(p => [[0, 0], p.A, p.B, p.O4, ...actingPoints(p), ...own(p), ...points(p)]);"
+            "const [wide, high] = [0, 1].map(j => Math.max(...P.map(q => q[j])) - Math.min(...P.map(q => q[j])));"
+            "return view.k * Math.max(wide / view.width, high / view.height);"
+        )
+        assert share >= 0.5, model
+        for row in range(0, rows[1], rows[1] // 8):
+            driver.execute_script(f"go({row})")
+            assert driver.execute_script(OVERLAPS) == [], (model, row)
+        assert driver.execute_script("return document.documentElement.scrollWidth") <= width
+
+
 @pytest.mark.slow
 def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(chromium, opened, tmp_path: Path) -> None:
     driver = chromium
-    driver.get(opened(tmp_path / "mine.toml").address)
-    wait_for(driver, "offers && document.getElementById('field:lengths/input')")
+    open_scene(driver, opened(tmp_path / "mine.toml"))
     type_into(driver, "field:lengths/input", "110 mm")
     wait_for(driver, "data.lengths[1] === 0.11")
     type_into(driver, "field:lengths/coupler", "240 mm")
@@ -188,8 +371,7 @@ def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(chromium
 @pytest.mark.slow
 def test_a_page_whose_line_is_cut_finds_its_server_again(chromium, opened, tmp_path: Path) -> None:
     driver = chromium
-    driver.get(opened(tmp_path / "mine.toml").address)
-    wait_for(driver, "offers && document.getElementById('field:lengths/input')")
+    open_scene(driver, opened(tmp_path / "mine.toml"))
     driver.execute_script("line.close()")
     type_into(driver, "field:lengths/input", "110 mm")
     wait_for(driver, "data.lengths[1] === 0.11")
@@ -200,8 +382,7 @@ def test_a_stopped_server_is_named_and_a_new_one_goes_on_from_its_state(chromium
     path, driver = tmp_path / "mine.toml", chromium
     server = opened(path)
     port = server.address.split("/")[2].partition(":")[2]
-    driver.get(server.address)
-    wait_for(driver, "offers && document.getElementById('field:lengths/input')")
+    open_scene(driver, server)
     type_into(driver, "field:lengths/input", "110 mm")
     wait_for(driver, "data.lengths[1] === 0.11")
     server.end()

@@ -216,6 +216,75 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_in_either_frame_and_a_nega
     assert np.angle(pulls / arrow) == pytest.approx(0.0, abs=0.02)
 
 
+BUCKET = ROOT / "models" / "gallery" / "excavator_bucket.toml"
+
+
+@pytest.mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
+def test_another_command_goes_over_the_same_motion(tmp_path: Path, command: str) -> None:
+    path = tmp_path / "bucket.toml"
+    path.write_text(BUCKET.read_text())
+    session = Session(path, tmp_path / "exports")
+    before = fourbar.solve(session.now.scene)
+    assert "refused" not in (told := session.do({"do": "command", "command": command})), told
+    after = fourbar.solve(session.now.scene)
+    assert after.assembled.all() and np.isfinite(after.drive_force).all()
+    values, places = getattr(before, command), getattr(after, command)
+    assert sorted(places[[0, -1]]) == pytest.approx(sorted(values[[0, -1]]), abs=3e-3 * np.ptp(values))
+    order = np.argsort(values)
+    for name in ("theta_2", "theta_3", "theta_4"):  # the same poses
+        expected = np.interp(places, values[order], np.unwrap(getattr(before, name))[order])
+        assert np.abs(np.angle(np.exp(1j * (getattr(after, name) - expected)))).max() < 2e-3
+    assert session.do({"do": "undo"})["text"] == BUCKET.read_text()
+
+
+def test_what_cannot_be_commanded_is_one_line(session: Session) -> None:
+    for command, words in (("stroke", "needs a cylinder"), ("theta_1", "must be one of"), ("", "must be one of")):
+        assert words in session.do({"do": "command", "command": command})["refused"]
+    session.change(lambda document: document.put(["motion", "theta_2"], "60 deg"))
+    assert "needs a motion" in session.do({"do": "command", "command": "theta_4"})["refused"]
+
+
+PINS_DRAWN = [[0.0, 0.0], [3.0, 4.0], [14.0, 9.0], [12.0, -5.0]]
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(tmp_path: Path, mirrored: bool) -> None:
+    session = Session(tmp_path / "new.toml", tmp_path / "exports")
+    assert session.do({"do": "hello"})["fresh"]
+    pins = [[x, -y if mirrored else y] for x, y in PINS_DRAWN]
+    told = session.do({"do": "draw", "pins": pins, "unit": "in", "grain": 1e-6})
+    assert "refused" not in told, told
+    scene = session.now.scene
+    assert not session.do({"do": "hello"})["fresh"] and session.do({"do": "hello"})["units"] == "as the file"
+    assert session.units["N"][0] == "lbf"
+    A, B, O4 = (0.0254 * complex(*pin) for pin in pins[1:])
+    where = fourbar.command(scene)
+    at = where._replace(angle=np.array([np.angle(A)]), branch=where.branch[:1])
+    s = fourbar.solve(scene, "position", at=at)
+    assert [complex(*s.A[0]), complex(*s.B[0])] == pytest.approx([A, B], abs=1e-6)
+    assert scene.linkage.ground * np.exp(1j * scene.linkage.ground_angle) == pytest.approx(O4, abs=1e-6)
+    assert fourbar.solve(scene).assembled.any()
+    session.do({"do": "set", "path": ["bars", "coupler", "mass"], "value": "3 lb"})
+    session.do({"do": "draw", "pins": [[0, 0], [3, 4], [14, 12], [12, -5]], "unit": "in", "grain": 0.01})
+    assert session.now.plain["bars"]["coupler"]["mass"] == "3 lb"  # what was typed stays
+    assert session.now.scene.linkage.coupler.length == pytest.approx(0.0254 * math.hypot(11, 8), abs=0.0254 * 0.01)
+    for nonsense in ([[0, 0]] * 4, [[0, 0], [1, 1]], [["a", 0]] * 4, [[0, 0], [1, 0], [math.nan, 1], [3, 0]]):
+        assert "refused" in session.do({"do": "draw", "pins": nonsense, "unit": "in", "grain": 0.01})
+    assert "refused" in session.do({"do": "draw", "pins": PINS_DRAWN, "unit": "lb", "grain": 0.01})
+
+
+@pytest.mark.parametrize(("length", "force"), [("12 in", "lbf"), ('12 1/2"', "lbf"), ("1 ft", "lbf"), ("300 mm", "N")])
+def test_results_have_the_units_of_the_file_until_others_are_chosen(session: Session, length: str, force: str) -> None:
+    text = session.now.text.replace('ground = "300 mm"', f"ground = '''{length}'''")
+    told = session.do({"do": "text", "text": text})
+    assert "refused" not in told, told
+    assert session.units.get("N", ("N", 1.0))[0] == force
+    session.do({"do": "units", "units": "mm N N.mm deg"})
+    assert session.units["m"][0] == "mm" and session.answer()["units"] == "mm N N.mm deg"
+    session.do({"do": "units", "units": "as the file"})
+    assert session.units.get("N", ("N", 1.0))[0] == force
+
+
 def test_numbers_get_the_digits_of_a_pixel_and_keep_their_unit() -> None:
     assert write_rounded(0.123456, 0.003, "m") == "0.123 m"
     assert write_rounded(123.456, 3.0, "mm") == "123 mm"
@@ -317,7 +386,7 @@ DAMAGES = {
     "a place before": lambda state: state.replace('"place": 1', '"place": -1'),
     "no texts": lambda state: state.replace('"texts": [', '"texts": 3, "others": ['),
     "no scene": lambda state: state.replace("[lengths]", "[length]"),
-    "units of nothing": lambda state: state.replace('"units": "SI"', '"units": "parsec"'),
+    "units of nothing": lambda state: state.replace('"units": "as the file"', '"units": "parsec"'),
     "a reference to nothing": lambda state: state.replace('"reference": "start"', '"reference": "state 7"'),
     "kept is a list": lambda state: state.replace('"kept": {', '"kept": [], "others": {'),
 }
