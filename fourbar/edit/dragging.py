@@ -6,7 +6,6 @@ unit that it has in the file and gets no more digits than a pixel is worth.
 
 import cmath
 import math
-import re
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from fourbar.edit.document import Path, SceneDocument
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.quantities.units import FEET, FRACTION, NUMBER, to_si
+from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 
@@ -159,15 +158,6 @@ def _write_like(old: object, value: float, grain: float, si: str, otherwise: str
     unit = find_unit(old, otherwise)
     factor = to_si(f"1 {si}", unit)
     return write_rounded(value * factor, grain * factor, unit)
-
-
-def find_unit(text: object, otherwise: str) -> str:
-    """Return the unit that a text has; another one where it has none."""
-    last = FEET.sub("", str(text).strip())  # the inches of 1'6"
-    found = FRACTION.match(last) or NUMBER.match(last)
-    unit = last[found.end() :].strip() if found else ""
-    unit = re.sub('[″”"]', "in", re.sub("[′’']", "ft", unit))
-    return unit or otherwise
 
 
 def write_rounded(value: float, grain: float, unit: str) -> str:

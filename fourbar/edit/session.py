@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.edit.document import SceneDocument, list_offers
-from fourbar.edit.dragging import Dragged, drag, find_unit, write_rounded
+from fourbar.edit.dragging import Dragged, drag, write_rounded
 from fourbar.edit.exports import Exports
 from fourbar.edit.reply import evaluate_scene
 from fourbar.errors import FourBarError, InputError
@@ -26,12 +26,12 @@ from fourbar.files.reading import read_bytes
 from fourbar.files.scene_file import LARGEST_FILE
 from fourbar.files.scene_text import BRANCHES
 from fourbar.linkage import BAR_NAMES
-from fourbar.quantities.units import to_si
+from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.motion import OF_STROKE, require_steps
 from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.stroke import SIDES
-from fourbar.show.units import units
+from fourbar.show.units import suit_units, units
 from fourbar.solution import Conversion
 from fourbar.solve import solve
 from fourbar.studies.keys import list_entries, read_place
@@ -63,7 +63,6 @@ UNITS = (
     "in lbf lbf.ft deg rpm",
 )
 """Units of results to choose from; any other list can be typed."""
-FEET_AND_INCHES = ("in", "inch", "inches", "ft", "foot", "feet")
 
 
 class SceneState(NamedTuple):
@@ -140,8 +139,7 @@ class Session:
         """Units of results: as chosen, or those of the file."""
         if self.unit_names != AS_THE_FILE:
             return _read_units(self.unit_names)
-        own = find_unit(self.now.plain["lengths"]["ground"], "m")
-        return _read_units("imperial" if own in FEET_AND_INCHES else "SI")
+        return _suit_units(self.now.plain["lengths"]["ground"])
 
     @property
     def fresh(self) -> bool:
@@ -229,7 +227,7 @@ class Session:
         self.now = now
 
 
-_read_units = cache(units)
+_read_units, _suit_units = cache(units), cache(suit_units)
 
 
 def _hash_text(data: bytes) -> str:

@@ -82,6 +82,15 @@ def to_si(text: str, unit: str) -> float:
     return -0.0 if value == 0.0 and found[0].startswith("-") else value
 
 
+def find_unit(text: object, otherwise: str) -> str:
+    """Return the unit that a text has; another one where it has none."""
+    last = FEET.sub("", str(text).strip())  # the inches of 1'6"
+    found = FRACTION.match(last) or NUMBER.match(last)
+    unit = last[found.end() :].strip() if found else ""
+    unit = re.sub('[″”"]', "in", re.sub("[′’']", "ft", unit))
+    return unit or otherwise
+
+
 def find_factor(unit: str, given: str) -> float:
     """Return what a number in the unit `given` is multiplied by to be in `unit`.
 

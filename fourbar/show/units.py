@@ -59,7 +59,9 @@ def _explain_refusal(name: str, unit: str) -> str:
 
 def suit_units(length: str) -> Conversion:
     """Return the units that suit a length as it was typed: imperial for inches and feet, otherwise `COMMON`."""
-    return units("imperial") if length.strip().lstrip("+-.0123456789eE ").casefold() in IMPERIAL else COMMON
+    from fourbar.quantities.units import find_unit
+
+    return units("imperial") if find_unit(length, "m").casefold() in IMPERIAL else COMMON
 
 
 def units_of_file(path: Path) -> Conversion:

@@ -13,10 +13,11 @@ import pytest
 
 import fourbar
 from fourbar.files import loads
+from fourbar.quantities.units import find_unit
 
 pytest.importorskip("tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit")
 from fourbar.edit.document import SceneDocument, list_offers
-from fourbar.edit.dragging import find_unit, write_rounded
+from fourbar.edit.dragging import write_rounded
 from fourbar.edit.reply import evaluate_scene, pack_frame
 from fourbar.edit.session import LARGEST_STATE, MOST_KEPT, Session
 
@@ -273,7 +274,9 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(tmp_path: Path
     assert "refused" in session.do({"do": "draw", "pins": PINS_DRAWN, "unit": "lb", "grain": 0.01})
 
 
-@pytest.mark.parametrize(("length", "force"), [("12 in", "lbf"), ('12 1/2"', "lbf"), ("1 ft", "lbf"), ("300 mm", "N")])
+@pytest.mark.parametrize(
+    ("length", "force"), [("12 in", "lbf"), ('12 1/2"', "lbf"), ("1' 6\"", "lbf"), ("1 ft", "lbf"), ("300 mm", "N")]
+)
 def test_results_have_the_units_of_the_file_until_others_are_chosen(session: Session, length: str, force: str) -> None:
     text = session.now.text.replace('ground = "300 mm"', f"ground = '''{length}'''")
     told = session.do({"do": "text", "text": text})
