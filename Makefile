@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-LONG := kills package machines engines simulators problems releases standing free fuzz accuracy suites
+LONG := kills package machines engines simulators problems standing free fuzz accuracy suites
 
 .PHONY: validate test test-all check long-test $(LONG:%=long-%) models docs setup clean
 
@@ -42,8 +42,6 @@ long-simulators:
 	$(BIN)/python -m pytest -m nightly
 long-problems:
 	PROBLEMS=all $(BIN)/python -m pytest tests/validation/lab/simulators/test_problems.py
-long-releases:
-	RELEASES=pip $(BIN)/python -m pytest tests/validation/lab/simulators/test_releases.py
 long-standing:
 	$(BIN)/python -m fourbar_lab standing
 long-free:

@@ -12,9 +12,9 @@ import click
 from fourbar.errors import FAILED, HOLDS
 from fourbar_lab import injection
 from fourbar_lab.injection import read_faults
+from fourbar_validation.engines.processes import run_to_end
 from fourbar_validation.engines.workers import apply_each
 from fourbar_validation.places import FORMULAS, PACKAGE
-from fourbar_validation.run.elsewhere import run_to_end
 
 SECONDS = 300
 """A fault with which the harness takes longer than this ends the run as a failure would; it takes some ten."""

@@ -28,7 +28,6 @@ READING = [
     ["validation", "run", "ENDLESS", "--out", "OUT"],
     ["validation", "check-mjcf", SCENE, "ENDLESS", "--out", "OUT"],
     ["validation", "run", SCENE, "--against", "ENDLESS", "--out", "OUT"],
-    ["validation", "run", SCENE, "--python", "ENDLESS", "--out", "OUT"],
     ["validation", "run", "--suite", "ENDLESS", "--out", "OUT"],
     ["validation", "compare", "ENDLESS", "ENDLESS"],
     ["validation", "accept", "ENDLESS"],

@@ -57,7 +57,7 @@ JUDGED_BY = {
     "validation/engines/test_engines.py": "validation/engines: ball_drive ball_vectors balls description "
     "drake exudyn exudyn_elements limits loaded loop opensim pinocchio prediction tree witnesses; "
     "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
-    "validation/engines/test_guests.py": "validation: engine; validation/engines: keeper output workers",
+    "validation/engines/test_guests.py": "validation: engine; validation/engines: keeper output processes workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects free_body_stroke",
     "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
     "validation/engines: exact; validation/engines/mujoco: shipped; "
@@ -73,7 +73,7 @@ JUDGED_BY = {
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "
     "ladder thesis_dynamics thesis_positions thirteen",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "
-    "record render scenes; validation/report: junit; validation/run: elsewhere",
+    "record render scenes; validation/report: junit",
     "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
     "templating",
     # studies: each through its command

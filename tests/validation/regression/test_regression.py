@@ -267,8 +267,7 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
         (["--random", "3", "--type", "crank"], "crank-rocker, drag-link"),
         (["--engines", ","], "must be among pinocchio-inverse"),
         (["--against", "no-such-run"], "error: --against = 'no-such-run': must be a folder with results.csv"),
-        (["--against", "accepted", "--python", "python"], "cannot be combined with --python"),
-        (["--html", "changes.html"], "say --against BASELINE or --python PATH too"),
+        (["--html", "changes.html"], "say --against BASELINE too"),
         (["--mjcf", "theirs.xml", "--name", "coupler=link"], "check-mjcf SCENE THEIRS.xml"),
         (["--name", "coupler=link"], "check-mjcf SCENE THEIRS.xml"),
         (["a.toml", "--random", "3"], "leave out the scene files"),
@@ -290,23 +289,6 @@ def test_what_stood_for_a_failure_and_is_gone_is_no_regression() -> None:
     assert not compare_rows((HERE, [ROW, alarm]), (HERE, [ROW])).regressed
     failed = replace(ROW, verdict=FAILS)
     assert compare_rows((HERE, [failed]), (HERE, [])).regressed  # a comparison that failed and is not made any more
-
-
-@pytest.mark.posix
-def test_another_python_without_the_libraries_is_one_line_and_status_3(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bare = tmp_path / "python"
-    bare.write_text("#!/bin/sh\necho \"ModuleNotFoundError: No module named 'click'\" >&2\nexit 1\n")
-    bare.chmod(0o755)
-    earlier = tmp_path / "out" / "elsewhere" / "results.csv"
-    earlier.parent.mkdir(parents=True)
-    earlier.write_text("of an earlier run")
-    scene = Path(__file__).parents[3] / "models" / "crank_rocker.toml"
-    assert status(["run", str(scene), "--python", str(bare), "--out", str(tmp_path / "out")]) == 3
-    message = capsys.readouterr().err.strip()
-    assert "did not run there: ModuleNotFoundError: No module named 'click' (it needs" in message
-    assert "\n" not in message
 
 
 def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path: Path) -> None:

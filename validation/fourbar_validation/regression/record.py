@@ -18,6 +18,7 @@ from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.columns import count_rows, read_column, read_columns
 from fourbar_validation.compare.rows import Row, make_plain, read_cell_text
 from fourbar_validation.compare.tolerance import SIMULATED, K
+from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import find_kernels, list_versions, name_machine
@@ -68,7 +69,8 @@ def describe_run(
     }
     described = {name: dict(entries) for name, entries in (scenes or {}).items()}
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    return About(list_versions() | find_kernels(), name_machine(), settings, described, now, _find_commit())
+    versions = {guest.name: guest.version for guest in witnesses if isinstance(guest, Guest) and guest.version}
+    return About(list_versions() | find_kernels() | versions, name_machine(), settings, described, now, _find_commit())
 
 
 def _find_commit() -> str:

@@ -1,6 +1,5 @@
 """`python -m validation run`: what is judged, by whom, how, and against what."""
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,6 @@ from fourbar_validation.regression.accept import add_output_options, report_diff
 from fourbar_validation.regression.record import find_baseline, open_run
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.report.summary import Summary
-from fourbar_validation.run.elsewhere import run_elsewhere
 from fourbar_validation.run.run import SAMPLE, WORKERS, Collected, Pictured, RunOptions, run
 from fourbar_validation.run.selection import choose_witnesses, find_askable, select_scenes
 from fourbar_validation.scenes.random import DrawnType
@@ -28,7 +26,6 @@ EXCLUDED = (
     ("--random", "scenes", "judges random linkages; leave out the scene files"),
     ("--suite", "scenes", "has its own scenes; leave out scene files and --random"),
     ("--suite", "--random", "has its own scenes; leave out scene files and --random"),
-    ("--against", "--python", "cannot be combined with --python, which compares with the run made there"),
 )
 """Option, what it cannot be combined with, and why."""
 OF_RANDOM = ("--seed", "--type")
@@ -46,7 +43,7 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
 )
-@click.option("--engines", metavar="NAMES", help="Comma-separated witnesses; left out: all.")
+@click.option("--engines", metavar="NAMES", help="Comma-separated engines, of engines.toml too; left out: all of ours.")
 @click.option("--error", "wanted", type=float, metavar="E", help="Simulate no more precisely than this relative error.")
 @click.option("--suite", "named", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
 @click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
@@ -61,11 +58,6 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
 @click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Processes.")
 @click.option("--scheduler", metavar="ADDRESS", help="Spread over the workers of this Dask scheduler.")
 @click.option("--against", metavar="BASELINE", help="Compare with an accepted name or an earlier run's folder.")
-@click.option(
-    "--python",
-    type=click.Path(path_type=Path),
-    help="Run the suite under this interpreter too (into OUT/elsewhere), and say what changes from there to here.",
-)
 @click.option(
     "--witness",
     "adapters",
@@ -103,7 +95,6 @@ def command(
     workers: int,
     scheduler: str | None,
     against: str | None,
-    python: Path | None,
     adapters: tuple[str, ...],
     time_limit: float | None,
     sample: int,
@@ -114,15 +105,11 @@ def command(
     from fourbar_validation.report.terminal import print_table
 
     of_random: dict[str, Any] = {"--random": count, "--seed": seed, "--type": types}
-    refuse_combinations(
-        {"scenes": scenes or None, "--suite": named, "--against": against, "--python": python} | of_random
-    )
+    refuse_combinations({"scenes": scenes or None, "--suite": named} | of_random)
     for form, path in forms.items():
         if path is not None:
-            if python is None and against is None and form != "junit":
-                raise InputError(
-                    f"--{form}", str(path), "tells differences; say --against BASELINE or --python PATH too"
-                )
+            if against is None and form != "junit":
+                raise InputError(f"--{form}", str(path), "tells differences; say --against BASELINE too")
             if out.exists() or path.parent != out:  # a folder that the run will make
                 require_file(path, *scenes)
     if against is not None:
@@ -132,14 +119,8 @@ def command(
         from fourbar_validation.run.required_error import adjust_witnesses
 
         witnesses = adjust_witnesses(witnesses, wanted)
-    if python is not None:
-        the_same = of_random | {"--workers": workers, "--engines": engines, "--sample-shipped": sample}
-        the_same |= {"--error": wanted, "--time-limit": time_limit}
-        the_same["--suite"] = named if named in (None, "hard") else os.path.abspath(named)
-        passed_on = [*map(os.path.abspath, scenes), "--no-pictures", *(f"--witness={adapter}" for adapter in adapters)]
-        passed_on += [f"{option}={value}" for option, value in the_same.items() if value is not None]
-        against = str(run_elsewhere(python, passed_on, out / "elsewhere"))
-    present, missing = find_askable(choose_witnesses(engines, witnesses), by_name=engines is not None)
+    chosen = choose_witnesses(engines, witnesses, [path.parent for path in scenes], time_limit)
+    present, missing = find_askable(chosen, by_name=engines is not None)
     options = RunOptions(workers, scheduler, drawn=not no_pictures, sample=sample)
     result = show_progress(len(suite), run(suite, out, present, options, missing))
     print_table(result, out)

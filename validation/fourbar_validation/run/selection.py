@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fourbar.errors import DependencyError, InputError
+from fourbar_validation.engines.environments import read_engines, start_engines
 from fourbar_validation.engines.guests import Guest, read_guests
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard, hold_fully
 from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, Witness
@@ -36,20 +37,28 @@ def select_scenes(
     return (read_scene_files(scenes) if scenes else read_default_suite()), witnesses
 
 
-def choose_witnesses(engines: str | None, witnesses: tuple[Witness, ...] = WITNESSES) -> tuple[Witness, ...]:
+def choose_witnesses(
+    engines: str | None,
+    witnesses: tuple[Witness, ...] = WITNESSES,
+    folders: Sequence[Path] = (),
+    seconds: float | None = None,
+) -> tuple[Witness, ...]:
     """Choose the witnesses named in a comma-separated list, and the guests, which are named by being given.
 
-    Where there is no list, all but those that need not be installed.
+    Where there is no list, all but those that need not be installed. A name that is no witness's is sought in the
+    engines.toml of these folders and of the package; `seconds`: in which such an engine must answer.
     """
     if engines is None:
         further = {witness.name for witness in FURTHER}
         return tuple(witness for witness in witnesses if witness.name not in further or not witness.missing())
     known = {witness.name: witness for witness in witnesses}
     names = [name.strip() for name in engines.split(",") if name.strip()]
+    described = read_engines(folders)
     for name in names or [engines]:
-        if name not in known:
-            raise InputError("--engines", name, "must be among " + ", ".join(known))
-    return tuple(witness for name, witness in known.items() if name in names or isinstance(witness, Guest))
+        if name not in known and name not in described:
+            raise InputError("--engines", name, "must be among " + ", ".join([*known, *described]))
+    chosen = tuple(witness for name, witness in known.items() if name in names or isinstance(witness, Guest))
+    return (*chosen, *start_engines([described[name] for name in names if name not in known], witnesses, seconds))
 
 
 def find_askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:

@@ -67,20 +67,9 @@ def test_the_command_says_what_could_not_run(monkeypatch: pytest.MonkeyPatch, tm
     script.write_text(script.read_text().replace("nothing-such (nothing_such)", "pytest (pytest)"))
     done = CliRunner().invoke(module.command)
     assert done.exit_code == 0 and f"one.py: holds in pytest {pytest.__version__}, Python" in done.output
-    asked = []
-
-    def installed(*given: object) -> tuple[Path | None, str]:
-        asked.append(given)
-        return (Path(sys.executable), "") if given[2] == "2.0" else (None, "does not load: libtoy.so.7")
-
-    monkeypatch.setattr(module, "install_version", installed)
-    arguments = [str(script), "--release", "1.0", "--release", "2.0", "--cache", str(tmp_path)]
-    done = CliRunner().invoke(module.command, arguments)
-    assert done.output == "pytest 1.0: does not load: libtoy.so.7\npytest 2.0: holds\n"
-    assert asked[0] == ("pytest", "pytest", "1.0", tmp_path, ["also==1.0", "more"])
 
 
-@pytest.mark.parametrize("arguments", [["--release", "1.0"], [__file__], ["no_such.py"]])
+@pytest.mark.parametrize("arguments", [[__file__], ["no_such.py"]])
 def test_bad_input_is_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert status(["findings", *arguments]) == 2
     assert capsys.readouterr().err.count("\n") == 1

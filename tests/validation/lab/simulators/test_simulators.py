@@ -22,10 +22,10 @@ from fourbar.mjcf.sdf import write_sdf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.processes import Ended
 from fourbar_validation.lab.simulators import examine, motion, standing
 from fourbar_validation.lab.simulators.findings import read_findings
 from fourbar_validation.lab.simulators.standing import PROBLEM
-from fourbar_validation.run.elsewhere import Ended
 from tests.whole.test_imports import ROOT, imported
 
 EXACT = 1e-10

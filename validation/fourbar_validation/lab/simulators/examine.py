@@ -15,8 +15,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.compare.tolerance import find_error, magnitude
-from fourbar_validation.lab.simulators.releases import LOOK
-from fourbar_validation.run.elsewhere import run_to_end, start_harness
+from fourbar_validation.engines.processes import run_to_end, start_harness
 
 SIMULATORS = {
     "mujoco_c": ("MuJoCo", "mujoco"),
@@ -37,6 +36,8 @@ NOT_EXAMINED = {
     "DART": "dartpy 6.20 gives the joints' wrenches and no force of the closing constraint; not read here",
 }
 """What could be examined and is not."""
+LOOK = "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or sys.exit(1)"
+"""For an interpreter: fails where a module is not installed."""
 TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
 
 

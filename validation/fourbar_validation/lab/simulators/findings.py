@@ -1,4 +1,4 @@
-"""`findings`: each finding's script where its simulator is, or under given releases."""
+"""`findings`: each finding's script where its simulator is, in an environment that has it."""
 
 import ast
 import re
@@ -11,9 +11,9 @@ from textwrap import dedent
 import click
 
 from fourbar.errors import DependencyError, InputError
-from fourbar_validation.lab.simulators.releases import CACHE, LOOK, install_version
+from fourbar_validation.engines.processes import Ended, run_to_end
+from fourbar_validation.lab.simulators.examine import LOOK
 from fourbar_validation.places import CHECKOUT
-from fourbar_validation.run.elsewhere import Ended, run_to_end
 
 FOLDER = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
 FIELDS = ("Engine", "With", "Expected", "Found", "Since", "Until", "Reported")
@@ -39,13 +39,6 @@ class Reproduction:
     def run(self, python: Path, seconds: float) -> str:
         """Run the script: "holds", "mended" or why it could not run."""
         return read_outcome(run_to_end([python, self.script], seconds=seconds))
-
-    def under(self, release: str, cache: Path, seconds: float) -> str:
-        """Run the script under one release, installed by itself."""
-        name, module = self.engine
-        more = [part.format(version=release) for part in self.fields.get("With", "").split(", ") if part]
-        python, why = install_version(name, module, release, cache, more)
-        return why if python is None else self.run(python, seconds)
 
 
 def read_outcome(done: Ended) -> str:
@@ -94,23 +87,13 @@ def run_findings(pythons: Sequence[Path], seconds: float) -> list[tuple[Reproduc
 @click.command()
 @click.argument("scripts", nargs=-1, type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("--python", "pythons", type=click.Path(path_type=Path), multiple=True, help="An environment (repeat).")
-@click.option("--release", "releases", multiple=True, metavar="VERSION", help="Of one script's engine (repeat).")
-@click.option("--cache", type=click.Path(path_type=Path), default=CACHE, help="Where releases are installed.")
 @click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each script.")
-def command(
-    scripts: tuple[Path, ...], pythons: tuple[Path, ...], releases: tuple[str, ...], cache: Path, time_limit: float
-) -> None:
-    """Run the scripts of docs/findings where their simulators are, or one of them under given releases."""
-    if releases and len(scripts) != 1:
-        raise InputError("--release", ", ".join(releases), "needs one SCRIPT")
+def command(scripts: tuple[Path, ...], pythons: tuple[Path, ...], time_limit: float) -> None:
+    """Run the scripts of docs/findings where their simulators are."""
     chosen = [read(script) for script in scripts]
     for finding in chosen:
         if "Engine" not in finding.fields:
             raise InputError("SCRIPT", str(finding.script), "has no line 'Engine: NAME (MODULE)' in its docstring")
-    if releases:
-        for release in releases:
-            click.echo(f"{chosen[0].engine[0]} {release}: {chosen[0].under(release, cache, time_limit)}")
-        return
     found = run_findings([Path(sys.executable), *(path.absolute() for path in pythons)], time_limit)
     wanted = {finding.script.resolve() for finding in chosen} or {each.script for each, _ in found}
     for finding, state in found:

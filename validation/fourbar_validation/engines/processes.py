@@ -1,4 +1,4 @@
-"""Other processes: the same suite under another Python (what does upgrading an engine change for my linkages?)."""
+"""Other programs, run to their end."""
 
 import os
 import subprocess
@@ -6,15 +6,8 @@ from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from fourbar.errors import FAILED, HOLDS, DependencyError, InputError
 from fourbar_validation.compare.rows import write_one_line
 from fourbar_validation.places import import_path
-
-NEEDS = "numpy, pint, click, rich, jinja2, pebble, filelock, pyarrow and the engines"
-
-
-class ElsewhereError(DependencyError):
-    """The other environment could not run the suite."""
 
 
 class Ended(NamedTuple):
@@ -63,24 +56,3 @@ def start_harness(line: Sequence[object], **how: Any) -> Ended:
     """Run an interpreter that is to find this code, wherever it lies; for `how` see `run_to_end`."""
     with import_path() as path:
         return run_to_end(line, variables={"PYTHONPATH": path}, **how)
-
-
-def run_elsewhere(python: Path, arguments: Sequence[str], out: Path) -> Path:
-    """Run `run` of this code under another interpreter; the folder of its results.
-
-    Raises InputError where there is no such interpreter, ElsewhereError where it does not get
-    through the suite (comparisons that fail are results, not an error).
-    """
-    if not python.is_file():
-        raise InputError("--python", str(python), "must be a Python interpreter, such as .venv-old/bin/python")
-    results = out / "results.csv"
-    results.unlink(missing_ok=True)  # of an earlier run; what is there afterwards is of this one
-    command = [python.absolute(), "-m", "fourbar_validation", "run", *arguments, "--out", out.absolute()]
-    try:
-        done = start_harness(command, fine=(HOLDS, FAILED))
-    except OSError as error:
-        raise InputError("--python", str(python), f"cannot be run: {error.strerror}") from None
-    if done.failed or not results.is_file():
-        reason = done.last.removeprefix("error: ")
-        raise ElsewhereError(f"{python}: the suite did not run there: {reason} (it needs {NEEDS})")
-    return out

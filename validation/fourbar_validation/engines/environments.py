@@ -1,0 +1,130 @@
+"""Engines in environments of their own: engines.toml says what pip installs, and which adapter or command answers."""
+
+import hashlib
+import os
+import re
+import shutil
+import sys
+import sysconfig
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import requires
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock
+
+from fourbar.errors import DependencyError, InputError
+from fourbar.writing import write_text
+from fourbar_validation.engines.guests import Guest, Program, name_guests, serve
+from fourbar_validation.engines.processes import run_to_end
+from fourbar_validation.engines.witnesses import Witness
+
+FILE = "engines.toml"
+CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-engines"
+HELD = ("tolerance", "expected", "positions", "through_time", "predictor", "residuals", "nearby", "stated")
+"""What an adapter of ours is held to, in whatever environment."""
+DONE = "installed"
+"""In the folder of an environment that is complete."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One table of engines.toml."""
+
+    name: str
+    adapter: str = ""
+    """One of our adapters, or module:Class."""
+    command: tuple[str, ...] = ()
+    """Command line of a foreign program, which takes the adapter's place."""
+    requires: tuple[str, ...] = ()
+    """What pip installs."""
+    python: str = ""
+    """Another interpreter than this one."""
+
+
+def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
+    """Read engines.toml of these folders and of the package, by name; InputError for what is no entry."""
+    result: dict[str, Entry] = {}
+    for file in dict.fromkeys(folder / FILE for folder in (*folders, Path(__file__).parent)):
+        if not file.is_file():
+            continue
+        try:
+            tables = tomllib.loads(file.read_text(encoding="utf-8")).get("engine", [])
+        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise InputError("engine", None, f"is no TOML: {error}", str(file)) from None
+        for table in tables:
+            entry = _read_entry(file, table)
+            result.setdefault(entry.name, entry)
+    return result
+
+
+def _read_entry(file: Path, table: object) -> Entry:
+    texts, lists = ("name", "adapter", "python"), ("command", "requires")
+    if not isinstance(table, dict) or not table.get("name"):
+        raise InputError("engine", table, "must be a table [[engine]] with a name", str(file))
+    for key, value in table.items():
+        fits = isinstance(value, list) and all(isinstance(part, str) for part in value)
+        if key not in (*texts, *lists) or not (fits if key in lists else isinstance(value, str)):
+            allowed = f"allowed: {', '.join(texts)} (texts), {', '.join(lists)} (lists of texts)"
+            raise InputError(f"engine.{key}", value, allowed, str(file))
+    if bool(table.get("adapter")) == bool(table.get("command")):
+        raise InputError("engine", table["name"], "must have an adapter or a command", str(file))
+    stated: dict[str, Any] = {key: tuple(value) if key in lists else value for key, value in table.items()}
+    return Entry(**stated)
+
+
+def make_environment(entry: Entry, cache: Path = CACHE) -> str:
+    """Return the interpreter of an engine's environment, which is made once; DependencyError where pip fails.
+
+    With this Python all else comes from the environment that runs here; another gets what the harness needs as well.
+    """
+    if not entry.requires and not entry.python:
+        return sys.executable
+    python = shutil.which(entry.python) if entry.python else sys.executable
+    if python is None:
+        raise DependencyError(f"{entry.name}: no {entry.python} is found")
+    own = [text for text in requires("fourbar") or [] if "extra ==" not in text] if entry.python else []
+    wanted = [*entry.requires, *own]
+    key = hashlib.sha256(repr((python, sys.version_info[:2], sys.prefix, wanted)).encode()).hexdigest()[:12]
+    folder = cache / f"{re.sub(r'[^a-zA-Z0-9.]+', '-', entry.name)}-{key}"
+    inside = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    cache.mkdir(parents=True, exist_ok=True)
+    with FileLock(f"{folder}.lock"):
+        if not (folder / DONE).is_file():
+            pip = [sys.executable, "-m", "pip", "--python", inside, "--disable-pip-version-check", "install", *wanted]
+            for line in ([python, "-m", "venv", "--clear", "--without-pip", folder], pip):
+                if why := run_to_end(line).why:
+                    raise DependencyError(f"{entry.name}: its environment cannot be made: {why}")
+            if not entry.python:
+                (site,) = folder.rglob("site-packages")
+                ours = dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib"))
+                lines = [f"import site; site.addsitedir({path!r})\n" for path in ours]
+                write_text(site / "zz_of_the_harness.pth", "".join(lines))  # read after all others
+            (folder / DONE).touch()
+    return str(inside)
+
+
+def start_engines(
+    entries: Sequence[Entry], witnesses: Sequence[Witness], seconds: float | None = None
+) -> tuple[Guest, ...]:
+    """Make the environments of engines and read each hello; an adapter of ours is held to what it is held to here."""
+    programs = []
+    for entry in entries:
+        python = make_environment(entry)
+        if entry.adapter:
+            programs.append((entry.adapter, entry.name, serve(entry.adapter, seconds, python)))
+        else:
+            program = shutil.which(entry.command[0], path=f"{Path(python).parent}{os.pathsep}{os.environ.get('PATH')}")
+            if program is None:
+                raise InputError("engine.command", entry.command[0], "no such program", FILE)
+            programs.append((entry.name, entry.name, Program((program, *entry.command[1:]), seconds)))
+    held = {witness.name: witness for witness in witnesses}
+    guests = zip(entries, name_guests(programs, held), strict=True)
+    return tuple(
+        replace(guest, **{name: getattr(held[entry.adapter], name) for name in HELD})
+        if entry.adapter in held
+        else guest
+        for entry, guest in guests
+    )
