@@ -55,7 +55,7 @@ JUDGED_BY = {
     "transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
     "validation/engines/test_engines.py": "validation/engines: ball_drive ball_vectors balls description "
-    "drake exudyn exudyn_elements limits loaded loop opensim pinocchio prediction tree witnesses; "
+    "limits loaded loop pinocchio prediction tree witnesses; lab/engines: drake exudyn exudyn_elements opensim; "
     "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
     "validation/engines/test_guests.py": "validation: engine; validation/engines: keeper output processes workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects free_body_stroke",

@@ -16,9 +16,10 @@ from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import COLUMNS, FORMULAS, IDENTITIES, Row
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES
 from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
-from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, WORK
+from fourbar_validation.engines.witnesses import WITNESSES, WORK
 from fourbar_validation.regression.change import WHOLE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.answers import check_statements

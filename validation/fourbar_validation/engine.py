@@ -19,9 +19,10 @@ from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer, explain_refusal
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.engines import protocol
+from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.guests import NOT_FOUND
 from fourbar_validation.engines.hard_suite import BALLS
-from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
+from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.report.machine import DISTRIBUTIONS
 
 ALL_BUT_CYLINDER = (*(getattr(effects, name).key for name in effects.FILE_OF), "loads", "drive")

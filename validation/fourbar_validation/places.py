@@ -31,7 +31,7 @@ def import_path() -> Iterator[str]:
     """PYTHONPATH for another interpreter: it finds this code there, and no library of this environment."""
     rest = filter(None, [os.environ.get("PYTHONPATH")])
     if CHECKOUT is not None:
-        yield os.pathsep.join([str(CHECKOUT), str(PACKAGE.parent), *rest])
+        yield os.pathsep.join([str(CHECKOUT), str(PACKAGE.parent), str(CHECKOUT / "lab"), *rest])
         return
     with TemporaryDirectory(prefix="fourbar-") as folder:
         for package in (FORMULAS, PACKAGE):

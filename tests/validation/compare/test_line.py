@@ -12,8 +12,9 @@ from fourbar.effects import LinearDrive, SpringEnd
 from fourbar.scene import Scene
 from fourbar_validation.compare.rows import AGREES, FAILS
 from fourbar_validation.engines.exact import BallArithmetic
+from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.guests import Asked, Hello, Program
-from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, Witness
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 

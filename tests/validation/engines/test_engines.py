@@ -22,10 +22,11 @@ from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, K
 from fourbar_validation.engines import loop
 from fourbar_validation.engines.effects import TERM_OF
+from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
 from fourbar_validation.engines.tree import solve_closed
-from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
+from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
@@ -266,7 +267,7 @@ def test_the_floor_of_mujoco_is_where_it_is_stated_to_be() -> None:
 @pytest.mark.parametrize("name", present("opensim-constraints"))
 def test_simbody_loses_a_constraint_where_the_limit_says(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bars 3 and 4 nearly in one line: just inside the limit it is exact, well beyond it the force is lost."""
-    from fourbar_validation.engines import opensim
+    from fourbar_lab.engines import opensim
 
     linkage = with_bar(2, mass=0.2).linkage
     linkage = replace(linkage, input=Bar(0.25, 0.2), coupler=Bar(0.22, 0.5), output=Bar(0.3, 0.4))
@@ -434,7 +435,7 @@ def test_a_fault_in_a_row_shows_but_where_an_engine_has_its_own(
 
 @pytest.mark.parametrize("name", present("exudyn-constraints"))
 def test_a_fault_in_an_element_of_exudyn_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from fourbar_validation.engines.exudyn_elements import ELEMENT_OF
+    from fourbar_lab.engines.exudyn_elements import ELEMENT_OF
 
     assert ELEMENT_OF.keys() == OWN[name]
     for key in OWN[name]:

@@ -22,7 +22,8 @@ from fourbar.files import save
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES
 from fourbar_validation.engines import guests
-from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
+from fourbar_validation.engines.further import FURTHER
+from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.run.selection import select_scenes

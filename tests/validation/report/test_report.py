@@ -16,7 +16,8 @@ import pytest
 import fourbar
 from fourbar_validation.compare.rows import FAILS, Row, write_rows
 from fourbar_validation.engines import guests
-from fourbar_validation.engines.witnesses import FURTHER, WITNESSES
+from fourbar_validation.engines.further import FURTHER
+from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.report import colours
 from fourbar_validation.report.colours import choose_style
 from fourbar_validation.report.costs import collect_cost_points

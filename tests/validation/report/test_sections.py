@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
+from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard
-from fourbar_validation.engines.witnesses import FURTHER, WORK
+from fourbar_validation.engines.witnesses import WORK
 from fourbar_validation.report.costs import draw_costs
 from fourbar_validation.report.html import write_html
 from fourbar_validation.report.sections import LARGEST, collect_hard_cases, collect_sections

@@ -53,6 +53,8 @@ class Witness:
     tolerance it can answer again within the rounding of theta_2."""
     stated: bool = True
     """Whether an exact engine is held to what the formulas state of the linkage too, whatever its motion."""
+    code: str = ""
+    """Hash of an adapter that the harness does not ship, so that no answer of another one is resumed."""
     library: str = ""
     """The module that its adapter imports, nothing: it needs no more than the formulas."""
 
@@ -161,24 +163,6 @@ def _observe_order_of_simulation(
     return observe_order(scene, at, error)
 
 
-def _make_exudyn() -> Engine:
-    from fourbar_validation.engines.exudyn import ExudynConstraints
-
-    return ExudynConstraints()
-
-
-def _make_opensim() -> Engine:
-    from fourbar_validation.engines.opensim import OpenSimConstraints
-
-    return OpenSimConstraints()
-
-
-def _make_drake() -> Engine:
-    from fourbar_validation.engines.drake import DrakeInverse
-
-    return DrakeInverse()
-
-
 WITNESSES = (
     Witness("pinocchio-inverse", _make_pinocchio, EQUIVALENCE, predictor=predict_in_world_axes, library="pinocchio"),
     Witness("mujoco-inverse", _make_mujoco, EQUIVALENCE, predictor=predict_about_mass_centre, library="mujoco"),
@@ -202,12 +186,6 @@ WITNESSES = (
         predictor=predict_from_data,
     ),
 )
-FURTHER = (
-    Witness("exudyn-constraints", _make_exudyn, EQUIVALENCE, predictor=predict_in_world_axes, library="exudyn"),
-    Witness("opensim-constraints", _make_opensim, EQUIVALENCE, predictor=predict_in_world_axes, library="opensim"),
-    Witness("drake-inverse", _make_drake, EQUIVALENCE, predictor=predict_in_world_axes, library="pydrake"),
-)
-"""Engines with extras of their own: they join a run where they are installed, and where they are named."""
 
 
 def make_prediction(witness: Witness, scene: Scene, at: Command, answer: Answer) -> Predicted | None:

@@ -5,9 +5,10 @@ from pathlib import Path
 
 from fourbar.errors import DependencyError, InputError
 from fourbar_validation.engines.environments import read_engines, start_engines
+from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.guests import Guest, read_guests
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard, hold_fully
-from fourbar_validation.engines.witnesses import FURTHER, WITNESSES, Witness
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
 from fourbar_validation.scenes.suites import Random, Suite, read_default_suite, read_scene_files, read_suite
 

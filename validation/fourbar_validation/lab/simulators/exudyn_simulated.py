@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.errors import LimitError
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import Scene
-from fourbar_validation.engines.exudyn import JOINTS, SIZE, ExudynBars
+from fourbar_lab.engines.exudyn import JOINTS, SIZE, ExudynBars
 from fourbar_validation.lab.simulators.motion import Instant, Readings, start, turn
 
 VERSION = version("exudyn")

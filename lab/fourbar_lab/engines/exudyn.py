@@ -29,10 +29,10 @@ from exudyn.itemInterface import (
 from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Scene
+from fourbar_lab.engines.exudyn_elements import ELEMENT_OF, Bodies
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import ON_BARS, POINTS, find_unknown, list_parts, place, reduce_angle
 from fourbar_validation.engines.effects import TERM_OF, list_acting
-from fourbar_validation.engines.exudyn_elements import ELEMENT_OF, Bodies
 from fourbar_validation.engines.loaded import Loaded, Values
 from fourbar_validation.engines.loop import Exact
 

@@ -1,0 +1,47 @@
+"""Engines that join a run where they are installed: Exudyn, OpenSim and Drake, each imported by its adapter alone."""
+
+import hashlib
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from fourbar_validation.compare.answer import Engine
+from fourbar_validation.compare.tolerance import EQUIVALENCE
+from fourbar_validation.engines.prediction import predict_in_world_axes
+from fourbar_validation.engines.witnesses import Witness
+
+
+def make_exudyn() -> Engine:
+    """Start Exudyn."""
+    from fourbar_lab.engines.exudyn import ExudynConstraints
+
+    return ExudynConstraints()
+
+
+def make_opensim() -> Engine:
+    """Start OpenSim."""
+    from fourbar_lab.engines.opensim import OpenSimConstraints
+
+    return OpenSimConstraints()
+
+
+def make_drake() -> Engine:
+    """Start Drake."""
+    from fourbar_lab.engines.drake import DrakeInverse
+
+    return DrakeInverse()
+
+
+def _hash_adapters() -> str:
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+_exact: Callable[..., Witness] = partial(
+    Witness, tolerance=EQUIVALENCE, predictor=predict_in_world_axes, code=_hash_adapters()
+)
+EXUDYN = _exact("exudyn-constraints", make_exudyn, library="exudyn")
+OPENSIM = _exact("opensim-constraints", make_opensim, library="opensim")
+DRAKE = _exact("drake-inverse", make_drake, library="pydrake")

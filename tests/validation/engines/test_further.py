@@ -1,0 +1,49 @@
+"""Engines of the lab join a run where it is installed; no other distribution adds one."""
+
+from importlib.metadata import Distribution, PackageNotFoundError
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fourbar_validation.engines import further
+from fourbar_validation.engines.witnesses import Witness
+from tests.whole.test_imports import ROOT
+
+
+def installed(folder: Path, name: str, entries: str) -> None:
+    info = folder / f"{name.replace('-', '_')}-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(entries)
+
+
+@pytest.fixture
+def only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that has all distributions."""
+
+    def find(name: str) -> Any:
+        for one in Distribution.discover(path=[str(tmp_path)]):
+            if one.metadata["Name"] == name:
+                return one
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(further, "distribution", find)
+    return tmp_path
+
+
+NAMES = ["exudyn-constraints", "opensim-constraints", "drake-inverse"]
+
+
+def test_the_lab_alone_adds_engines(only: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert [each.name for each in further.load_further()] == NAMES  # of the checkout, where it lies on the path
+    monkeypatch.setattr(further, "CHECKOUT", None)
+    assert further.load_further() == ()
+    installed(only, "stranger", "[fourbar.engines]\nmine = os:abort\n")
+    assert further.load_further() == ()
+    project = (ROOT / "lab" / "pyproject.toml").read_text()
+    lines = project.partition('entry-points."fourbar.engines"]')[2].partition("[")[0].replace('"', "").splitlines()[1:]
+    installed(only, "fourbar-lab", "[fourbar.engines]\n" + "\n".join(lines) + "\n[other]\nmine = os:abort\n")
+    found = further.load_further()
+    assert [each.name for each in found] == NAMES
+    assert all(isinstance(each, Witness) and each.code in each.fingerprint() and each.code for each in found)
