@@ -50,7 +50,7 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
 
     Each length has a unit, like 300mm; or --unit mm is the unit of all.
     """
-    from fourbar.files.new import write_new_scene
+    from fourbar.files.scene_text import write_new_scene
     from fourbar.writing import write_text
 
     if (file is None) == (out is None):

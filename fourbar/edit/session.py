@@ -21,10 +21,9 @@ from fourbar.edit.exports import Exports
 from fourbar.edit.reply import evaluate_scene
 from fourbar.errors import FourBarError, InputError
 from fourbar.files import loads, read_text
-from fourbar.files.new import write_new_scene
 from fourbar.files.reading import read_bytes
 from fourbar.files.scene_file import LARGEST_FILE
-from fourbar.files.scene_text import BRANCHES
+from fourbar.files.scene_text import BRANCHES, write_new_scene
 from fourbar.linkage import BAR_NAMES
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Scene

@@ -8,8 +8,7 @@ import numpy as np
 
 from fourbar.effects.actions import Actions
 from fourbar.effects.cones import NONE, ONE, compute_step, solve_sliding
-from fourbar.effects.effect import SolvedFriction
-from fourbar.effects.pins import PinRows
+from fourbar.effects.effect import PinRows, SolvedFriction
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import is_any, make_like
 from fourbar.formulas.longer import shorten

@@ -4,7 +4,7 @@ from dataclasses import MISSING, fields
 from typing import TYPE_CHECKING, Any
 
 from fourbar import effects as kinds
-from fourbar.effects.pins import PinRows
+from fourbar.effects.effect import PinRows
 from fourbar.effects.spring import AT, GAS
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader, write_declared, write_numbers, write_polar

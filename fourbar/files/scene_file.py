@@ -18,14 +18,15 @@ from fourbar.files import reading
 from fourbar.files.effects import read_effect, read_ends
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.pictures import Picture
-from fourbar.files.scene_text import BARS, BRANCHES
-from fourbar.files.tolerances import read_tolerances
-from fourbar.linkage import BAR_NAMES, MOST_STEPS, POSITIVE, Bar, FourBar
+from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
+from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, Free, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import COMMANDS, ENDS, Law
+from fourbar.scene.numbers import Tolerance
 from fourbar.scene.point import Point
 from fourbar.solution import Array
+from fourbar.studies.keys import COMMAND_KEYS, LEFT_OUT, is_left_out, list_entries, read_place, refuse_key
 
 LARGEST_FILE = 500_000
 """Bytes; a scene takes about a thousand."""
@@ -120,7 +121,7 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         _read_points(read, top.get("points", {})),
         drive=line,
     )
-    return replace(scene, tolerances=read_tolerances(read, scene, top.get("tolerances", {})))
+    return replace(scene, tolerances=_read_tolerances(read, scene, top.get("tolerances", {})))
 
 
 def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
@@ -249,3 +250,41 @@ def _load(read: Reader, key: str, value: object) -> Load:
         frame=read.choice(f"{key}.frame", entry.get("frame", "world"), ("world", "bar")),
         table=table,
     )
+
+
+def _read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Tolerance, ...]:
+    """``"lengths.input" = "0.05 mm"`` (plus or minus) or ``["0.02 mm", "sigma"]``."""
+    known, found = list_entries(scene), []
+    for key, given in _flatten(read, value).items():
+        name = f'tolerances."{key}"'
+        if key in COMMAND_KEYS:
+            raise read.refuse(name, given, "is what is commanded, and is held; its speed and acceleration may scatter")
+        if key not in known:
+            raise read.refuse(name, given, refuse_key(key, given, list(known)).allowed)
+        entry, sigma = known[key], isinstance(given, list)
+        if sigma and (len(given) != 2 or given[1] != SIGMA):
+            raise read.refuse(name, given, f'must be like "0.05 {entry.unit}" or ["0.02 {entry.unit}", "{SIGMA}"]')
+        width = given[0] if sigma else given
+        if is_left_out(scene, entry):
+            raise read.refuse(name, width, LEFT_OUT)
+        own = read.quantity(name, width, entry.unit, POSITIVE)
+        if own <= 0.0:
+            raise read.refuse(name, width, "must be > 0")
+        tolerance, number = Tolerance(key, own, sigma), read_place(scene, entry.place)
+        if number is None:
+            raise read.refuse(name, width, "belongs to a number that the scene does not state")
+        if entry.bound != ANY and tolerance.reach >= number:
+            three = "three sigma of it " if sigma else ""
+            raise read.refuse(name, width, f"{three}must be less than the number itself, {number:.6g} {entry.unit}")
+        found.append(tolerance)
+    return tuple(found)
+
+
+def _flatten(read: Reader, value: object, before: str = "") -> dict[str, Any]:
+    """Flatten a table to full keys, whether these are quoted or dotted."""
+    if not isinstance(value, dict):
+        raise read.refuse("tolerances", value, 'must be a table of keys like "lengths.input" = "0.05 mm"')
+    found: dict[str, Any] = {}
+    for key, entry in value.items():
+        found |= _flatten(read, entry, f"{before}{key}.") if isinstance(entry, dict) else {f"{before}{key}": entry}
+    return found

@@ -2,7 +2,9 @@
 
 import json
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
@@ -10,15 +12,17 @@ import numpy as np
 from fourbar.effects import Load
 from fourbar.errors import InputError, expect
 from fourbar.files.effects import write_effect, write_ends
-from fourbar.files.fields import write_numbers, write_quantity
-from fourbar.files.tolerances import write_tolerances
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar
+from fourbar.files.fields import Reader, write_numbers, write_quantity
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import Law
+from fourbar.studies.keys import list_entries
 from fourbar.writing import write_text
 
 BRANCHES = {name: branch for branch, name in BRANCH_NAMES.items()}
+SIGMA = "sigma"
+"""Word of a tolerance that is a standard deviation."""
 BARS = {BAR_NAMES[number]: number for number in MOVING_BARS}
 
 
@@ -55,7 +59,7 @@ def dump(scene: Scene) -> str:
         ("points", points),
         *(("[loads]", load) for load in described["loads"]),
         ("effects", described["effects"]),
-        ("tolerances", write_tolerances(scene)),
+        ("tolerances", _write_tolerances(scene)),
     ]
     return "\n".join(_write_table(name, entries) for name, entries in tables if entries)
 
@@ -152,3 +156,28 @@ def _write_value(key: str, value: object) -> str:
     except UnicodeEncodeError:
         raise InputError(key, value, "must be valid Unicode text") from None
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _write_tolerances(scene: Scene) -> dict[str, Any]:
+    """Write the table of tolerances."""
+    known, rows = list_entries(scene), dict[str, Any]()
+    for tolerance in scene.tolerances:
+        if tolerance.key not in known:
+            raise InputError("tolerances", tolerance.key, "is no number of the scene")
+        width = write_quantity(tolerance.width, known[tolerance.key].unit)
+        rows[tolerance.key] = [width, SIGMA] if tolerance.sigma else width
+    return rows
+
+
+def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
+    """Write a scene file for four lengths (ground, input, coupler, output), each with its unit, as it was given.
+
+    Raises InputError for what is no length, and for bars that cannot close.
+    """
+    read = Reader("--lengths")
+    given = [(name, " ".join(text.split())) for name, text in zip(BAR_NAMES.values(), lengths, strict=True)]
+    d, a, b, c = (read.quantity(name, text, "m", POSITIVE) for name, text in given)
+    FourBar(d, Bar(a), Bar(b), Bar(c))
+    lines = "\n".join(f'{name} = "{text}"' for name, text in given)
+    text = files("fourbar.files").joinpath("new.toml").read_text(encoding="utf-8")
+    return Template(text).substitute(lengths=lines, input=repr(a), coupler=repr(b), output=repr(c))

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import Number, cross, sine
-from fourbar.formulas.circuits import circuits
-from fourbar.formulas.mobility import TURN, Array, change_points, follow_smooth_path, turns_fully
+from fourbar.formulas.mobility import TURN, Array, change_points, circuits, follow_smooth_path, turns_fully
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import compute_state
 from fourbar.linkage import A_BRANCH, MOST_STEPS, FourBar, require, require_bar, require_numbers, require_whole

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from fourbar.effects.pins import PinRows
+from fourbar.effects.effect import PinRows
 from fourbar.errors import InputError, LimitError, NotAssembledError, clean_line
 from fourbar.formulas.mobility import change_points, choose_range
 from fourbar.linkage import MOVING_BARS, FourBar

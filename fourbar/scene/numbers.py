@@ -1,11 +1,17 @@
-"""The unit of every number of a scene, by its key: each is declared where it belongs, as `numbers` of its class."""
+"""The numbers of a scene by their keys: the unit of each, declared where it belongs, and tolerances."""
+
+import math
+from dataclasses import dataclass
 
 from fourbar import effects
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, Declared, FourBar
+from fourbar.errors import InputError, expect
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, POSITIVE, Bar, Declared, FourBar, require
 from fourbar.scene.motion import OF_STROKE
 from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.point import Point
 
+THREE_SIGMA = 3.0
+"""What counts as the width of a normal distribution in a worst case."""
 OF_MOTION = {
     name: Declared(f"{unit}{per}")
     for unit, commands in (("rad", COMMANDS.values()), ("m", [OF_STROKE]))
@@ -29,3 +35,38 @@ def find_unit(key: str) -> str | None:
     part = names.pop() if names and names[-1] in ("0", "1") else ""
     stated = numbers.get(names[-1] if names else "", numbers.get(""))
     return None if stated is None else "rad" if part == "1" else stated.unit
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """How far one number of a scene may be off.
+
+    Parameters
+    ----------
+    key : of the number, as in the scene file, pairs and lists by index.
+    width : in its SI unit or a text like "0.1 mm", > 0: plus or minus, evenly distributed, or the standard deviation
+        of a normal distribution.
+    sigma : whether it is that.
+    """
+
+    key: str
+    width: float
+    sigma: bool = False
+
+    def __post_init__(self) -> None:
+        expect("tolerances", self.key, str)
+        unit = find_unit(self.key)
+        if unit is None and isinstance(self.width, str):
+            raise InputError(f"tolerances.{self.key}", self.width, "unknown key")
+        object.__setattr__(self, "width", require(f"tolerances.{self.key}", self.width, unit or "1", POSITIVE))
+        expect(f"tolerances.{self.key}", self.sigma, bool)
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation."""
+        return self.width if self.sigma else self.width / math.sqrt(3.0)
+
+    @property
+    def reach(self) -> float:
+        """The largest change that a worst case counts with."""
+        return THREE_SIGMA * self.width if self.sigma else self.width

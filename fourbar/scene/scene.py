@@ -12,8 +12,8 @@ from fourbar.formulas.mobility import MARGIN, choose_range, find_limit_angles, f
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import COMMANDS
+from fourbar.scene.numbers import Tolerance
 from fourbar.scene.point import Point
-from fourbar.scene.tolerance import Tolerance
 from fourbar.solution import Array
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ any position.
 import cmath
 from typing import Any, NamedTuple
 
-from fourbar.effects.pins import PinRows
+from fourbar.effects.effect import PinRows
 from fourbar.linkage import FIRST_PIN
 from fourbar.scene import Scene
 

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from fourbar.effects.actions import Actions, list_bodies
 from fourbar.errors import NotAssembledError
 from fourbar.evaluation.case import Case
-from fourbar.formulas.circuits import circuits, find_circuit
 from fourbar.formulas.closed_curve import on_curve, transmission
-from fourbar.formulas.mobility import TURN, change_points, turns_fully
+from fourbar.formulas.mobility import TURN, change_points, circuits, find_circuit, turns_fully
 from fourbar.formulas.motion import State
 from fourbar.formulas.position import loop
 from fourbar.scene import Command, Scene, command

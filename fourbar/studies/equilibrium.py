@@ -9,6 +9,7 @@ Source: R. L. Norton, Design of Machinery, ch. 11 (virtual work); L. Meirovitch,
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -17,20 +18,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import expect
-from fourbar.formulas.circuits import Circuit, circuits
 from fourbar.formulas.closed_curve import on_curve, transmission
-from fourbar.formulas.mobility import MARGIN, TURN, choose_range, turns_fully
+from fourbar.formulas.mobility import MARGIN, TURN, Circuit, choose_range, circuits, turns_fully
 from fourbar.formulas.position import Loop
 from fourbar.formulas.torque import inertia
-from fourbar.quantities import NOT_ASSEMBLED, SINGULAR
+from fourbar.quantities import JAMMED, NOT_ASSEMBLED, SINGULAR
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import DEFAULT_STEPS
 from fourbar.solution import Array, Solution
 from fourbar.solve import solve
-from fourbar.studies.circuit_curve import SAMPLES, CircuitCurve, RestPosition, compute_generalised_force, of_input
+from fourbar.studies.circuit_curve import (
+    NOTHING,
+    SAMPLES,
+    CircuitCurve,
+    RestPosition,
+    compute_generalised_force,
+    of_input,
+)
 from fourbar.studies.derivatives import make_differentiable
-from fourbar.studies.holding import HALVINGS, CircuitRange, holds, is_inside, list_ranges, moves
-from fourbar.studies.interval import KNOWN
+from fourbar.studies.enclosure import PROVABLE
 from fourbar.studies.keys import is_left_out, list_entries, read_place, replace_numbers
 from fourbar.studies.sloped import Sloped
 from fourbar.studies.zeros import AT_CHANGE_POINT, Zeros, find_zeros
@@ -41,6 +47,22 @@ STILL = 1e-3
 """Where bar 2 turns by less than this of bar 4 it stands at a limit, and theta_4 takes its place."""
 A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
+
+
+HALVINGS = 60
+"""Of the distance between two samples: to its last digits."""
+
+
+class _CircuitRange(NamedTuple):
+    """A part of a row of the circuit."""
+
+    ends: tuple[RestPosition, RestPosition]
+    row: int
+    low: float
+    """Where it begins, and how far it goes, rad of the row's own angle."""
+    width: float
+    samples: int
+    """How many are in it."""
 
 
 class Equilibrium(NamedTuple):
@@ -95,7 +117,7 @@ def equilibrium(scene: Scene) -> Equilibria:
     expect("scene", scene, Scene)
     with np.errstate(all="ignore"):
         curve = CircuitCurve(scene)
-        level = [each for each in list_ranges(curve, curve.level, np.empty((0, 2))) if each.samples > A_RANGE]
+        level = [each for each in _list_ranges(curve, curve.level, np.empty((0, 2))) if each.samples > A_RANGE]
         samples = curve.samples()
         idle = curve.level(samples)
         result = Zeros(np.empty((0, 2)), np.empty((0, 2)), True)
@@ -103,18 +125,18 @@ def equilibrium(scene: Scene) -> Equilibria:
             proof = _prove_zeros(curve, samples[idle])
             result = proof if proof is not None and proof.complete else _find_sign_changes(curve, samples)
         points = curve.sorted(np.concatenate([result.found, result.undecided]))
-        held: list[CircuitRange] = []
+        held: list[_CircuitRange] = []
         if any(term.dry_pins for term in curve.case.terms):
-            held = list_ranges(curve, partial(holds, curve), points)
+            held = _list_ranges(curve, partial(_holds, curve), points)
         found = []
         for point in points:
             undecided = any(np.array_equal(point, each) for each in result.undecided)
-            around = next((each.ends for each in held if is_inside(curve, point, each)), None)
+            around = next((each.ends for each in held if _is_inside(curve, point, each)), None)
             found.append(_describe(curve, point, around, undecided=undecided))
         singular = tuple(curve.place(np.array(point)) for point in curve.singular)
         positions = _solve_at_rest(scene, curve.circuit)
         psi = positions.theta_2 - curve.theta_1
-        sense = moves(curve, np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1))
+        sense = _moves(curve, np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1))
         sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
         flat, ends = (tuple(each.ends for each in of) for of in (level, held))
         return Equilibria(tuple(found), flat, result.complete, singular, ends, positions, sense)
@@ -170,22 +192,31 @@ def _find_sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
 
 
 def _prove_zeros(curve: CircuitCurve, idle: Array) -> Zeros | None:
-    """All zeros of Q on the circuit; None where ball arithmetic or an effect's form in it is missing.
-
-    Between two change points, where signs of psi and mu tell the ways of moving apart, Q may be zero throughout: a load
-    on a bar that rests in one of them. There none is looked for.
+    """Find all zeros of Q on the circuit; None if ball arithmetic or an effect's form in it is missing.
 
     `idle`: samples in which Q is nothing.
     """
     try:
-        from flint import arb, ctx
+        from flint import ctx
     except ImportError:
         return None
-    scene = curve.scene
-    acting = tuple(term for term in scene.effects if not term.dry_pins)  # dry friction does no work at rest
-    for term in (*scene.loads, *acting):
-        if term.key not in KNOWN or getattr(term, "table", None) is not None:
+    before, ctx.prec = ctx.prec, 128
+    try:
+        force = _enclose_force(curve.scene)
+        if force is None:
             return None
+        return find_zeros(curve.ratios, force, _bound_circuit(curve), _choose_boxes(curve, idle), curve.singular)
+    finally:
+        ctx.prec = before
+
+
+def _enclose_force(scene: Scene) -> Callable[[Any, Any], Sloped] | None:
+    """Make Q of psi and mu in ball arithmetic, with its slopes by both; None if an effect has no form in it."""
+    from flint import arb
+
+    acting = tuple(term for term in scene.effects if not term.dry_pins)  # dry friction does no work at rest
+    if any(term.key not in PROVABLE or getattr(term, "table", None) for term in (*scene.loads, *acting)):
+        return None
     scene = make_differentiable(replace(scene, effects=acting))
     still = np.zeros((2, 1), dtype=object)
     numbers = {
@@ -194,34 +225,122 @@ def _prove_zeros(curve: CircuitCurve, idle: Array) -> Zeros | None:
         if not key.startswith("motion.") and not is_left_out(scene, entry)
     }
     exact = replace_numbers(scene, numbers)
-    d, a, b, c = exact.linkage.lengths
-    lengths, theta_1 = Loop(d, a, b, c, 0.0, 0.0), exact.linkage.ground_angle
-    terms = (*exact.loads, *exact.effects)
+    lengths, theta_1 = Loop(*exact.linkage.lengths, 0.0, 0.0), exact.linkage.ground_angle
+    by_psi, by_mu = (np.array(column, dtype=object) for column in ([[1], [0]], [[0], [1]]))
 
     def force(psi: Any, mu: Any) -> Sloped:
-        seeded = (Sloped(x, np.array([[i == 0], [i == 1]], dtype=object) * 1) for i, x in enumerate((psi, mu)))
-        Q: Sloped = compute_generalised_force(exact, terms, on_curve(lengths, theta_1, *seeded))
+        state = on_curve(lengths, theta_1, Sloped(psi, by_psi), Sloped(mu, by_mu))
+        Q: Sloped = compute_generalised_force(exact, (*exact.loads, *exact.effects), state)
         return Q
 
-    turn, both = (-math.pi, math.pi), len(circuits(scene.linkage)) == 1
-    psi, mu = turn, turn
-    if not both and curve.full:
-        mu = (0.0, math.pi) if curve.circuit.branches == (1,) else (-math.pi, 0.0)
-    elif not both:
-        psi = (0.0, math.pi) if 0.0 <= curve.low < math.pi else (-math.pi, 0.0)
-    signs = [np.sign(np.sin(x)) for x in (curve.samples(), idle)]
-    ways = {tuple(way) for way in signs[1]} if curve.singular else set()
-    count = [lambda way, of=each: (of == way).all(axis=1).sum() for each in signs]
-    idle_ways = [np.array(way) for way in ways if count[0](way) == count[1](way)]
+    return force
 
-    def wanted(centres: Array, radii: Array) -> NDArray[np.bool_]:
+
+def _bound_circuit(curve: CircuitCurve) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return ranges of psi and mu that hold the circuit: half a turn of one of them where there is another circuit."""
+    turn, ahead, back = (-math.pi, math.pi), (0.0, math.pi), (-math.pi, 0.0)
+    if len(circuits(curve.scene.linkage)) == 1:
+        return turn, turn
+    if curve.full:
+        return turn, ahead if curve.circuit.branches == (1,) else back
+    return ahead if 0.0 <= curve.low < math.pi else back, turn
+
+
+def _choose_boxes(curve: CircuitCurve, idle: Array) -> Callable[[Array, Array], NDArray[np.bool_]]:
+    """Make the choice of the boxes in which a zero is looked for: those within the sweep where Q may be something.
+
+    Between two change points, where signs of psi and mu tell the ways of moving apart, Q may be zero throughout: a load
+    on a bar that rests in one of them.
+    """
+    idle_ways: list[Array] = []
+    if curve.singular:
+        ways, idle_of = (np.sign(np.sin(points)) for points in (curve.samples(), idle))
+        for way in np.unique(idle_of, axis=0):
+            if (ways == way).all(axis=1).sum() == (idle_of == way).all(axis=1).sum():
+                idle_ways.append(way)
+
+    def holds_a_zero(centres: Array, radii: Array) -> NDArray[np.bool_]:
         kept = curve.inside(centres[:, 0], radii[:, 0])
+        sines = np.sin(centres)
         for way in idle_ways:
-            kept &= ~((way * np.sin(centres) > 0.0) & (np.abs(np.sin(centres)) > radii)).all(axis=1)
+            kept &= ~((way * sines > 0.0) & (np.abs(sines) > radii)).all(axis=1)
         return kept
 
-    before, ctx.prec = ctx.prec, 128
-    try:
-        return find_zeros(curve.ratios, force, (psi, mu), wanted, curve.singular)
-    finally:
-        ctx.prec = before
+    return holds_a_zero
+
+
+def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
+    """Q with what friction does against a motion that begins to one side; -inf or inf where it jams that motion."""
+    state, result = curve.state(points), np.empty(len(points))
+    along = np.abs(state.k.h2) >= np.abs(state.k.h4)  # the torque that balances Q, on the bar that turns faster
+    for bar, chosen in ((2, along), (4, ~along)):
+        if chosen.any():
+            part = curve.state(points[chosen])
+            case = curve.case._replace(drive_bar=bar, drive=None)
+            found = case.dynamics(part, 0.0, side)
+            Q = -found.drive * part.k[bar - 2]
+            result[chosen] = Q if found.status is None else np.where(found.status == JAMMED, -side * np.inf, Q)
+    return result
+
+
+def _holds(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
+    """Whether friction holds."""
+    return (_add_friction(curve, points, 1) <= 0.0) & (_add_friction(curve, points, -1) >= 0.0)
+
+
+def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
+    """How positions begin to move: +1 as theta_2 grows, -1 as it falls, 0 they stay."""
+    state = curve.state(points)
+    ahead, back = _add_friction(curve, points, 1), _add_friction(curve, points, -1)
+    level = NOTHING * curve.size(points)
+    sense = np.where(ahead > level, 1, np.where(back < -level, -1, 0))
+    return np.asarray(sense * np.sign(state.k.h2), dtype=np.int8)
+
+
+def _list_ranges(curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]], known: Array) -> list[_CircuitRange]:
+    """List the ranges within the sweep in which something holds, row by row; it holds at the points known."""
+    result = []
+    own_tau, own_row = curve.tau(known)
+    for row, branch in enumerate(curve.rows):
+
+        def there(tau: Array, branch: int = branch) -> NDArray[np.bool_]:
+            points = curve.point(tau, branch)
+            return curve.inside(points[:, 0], np.zeros(1)) & holds(points)
+
+        tau = np.concatenate([(np.arange(SAMPLES) + 0.5) * (TURN / SAMPLES), own_tau[own_row == row]])
+        order = np.argsort(tau)
+        tau, inside = tau[order], (there(tau) | (np.arange(len(tau)) >= SAMPLES))[order]
+        if inside.all():
+            first, last = curve.point(np.array([0.0, math.nextafter(TURN, 0.0)]), branch)
+            result.append(_CircuitRange((curve.place(first), curve.place(last)), row, 0.0, TURN, SAMPLES))
+            continue
+        starts, stops = (np.flatnonzero(inside & ~np.roll(inside, by)) for by in (1, -1))
+        if len(starts) and stops[0] < starts[0]:
+            stops = np.roll(stops, -1)
+        following = tau[(stops + 1) % len(tau)]
+        begin = _find_edge(there, tau[starts], np.remainder(tau[starts] - tau[starts - 1], TURN), -1.0)
+        end = _find_edge(there, tau[stops], np.remainder(following - tau[stops], TURN), 1.0)
+        for low, high, count in zip(begin, end, (stops - starts) % len(tau) + 1, strict=True):
+            one, other = (curve.place(point) for point in curve.point(np.array([low, high]), branch))
+            if curve.full and other.theta_2 < one.theta_2:
+                other = other._replace(theta_2=other.theta_2 + TURN)
+            ends = (other, one) if not curve.full and one.branch == other.branch == -1 else (one, other)
+            width = float(np.remainder(high - low, TURN))
+            result.append(_CircuitRange(ends, row, low, width, int(count)))
+    return result
+
+
+def _is_inside(curve: CircuitCurve, point: Array, of: _CircuitRange) -> bool:
+    """Whether a point lies in a range."""
+    tau, row = curve.tau(point[None])
+    return bool(row[0] == of.row and np.remainder(tau[0] - of.low, TURN) <= of.width)
+
+
+def _find_edge(held: Callable[[Array], NDArray[np.bool_]], tau: Array, gap: Array, sense: float) -> Array:
+    """Find where a range ends, between a place that is held and the next one, which is not."""
+    low, high = np.zeros(tau.shape), gap
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        inside = held(tau + sense * middle)
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    return np.asarray(np.remainder(tau + sense * low, TURN))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from fourbar.effects import Gravity, Springs
-from fourbar.effects.pins import PinRows
+from fourbar.effects.effect import PinRows
 from fourbar.effects.spring import AT
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import namespace, polar

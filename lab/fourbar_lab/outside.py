@@ -15,7 +15,7 @@ from fourbar.formulas.mobility import change_points
 from fourbar.linkage import MOVING_BARS, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
-from fourbar.scene.tolerance import Tolerance
+from fourbar.scene.numbers import Tolerance
 from fourbar.solution import Array, Solution
 from fourbar.solve import solve
 from fourbar.studies.enclosure import Extremes, extremes

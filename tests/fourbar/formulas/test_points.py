@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from fourbar.errors import InputError
-from fourbar.formulas.circuits import circuits
-from fourbar.formulas.mobility import find_intervals, turns_fully
+from fourbar.formulas.mobility import circuits, find_intervals, turns_fully
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import compute_state
 from fourbar.formulas.points import Centre, coupler_curve, instant_centres, point_coefficients

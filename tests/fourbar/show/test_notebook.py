@@ -16,7 +16,7 @@ import fourbar
 from fourbar.cli import status
 from fourbar.errors import DependencyError, InputError
 from fourbar.files import scene_file as files
-from fourbar.files.new import write_new_scene
+from fourbar.files.scene_text import write_new_scene
 from tests.support.scenes import crank_rocker, thesis
 
 HOSTILE = "<script>alert(1)</script>&"

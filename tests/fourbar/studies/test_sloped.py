@@ -28,11 +28,10 @@ from fourbar.effects import (
     Torsion,
     Viscous,
 )
-from fourbar.effects.pins import PinRows
+from fourbar.effects.effect import PinRows
 from fourbar.errors import LimitError
 from fourbar.studies import sloped
-from fourbar.studies.enclosure import _Search
-from fourbar.studies.interval import require
+from fourbar.studies.enclosure import _Search, require_provable
 from fourbar.studies.keys import list_entries, read_place, replace_numbers
 from fourbar.studies.sloped import Sloped, Undecided
 from fourbar_validation.engines.ball_vectors import wedge
@@ -178,7 +177,7 @@ def test_an_effect_is_bounded_over_its_decisions_or_refused(key: str, compared: 
     walked = 0
     for each, at, radius in STRADDLING[key]:
         try:
-            require(each)
+            require_provable(each)
         except InputError:
             continue
         held(each, at, radius)
