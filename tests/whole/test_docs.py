@@ -163,7 +163,7 @@ def test_the_witness_of_the_guide_agrees(
 
 
 def test_the_scene_file_is_one(checkout: Path) -> None:
-    (text,) = blocks("toml", read("docs/scene-file.md"))
+    text, _ = blocks("toml", read("docs/scene-file.md"))  # a scene; an example of each effect
     (checkout / "example.toml").write_text(text)
     scene = fourbar.load(checkout / "example.toml")
     assert set(fourbar.solve(scene).status) == {"ok"}

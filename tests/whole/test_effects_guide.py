@@ -29,7 +29,7 @@ from fourbar_validation.run.judge import judge
 from tests.validation.engines.test_effects import ENGINES, EXACT, SIMULATED, failing
 
 PAGE = (Path(__file__).parents[2] / "docs" / "adding-an-effect.md").read_text(encoding="utf-8")
-REFERENCE = (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
+REFERENCE = (Path(__file__).parents[2] / "docs" / "scene-file.md").read_text(encoding="utf-8")
 TABLES: list[tuple[ModuleType, str]] = [
     (on_trees, "TERM_OF"),
     (in_scales, "SIZE_OF"),
@@ -186,7 +186,7 @@ def test_every_effect_has_a_row_in_each_table() -> None:
 
 
 def test_the_scene_of_the_reference_names_everything_and_is_agreed_on() -> None:
-    scene = loads(SCENE.partition("[motion]")[0] + block("toml", REFERENCE))
+    scene = loads(SCENE.partition("[motion]")[0] + block("toml", REFERENCE, 1))
     assert [effect.key for effect in scene.effects] == list(effects.list_kinds())
     assert scene.motion.law is not None and scene.loads[0].table is not None
     again = loads(dump(scene))
@@ -220,6 +220,6 @@ def test_the_places_that_the_guide_to_a_quantity_names_are_there() -> None:
     texts = {
         name: (root / ("validation" if name.startswith("fourbar_v") else ".") / name).read_text() for name in files
     }
-    for name, word in (("__init__", "_scalar("), ("stages", "OF_BARS"), ("loop", "NOT_ANSWERED"), ("scales", "v_A"),
+    for name, word in (("__init__", "_scalar("), ("evaluate", "OF_BARS"), ("loop", "NOT_ANSWERED"), ("scales", "v_A"),
                        ("balls", "omega[k]"), ("results-format", "| `v_A` |")):  # fmt: skip
         assert any(file.rpartition("/")[2].startswith(name) and word in text for file, text in texts.items()), name

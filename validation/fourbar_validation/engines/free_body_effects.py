@@ -1,6 +1,6 @@
 """What each load and each effect does to the free bodies of a four-bar: a table from its kind to its wrench.
 
-Definitions as in docs/effects.md, from the numbers of the description alone. Vectors of the plane are
+Definitions as in docs/scene-file.md, from the numbers of the description alone. Vectors of the plane are
 complex numbers, x + i y.
 """
 
