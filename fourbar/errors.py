@@ -87,8 +87,11 @@ HOLDS, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
 """All holds; a comparison fails or none was made; bad input; the environment or the program failed; interrupted."""
 
 
-def run(group: "click.Group", program: str, arguments: list[str] | None = None) -> int:
-    """Run a command of a group; the exit status is what the command returns, or says what went wrong."""
+def run(group: "click.Group", program: str, arguments: list[str] | None = None, extra: str = "all") -> int:
+    """Run a command of a group; the exit status is what the command returns, or says what went wrong.
+
+    `extra`: the one that brings what the program needs, named where a module is missing.
+    """
     import click  # on the command line alone
 
     given = sys.argv[1:] if arguments is None else arguments
@@ -113,7 +116,7 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None) 
     except FourBarError as error:
         return _say(str(error), BAD_INPUT)
     except ModuleNotFoundError as error:
-        return _say(f"{error.name} is not installed: {say_install('all')}", BROKEN)
+        return _say(f"{error.name} is not installed: {say_install(extra)}", BROKEN)
     except OSError as error:
         named = error.filename2 or error.filename or "output"  # of a file that is put in place the second is its place
         return _say(f"{named}: {error.strerror or error}", BROKEN)

@@ -331,3 +331,25 @@ def test_what_was_printed_without_being_written_out_is_not_lost_in_silence() -> 
         )
         os.close(out)
         assert (done.returncode, done.stderr) == (status, printed)
+
+
+def test_published_says_at_once_that_scipy_is_missing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.integrate", None)
+    assert fourbar_validation.cli.status(["published"]) == BROKEN
+    printed = capsys.readouterr()
+    assert not printed.out and "SciPy" in printed.err and printed.err.count("\n") == 1
+
+
+def test_a_module_that_the_harness_lacks_is_in_the_extra_of_the_harness(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "filelock", None)
+    assert (
+        fourbar_validation.cli.status(
+            ["run", str(ROOT / "models" / "crank_rocker.toml"), "--out", str(tmp_path / "out")]
+        )
+        == BROKEN
+    )
+    assert 'filelock is not installed: pip install ".[validation]"' in capsys.readouterr().err

@@ -74,21 +74,23 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
         assert any(row.scene == scene and row.engine == "free-body" for row in rows)
 
 
-def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent() -> None:
-    """The limit is that of a scene, whatever the others of its chunk took."""
+@pytest.mark.posix
+@pytest.mark.parametrize(("parent", "limit"), [("os.getppid()", 1.0), ("1", 100.0)], ids=["hangs", "orphan"])
+def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent(parent: str, limit: float) -> None:
+    """The limit is that of a scene, whatever the others of its chunk took; the orphan's parent is another process."""
     judge = (
         "import os; from tests.support.unlucky import Few, Moody; from fourbar_validation.engines import workers; "
         "from fourbar_validation.compare.tolerance import EQUIVALENCE; from fourbar_validation.run import pool; "
         "from fourbar_validation.engines.witnesses import Witness; "
-        "moody = [Witness('moody', Moody, EQUIVALENCE)]; "
-        "workers.ready(%s); print('ready', flush=True); "
-        "workers.apply_watched(%s, pool.judge_job, pool.jobs(Few(), [0, 2], moody, False))"
+        "jobs = pool.make_jobs(Few(), [0, 2], [Witness('moody', Moody, EQUIVALENCE)], False); "
+        f"os.write(1, b'ready'); workers.prepare_worker({parent}); "
+        f"workers.apply_watched({limit}, pool.judge_job, jobs); os.write(1, b'came back')"
     )
-    for parent, limit in (("os.getppid()", 1.0), ("1", 100.0)):  # the parent of the second is another
-        line = [sys.executable, "-c", judge % (parent, limit)]
-        began = time.monotonic()
-        done = subprocess.run(line, cwd=Path(__file__).parents[2], capture_output=True, check=False, timeout=60)
-        assert done.returncode == 1 and time.monotonic() - began < 60.0, done.stderr
+    began = time.monotonic()
+    line = [sys.executable, "-c", judge]
+    done = subprocess.run(line, cwd=Path(__file__).parents[2], capture_output=True, check=False, timeout=60)
+    assert (done.stdout, done.returncode) == (b"ready", 1), done.stderr
+    assert not done.stderr and time.monotonic() - began < 60.0
 
 
 @pytest.mark.posix

@@ -84,4 +84,4 @@ def main(arguments: list[str] | None = None) -> None:
 
 def status(arguments: list[str] | None = None) -> int:
     """Run a command; what goes wrong becomes one line on standard error and an exit status."""
-    return run(group, PROGRAM, arguments)
+    return run(group, PROGRAM, arguments, "validation")

@@ -1,10 +1,12 @@
 """`published`: the thesis's torque error by error, then every printed figure against ours."""
 
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 
 import click
 
+from fourbar.errors import DependencyError, say_install
 from fourbar.writing import write_text
 from fourbar_validation.places import PROGRAM
 from fourbar_validation.published.comparison import check
@@ -48,6 +50,10 @@ def published(show_all: bool, out: Path | None) -> int:
     """Compare the figures of the sources with ours; exit 1 on a difference that no erratum explains."""
     from rich.console import Console
 
+    try:  # what the last of the sources needs is missed before the first is printed
+        import_module("scipy.integrate")
+    except ModuleNotFoundError:
+        raise DependencyError(f"a free motion among the sources needs SciPy: {say_install('validation')}") from None
     rows = list_ladder_rows()
     Console().print(make_table(HEAD, rows, 2, title="The published torque, error by error", show_lines=True))
     if out is not None:
