@@ -69,7 +69,7 @@ def test_nothing_is_wider_than_a_phone(browse) -> None:
 @pytest.mark.parametrize("count", [2, ALL_OPEN + 2])
 def test_a_number_leads_to_its_row(browse, count: int) -> None:
     driver = browse(report(copies(count))[1])
-    link = driver.find_elements("css selector", "#overview ~ .wide td.cell a")[-1]
+    link = driver.find_elements("css selector", "#overview ~ details td.cell a")[-1]
     target = link.get_attribute("href").rpartition("#")[2]
     assert count <= ALL_OPEN or not driver.find_elements("id", target)  # not unpacked yet
     driver.execute_script("arguments[0].click()", link)

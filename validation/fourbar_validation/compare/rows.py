@@ -27,6 +27,8 @@ IDENTITIES = (
 )
 """Rows of the formulas that no engine answers: they do not count as compared."""
 
+SHIPPED = ("study", "sensitivity", "extremes", "tolerances", "equilibria", "sdf", "usd")
+"""Engines of the rows that judge what else is shipped. With the formulas' own they are our own consistency."""
 LONGEST = 500
 """Characters of what somebody else's code gives as a reason."""
 

@@ -10,7 +10,7 @@ from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sort_rows, write_rows
 from fourbar_validation.report.costs import draw_costs
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import STATEMENT, Summary, compute_shares
+from fourbar_validation.report.summary import OWN, OWN_ENGINES, STATEMENT, Summary, compute_shares
 from fourbar_validation.report.templating import count_or_size, render, write_number, write_share
 
 ALL_OPEN = 8
@@ -108,6 +108,7 @@ def write_html(
 
     views = [_make_view(scene, first_lines.get(scene.name, 2), pictures or {}) for scene in summary.shown]
     csv = base64.b64encode(write_rows(cell.row for view in views for cell in view.cells).encode("utf-8"))
+    engines = _list_engines(cell.row for view in views for cell in view.cells)
     failing = sorted((cell for view in views for cell in view.cells if cell.row.failed), key=lambda c: c.line)
     costs = draw_costs(summary.shown)
     return render(
@@ -115,7 +116,9 @@ def write_html(
         "report.html.j2",
         s=summary,
         views=views,
-        engines=_list_engines(cell.row for view in views for cell in view.cells),
+        engines=[name for name in engines if name not in OWN_ENGINES],
+        own_engines=[name for name in OWN_ENGINES if name in engines],
+        own=OWN,
         failing=failing,
         lazy=len(views) > ALL_OPEN,
         figures={scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure},  # drawn by our own code
@@ -143,7 +146,8 @@ def _make_view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> S
     cells = [Cell(line, *each) for line, each in enumerate(zip(rows, compute_shares(rows), strict=True), first_line)]
     ranked = sorted(reversed(cells), key=lambda cell: (cell.row.compared, cell.used))  # of a place the last stays
     by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
-    worst = {cell.row.engine: cell for cell in ranked}
+    # a share of undecided numbers is no error, unless it fails
+    worst = {cell.row.engine: cell for cell in ranked if cell.row.quantity != "undecided" or cell.row.failed}
     found = {cell.row.quantity for cell in cells}
     quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
     engines = _list_engines(cell.row for cell in cells)

@@ -4,7 +4,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from heapq import nlargest
 from operator import attrgetter
 from statistics import median
@@ -14,7 +14,7 @@ import numpy as np
 
 from fourbar.errors import HOLDS
 from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import DEGRADED, REFUSES, Row
+from fourbar_validation.compare.rows import DEGRADED, FORMULAS, REFUSES, SHIPPED, Row
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,
@@ -44,6 +44,29 @@ class Worst:
     failed: int
 
 
+@dataclass(slots=True)
+class EngineLine:
+    """All that one independent engine, or our own consistency, answered: its counts and its worst row."""
+
+    name: str
+    version: str = ""
+    counts: Counts = field(default_factory=Counts)
+    worst: Row | None = None
+    """The row that used most of its allowance."""
+    used: float = -1.0
+    """error/allowed of that row."""
+    undecided: float = 0.0
+    """Largest share of the numbers of a scene that are undecided."""
+
+    def add(self, row: Row, used: float) -> None:
+        """Count a row; a share of undecided numbers is no error, unless it fails."""
+        self.counts.add([row])
+        if row.quantity == "undecided":
+            self.undecided = max(self.undecided, row.error)
+        if row.compared and used > self.used and (row.quantity != "undecided" or row.failed):
+            self.worst, self.used = row, used
+
+
 @dataclass(frozen=True, slots=True)
 class EngineCost:
     """Time of one engine, as a ratio to the formulas on the same scene in the same process."""
@@ -56,6 +79,9 @@ class EngineCost:
     """What it did for that."""
 
 
+OWN = "our own consistency"
+OWN_ENGINES = (FORMULAS, *SHIPPED)
+"""Engines whose rows compare what is ours with what is ours: identities, and what else is shipped."""
 SCENES_SHOWN = 200
 PICTURED = 24
 """Scenes with pictures, where fewer fail: to draw one takes ten times as long as to judge it by an exact engine."""
@@ -95,6 +121,7 @@ class Summary:
         """What the witnesses were held to."""
         self.missing: Sequence[tuple[str, str]] = ()
         """(engine, why it could not run here)."""
+        self._engines: dict[str, EngineLine] = {}
         self._refusals: Counter[tuple[str, str]] = Counter()
         self._first_reason: dict[tuple[str, str], str] = {}
         self._worst: list[Worst] = []
@@ -108,6 +135,9 @@ class Summary:
         self.counts.add_scene(scene.rows)
         bad = [row for row in scene.rows if row.failed]
         self.failures += bad[: FAILURES_KEPT - len(self.failures)]
+        for row, used in zip(scene.rows, compute_shares(scene.rows), strict=True):
+            name = OWN if row.engine in OWN_ENGINES else row.engine
+            self._engines.setdefault(name, EngineLine(name)).add(row, used)
         compared, loose = _count_compared(scene.rows)
         self.pairs, self.loose = self.pairs + compared, self.loose + len(loose)
         self._loosest = _keep_largest(LOOSEST_SHOWN, [*self._loosest, *loose], ALLOWANCE)
@@ -161,6 +191,14 @@ class Summary:
     def good(self) -> bool:
         """Whether all that was to be compared was, and holds."""
         return self.counts.status == HOLDS and not self.missing
+
+    @property
+    def engines(self) -> list[EngineLine]:
+        """Every independent engine by name, then our own consistency."""
+        versions = {name.lower(): version for name, version in self.versions.items()}
+        for line in self._engines.values():
+            line.version = versions.get(line.name.partition("-")[0], "")
+        return sorted(self._engines.values(), key=lambda line: (line.name == OWN, line.name))
 
     @property
     def worst(self) -> list[Worst]:

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import clean_line
-from fourbar_validation.report.summary import Summary
+from fourbar_validation.compare.rows import FAILS
+from fourbar_validation.report.summary import OWN, Summary
 from fourbar_validation.report.templating import write_number
 
 if TYPE_CHECKING:
@@ -17,22 +18,67 @@ NARROWEST = 80
 """Columns of the table at least: a narrower terminal breaks its lines, where rich would cut its numbers."""
 
 
-def print_table(summary: Summary, out: Path) -> None:
-    """Print the worst row of every scene and engine, the verdict last."""
-    from rich.box import SIMPLE_HEAD
+def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
+    """Print a row of every engine, what fails, what was left out, the verdict last.
+
+    `verbose`: the worst row of every scene and engine too, and each reason for which something was left out.
+    """
     from rich.console import Console
     from rich.markup import escape
-    from rich.table import Table
 
     console = Console()
+    wide = Console(width=max(console.width, NARROWEST))
+    if verbose:
+        wide.print(_make_worst_table(summary))
+    wide.print(_make_engine_table(summary))
+    for row in summary.failures:
+        console.print(
+            f"[bold red]fails[/] {escape(clean_line(row.scene))} {escape(row.engine)} {escape(row.quantity)}: "
+            f"error {write_number(row.error)}, allowed {write_number(row.allowed)}: {escape(clean_line(row.reason))}"
+        )
+    if summary.counts[FAILS] > len(summary.failures):
+        console.print(f"and {summary.counts[FAILS] - len(summary.failures)} more that fail, in results.csv")
+    if verbose:
+        for engine, reason, count in summary.refusals:
+            console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(clean_line(reason))}")
+    elif summary.refusals:
+        count = sum(count for *_, count in summary.refusals)
+        console.print(f"left out: {count} times, for {len(summary.refusals)} reasons (--verbose lists them)")
+    for engine, reason in summary.missing:
+        console.print(f"[bold red]not run[/] {escape(engine)}: {escape(reason)}")
+    console.print(f"[bold]{escape(summary.verdict)}[/]")
+    console.print(f"report: {escape(clean_line(str(out / 'report.html')))}", soft_wrap=True)
+
+
+def _make_engine_table(summary: Summary) -> "Table":
+    from rich.markup import escape
+
+    shown = _make_bare_table(("engine",), ("error", "allowed"))
+    shown.add_column("worst at", overflow="fold")
+    for line in summary.engines:
+        row, name = line.worst, f"{line.name} {line.version}".rstrip()
+        if row is None:
+            shown.add_row(escape(name), "-", "-", "nothing compared")
+            continue
+        quantity = f"{row.engine} {row.quantity}" if line.name == OWN else row.quantity
+        place = "" if math.isnan(row.theta_2) else f", {math.degrees(row.theta_2):.1f} deg"
+        cells = (
+            name,
+            write_short(row.error),
+            write_short(row.allowed),
+            f"{quantity} of {clean_line(row.scene)}{place}",
+        )
+        shown.add_row(*map(escape, cells), style="bold red" if line.counts[FAILS] else "")
+    return shown
+
+
+def _make_worst_table(summary: Summary) -> "Table":
+    from rich.markup import escape
+
     title = "worst row of each scene and engine"
     if len(summary.worst) < summary.judged:
         title = f"worst rows of {len(summary.worst)} of {summary.judged} scenes and engines"
-    shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
-    for heading in ("scene and engine", "worst"):
-        shown.add_column(heading, no_wrap=True)
-    for heading in ("error", "allowed", "used", "at deg"):
-        shown.add_column(heading, justify="right", no_wrap=True)
+    shown = _make_bare_table(("scene and engine", "worst"), ("error", "allowed", "used", "at deg"), title=title)
     for scene, group in groupby(summary.worst, key=lambda w: w.row.scene):
         shown.add_row(f"[bold]{escape(clean_line(scene))}[/]")
         for w in group:
@@ -44,17 +90,17 @@ def print_table(summary: Summary, out: Path) -> None:
             )
             words = (f"  {escape(w.row.engine)}", escape(w.row.quantity))
             shown.add_row(*words, *numbers, style="" if w.failed == 0 else "bold red")
-    Console(width=max(console.width, NARROWEST)).print(shown)
-    for row in summary.failures[:20]:
-        console.print(
-            f"[bold red]fails[/] {escape(clean_line(row.scene))} {escape(row.engine)} {escape(row.quantity)}: "
-            f"error {write_number(row.error)}, allowed {write_number(row.allowed)}: {escape(clean_line(row.reason))}"
-        )
-    for engine, reason, count in summary.refusals:
-        console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(clean_line(reason))}")
-    for engine, reason in summary.missing:
-        console.print(f"[bold red]not run[/] {escape(engine)}: {escape(reason)}")
-    console.print(f"[bold]{escape(summary.verdict)}[/]; written to {escape(clean_line(str(out)))}")
+    return shown
+
+
+def _make_bare_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    shown = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    for heading in (*words, *numbers):
+        shown.add_column(heading, justify="left" if heading in words else "right", no_wrap=True)
+    return shown
 
 
 def make_table(headings: Sequence[str], rows: Iterable[Sequence[str]], words: int = 1, **options: Any) -> "Table":

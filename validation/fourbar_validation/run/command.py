@@ -80,6 +80,7 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
     metavar="N",
     help="Judge studies, derivatives, bounds, equilibria, SDF and USD in this many scenes, evenly chosen.",
 )
+@click.option("--verbose", is_flag=True, help="Print the worst row of each scene and engine, and what was left out.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing and measure no observed order; no verdict changes.")
 @click.option("--mjcf", "--name", multiple=True, hidden=True, expose_value=False, is_eager=True, callback=refuse_moved)
 @add_output_options
@@ -98,6 +99,7 @@ def command(
     adapters: tuple[str, ...],
     time_limit: float | None,
     sample: int,
+    verbose: bool,
     no_pictures: bool,
     **forms: Path | None,
 ) -> int:
@@ -123,7 +125,7 @@ def command(
     present, missing = find_askable(chosen, by_name=engines is not None)
     options = RunOptions(workers, scheduler, drawn=not no_pictures, sample=sample)
     result = show_progress(len(suite), run(suite, out, present, options, missing))
-    print_table(result, out)
+    print_table(result, out, verbose=verbose)
     worse = _report_differences(against, out, forms, result.verdict)
     if result.counts[FAILS] or worse:
         return FAILED
