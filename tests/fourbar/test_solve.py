@@ -98,6 +98,7 @@ def scenes(draw: st.DrawFn) -> Scene:
     return Scene(linkage, motion, draw(st.sampled_from(MOVING_BARS)), tuple(loads), tuple(effects))
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(scenes(), st.sampled_from(STAGES))
 def test_where_the_status_is_ok_every_requested_quantity_is_a_number(scene: Scene, stage: str) -> None:
@@ -249,6 +250,7 @@ def test_analyze_refuses_a_speed_without_a_square_in_one_line(tmp_path: Path, ca
     assert out == "" and errors.count("\n") == 1 and f"{file}: motion.omega_2 = 1e+200: must be below" in errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("figure", ["overview", "torque", "forces", "hodograph"])
 def test_figures_without_a_single_force_are_drawn_without_a_word(figure: str, tmp_path: Path) -> None:
     scene = Scene(PARALLELOGRAM, Motion(np.linspace(0.3, 2.0, 5), 1.0), 3)

@@ -51,6 +51,7 @@ def test_a_symbolic_link_stays_and_the_file_that_it_names_is_written(tmp_path: P
         write_bytes(tmp_path / "nowhere", b"")
 
 
+@pytest.mark.slow
 def test_save_and_analyze_write_through_links_and_keep_the_mode(tmp_path: Path) -> None:
     for name, write in {
         "scene.toml": lambda path: fourbar.save(fourbar.load(CRANK_ROCKER), path),

@@ -27,6 +27,7 @@ from tests.support.scenes import crank_rocker
 SEED = 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(KEPT.glob("*.toml")), ids=lambda path: path.stem)
 def test_a_kept_counterexample_holds(path: Path) -> None:
     findings = (outside if path.stem.startswith("bounds") else examine).list_findings
@@ -127,6 +128,7 @@ def test_a_position_that_does_not_close_is_a_finding(monkeypatch: pytest.MonkeyP
     assert any(line.startswith("assembled") for line in examine.list_findings(scene))
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fourbar_lab.fuzz.CHUNK", 4)
     first = run(12, 1, tmp_path, 1)
@@ -139,6 +141,7 @@ def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert len(found) == 3 and found[0] == {"0": ["left by the run before"]}
 
 
+@pytest.mark.slow
 def test_a_scene_that_kills_its_worker_costs_itself_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(examine, "examine", dies_in_scene_2)
     (found,) = run(4, 1, tmp_path, 1)
@@ -163,12 +166,14 @@ def watched(monkeypatch: pytest.MonkeyPatch, change: Any = lambda found: found) 
     return proven
 
 
+@pytest.mark.slow
 def test_no_value_lies_outside_what_is_proven(monkeypatch: pytest.MonkeyPatch) -> None:
     proven = watched(monkeypatch)
     assert not [number for number in range(45, 48) if examine.examine(SEED, True, number)]
     assert len(proven) == 3 and any(found.nominal for found in proven)
 
 
+@pytest.mark.slow
 def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def within(extremes: dict[str, Extreme], part: float) -> dict[str, Extreme]:
         return {
@@ -186,6 +191,7 @@ def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatc
     ] * 2
 
 
+@pytest.mark.slow
 def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A distance that may be 0 had 1 m added."""
 

@@ -28,6 +28,7 @@ def test_a_number_counts_as_changed_from_a_billionth_on() -> None:
     assert is_changed(before, {**before, "F12": None})
 
 
+@pytest.mark.slow
 def test_without_a_mutant_the_harness_holds() -> None:
     """Near change points too, where the engines lose as many digits as they are expected to."""
     for scene in harness.choose_scenes()[-3:]:

@@ -66,6 +66,7 @@ def tallies() -> dict[str, Tally]:
     return {family: run(family, range(SAMPLES)) for family in FAMILIES}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_output_is_within_what_the_inputs_last_digits_do(family: str, tallies: dict[str, Tally]) -> None:
     tally = tallies[family]
@@ -92,6 +93,7 @@ def installed(library: str) -> None:
             pytest.skip(f"{needed} is not installed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("library", LIBRARIES)
 @pytest.mark.parametrize("family", ["change_point", "tables", "torsion"])
 def test_every_output_is_within_it_in_other_libraries_too(library: str, family: str) -> None:
@@ -100,6 +102,7 @@ def test_every_output_is_within_it_in_other_libraries_too(library: str, family: 
     assert tally.holds() and not tally.untold and "torque" in tally.worst
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:There is a performance drop")  # PyTorch maps no product's derivative
 @pytest.mark.parametrize("library", ["numpy", *LIBRARIES])
 def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them(library: str) -> None:
@@ -114,6 +117,7 @@ def test_the_power_of_a_bar_that_hardly_turns_has_its_digits() -> None:
     assert run("ratios", range(2, 3), derivatives=True).holds()
 
 
+@pytest.mark.slow
 def test_a_derivative_that_is_left_out_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     """The reference says where there is none: where the loop does not close, or dry friction holds a pin at rest."""
 

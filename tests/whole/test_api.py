@@ -181,6 +181,7 @@ def spoilt(value: Any, wrong: object) -> Iterator[Any]:
                 yield type(value)(*parts) if hasattr(value, "_fields") else parts
 
 
+@pytest.mark.slow
 def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -62,6 +62,7 @@ def test_the_examples_of_continuous_integration_use_commands_and_options_that_ex
             assert wanted <= known and wanted, (file.name, name, wanted - known)
 
 
+@pytest.mark.slow
 def test_the_run_of_a_pull_request_makes_the_folder_of_its_reports(checkout: Path) -> None:
     (line,) = re.findall(r"validation (run [^:]*?)\n\s+- ", read("docs/ci/four-bar.yml"))
     assert not Path("results").exists()
@@ -93,6 +94,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "count"),
     [
@@ -148,6 +150,7 @@ def test_the_table_of_the_exercise_is_right(checkout: Path, capsys: pytest.Captu
     assert harness(["check", "models/crank_rocker.toml", "theirs.csv"]) == FAILED
 
 
+@pytest.mark.slow
 def test_the_witness_of_the_guide_agrees(
     checkout: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -265,6 +268,7 @@ def test_the_pictures_are_those_that_are_drawn(name: str, options: tuple[str, ..
     assert re.findall("<!-- (.*) -->", drawn) == re.findall("<!-- (.*) -->", kept)
 
 
+@pytest.mark.slow
 def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
     suite = read_suite(GALLERY / "suite.txt")
     names = [suite.name(index) for index in range(len(suite))]

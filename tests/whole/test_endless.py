@@ -56,6 +56,7 @@ def test_what_may_never_end_is_not_waited_for(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 def test_a_file_on_standard_input_is_read_and_a_pipe_is_not() -> None:
     """`< scene.toml` is an ordinary file with a size, `cat scene.toml |` is a pipe."""
@@ -82,6 +83,7 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 """
 
 
+@pytest.mark.slow
 def test_a_free_motion_without_end_is_given_up_with_its_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

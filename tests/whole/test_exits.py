@@ -74,6 +74,7 @@ def test_no_command_writes_over_what_it_reads(
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == texts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("group", "status"),
     [
@@ -125,6 +126,7 @@ def test_an_interruption_while_the_libraries_are_imported_is_one_line(module: st
     assert (done.returncode, done.stderr) == (INTERRUPTED, "error: interrupted\n")
 
 
+@pytest.mark.slow
 def test_a_program_without_output_streams_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """One started with `>&- 2>&-`, or on Windows without a console."""
     for stream in ("stdout", "stderr"):
@@ -194,6 +196,7 @@ STATUSES: list[tuple[Callable[[list[str]], int], str, int]] = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "line", "status"), STATUSES, ids=[line for _, line, _ in STATUSES])
 def test_every_command_ends_with_its_status(
     command: Callable[[list[str]], int], line: str, status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -316,6 +319,7 @@ def test_every_command_is_in_the_table_of_processes() -> None:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
 def test_what_was_printed_without_being_written_out_is_not_lost_in_silence() -> None:
     code = "import click, sys; from fourbar.errors import run; "

@@ -74,6 +74,7 @@ class Named:
         return repr(self.texts)
 
 
+@pytest.mark.slow
 def test_reports_hold_hostile_text_as_text(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -239,6 +239,7 @@ def test_a_sweep_bounds_the_search() -> None:
     assert found.found[0].place.theta_2 == pytest.approx(-math.pi / 2 - 0.3, abs=CLOSE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["crank_rocker", "thesis", "gallery/hoecken", "gallery/pump_jack"])
 def test_the_free_bodies_need_no_torque_there_and_its_slope_beside(name: str) -> None:
     """Newton-Euler on three free bodies with their own closure: no virtual work, no coefficient of motion."""
@@ -262,6 +263,7 @@ def crossings(time: np.ndarray, angle: np.ndarray, middle: float) -> float:
     return (len(roots) - 1) / float(roots[-1] - roots[0])
 
 
+@pytest.mark.slow
 def test_released_motions_swing_at_the_frequency() -> None:
     scene = fourbar.load(MODELS / "crank_rocker.toml")
     rest = one(equilibrium(scene), "stable")
@@ -298,6 +300,7 @@ def test_released_ones_begin_to_move_as_stated() -> None:
     assert {*found.moves[list(chosen)].tolist()} >= {0} and len(set(found.moves.tolist())) == 3
 
 
+@pytest.mark.slow
 def test_the_command_prints_what_python_finds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = MODELS / "problems" / "gz_physics_987.toml"
     assert status(["equilibrium", str(file)]) == 0
@@ -347,6 +350,7 @@ def test_a_zero_that_falls_on_a_sample_is_found_by_signs_too() -> None:
 DRIVE = fourbar.LinearDrive(SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["theta_3", "theta_4", "stroke"])
 def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(name: str) -> None:
     """Those of the input swept over the same; a single position has those of its circuit."""

@@ -116,6 +116,7 @@ def wrapped(x: Any) -> Any:
     return (x + np.pi) % (2.0 * np.pi) - np.pi
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
 def test_every_quantity_is_that_of_solve(library: Library, drive_bar: int) -> None:
     scene = replace(LOADED, drive_bar=drive_bar)
@@ -129,6 +130,7 @@ def test_every_quantity_is_that_of_solve(library: Library, drive_bar: int) -> No
         assert np.abs(gap).max() <= ROUNDED * max(1.0, np.abs(theirs).max()), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", [(1, 3), (1, 4), (2, 4)])
 def test_a_drive_along_a_line(library: Library, ends: tuple[int, int]) -> None:
     """Its force, with the derivative by where it is pinned, which `sensitivity` has by another route."""
@@ -148,6 +150,7 @@ def test_a_drive_along_a_line(library: Library, ends: tuple[int, int]) -> None:
         assert np.abs(np.asarray(by[name]) - exact).max() <= ROUNDED * np.abs(exact).max(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [Motion(theta_3=0.6, omega_3=2.0), Motion(theta_4=2.2, omega_4=-1.0, alpha_4=2.0)])
 def test_other_bars_command(library: Library, motion: Motion) -> None:
     scene = replace(LOADED, motion=motion, loads=())
@@ -194,6 +197,7 @@ def test_power_and_condition_of_a_cylinder_are_those_of_the_definitions() -> Non
     assert found["condition"] == pytest.approx(abs(found["sin_mu"]) * lever / 0.3, rel=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("bar", "side", "length"), [(2, "left", 0.35), (4, "right", 0.5)])
 def test_a_stroke_commands(library: Library, bar: int, side: str, length: float) -> None:
     """The strokes before and after the one are none that this cylinder can have."""
@@ -219,6 +223,7 @@ def test_a_stroke_commands(library: Library, bar: int, side: str, length: float)
     assert float(stated(end)["drive_force"]) == pytest.approx(solution.drive_force[0], rel=ROUNDED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name != "tables"])
 def test_derivatives_are_those_of_sensitivity(library: Library, family: str) -> None:
     """Forwards in JAX and backwards in PyTorch, which are no derivation of ours."""
@@ -239,6 +244,7 @@ def test_derivatives_are_those_of_sensitivity(library: Library, family: str) -> 
         assert np.abs((ours - exact) * weights).max() <= (ROUNDED + blur) * size, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [Motion(np.pi, 8.0), Motion(np.pi - 1e-6, 8.0), Motion(theta_4=np.pi, omega_4=2.0)])
 def test_derivatives_keep_their_digits_beside_half_a_turn(library: Library, motion: Motion) -> None:
     """There the tangent of half the angle is large: at 1e-6 rad nine digits of the slopes once were left."""
@@ -253,6 +259,7 @@ def test_derivatives_keep_their_digits_beside_half_a_turn(library: Library, moti
             assert np.abs(np.asarray(slope) - exact).max() <= ROUNDED * np.abs(exact).max(), name
 
 
+@pytest.mark.slow
 def test_peak_pin_force_of_a_thousand_positions(library: Library) -> None:
     angles = np.linspace(0.0, 6.28, 1000)
     f = function(LOADED, ["lengths.input", "motion.theta_2"], ["F32"])
@@ -267,6 +274,7 @@ def test_peak_pin_force_of_a_thousand_positions(library: Library) -> None:
     assert slope == pytest.approx((ahead - back) / (2.0 * STEP), rel=DIFFERENCES)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)  # JAX compiles each operation for each of two shapes
 def test_positions_that_do_not_close_leave_the_others_their_derivatives(library: Library) -> None:
     """A sweep through both limits of a rocker, and lengths that close nowhere."""
@@ -288,6 +296,7 @@ def test_positions_that_do_not_close_leave_the_others_their_derivatives(library:
     assert (np.asarray(library.grad(total)(library.array([-1.0, np.nan]), angles)) == 0.0).all()
 
 
+@pytest.mark.slow
 def test_mapped_over_linkages_as_vary(library: Library) -> None:
     lengths = np.linspace(0.05, 0.9, 10_000)
     solution = fourbar.solve(fourbar.vary(LOADED, {"lengths.input": lengths}))
@@ -304,6 +313,7 @@ def test_mapped_over_linkages_as_vary(library: Library) -> None:
         assert (gap.reshape(len(sine), -1).max(axis=1) * sine**2 <= ROUNDED).all()
 
 
+@pytest.mark.slow
 def test_derivatives_are_mapped_over_linkages_and_positions(library: Library) -> None:
     """In a table's piece too, which a transformed index looks up."""
     f = function(LOADED, ["lengths.input", "motion.theta_2"], ["torque"])
@@ -333,6 +343,7 @@ NO_VALUE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("status", NO_VALUE)
 def test_where_solve_has_no_value_there_is_none(library: Library, status: str) -> None:
     """Of the second the power alone is beyond the range of doubles; of the first F32 is (inf, -inf): no warning."""
@@ -343,6 +354,7 @@ def test_where_solve_has_no_value_there_is_none(library: Library, status: str) -
         assert np.isnan(float(found["power"])) and np.isfinite(float(found["theta_4"]))
 
 
+@pytest.mark.slow
 def test_a_lever_that_only_rounding_leaves_holds_nothing(library: Library) -> None:
     """A kite whose input lies on the ground's line at any theta_4: its couple has no lever, in any arithmetic."""
     motion = Motion(theta_4=np.linspace(0.2, 2.9, 12), omega_4=2.0)
@@ -354,6 +366,7 @@ def test_a_lever_that_only_rounding_leaves_holds_nothing(library: Library) -> No
     assert np.isfinite(np.asarray(found["theta_3"])).all()
 
 
+@pytest.mark.slow
 def test_single_precision_stays_single(library: Library) -> None:
     f = function(LOADED, ["lengths.input", "motion.theta_2"], ["torque"])
     kind = library.xp.float32

@@ -187,6 +187,7 @@ def test_an_effect_is_bounded_over_its_decisions_or_refused(key: str, compared: 
     assert all(own.values()), own
 
 
+@pytest.mark.slow
 def test_the_formulas_are_bounded_over_their_decisions(compared: dict[tuple[str, int], bool]) -> None:
     for each, at, radius in FORMULAS:
         held(each, at, radius)

@@ -124,6 +124,7 @@ def test_what_the_study_refuses() -> None:
             spread(Tolerance("lengths.input", 1e-5), samples=samples)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene, plot = tmp_path / "s.toml", tmp_path / "t.png"
     text = MODEL.replace("steps = 360", "steps = 12")
@@ -151,6 +152,7 @@ def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.Capt
     assert "tolerances: the scene states none" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_share_that_is_done_is_told_from_the_start_and_reaches_all_of_it() -> None:
     told: list[float] = []
     scene = crank_rocker(tolerances=(Tolerance("lengths.input", 5e-5),))
