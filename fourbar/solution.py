@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fourbar.errors import InputError, expect
 from fourbar.linkage import POSITIVE, require
 from fourbar.quantities import NOT_ASSEMBLED, OF_LINE, PIN_FORCES, SCALARS, STATUS_NAMES, UNITS, Quantities
+from fourbar.scene import Command
 from fourbar.writing import describe_extent, list_names, make_data_frame, write_between, write_object, write_text
 
 Array = NDArray[np.float64]
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from fourbar.effects import LinearDrive
-    from fourbar.scene import Command
 
 SCHEMA = "fourbar-analyze/1"
 Conversion = Mapping[str, tuple[str, float]]
@@ -67,7 +67,7 @@ class Solution(Quantities):
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached a limit position or change point, s; None: it did not."""
 
-    at: "Command" = field(default=None, init=False)  # type: ignore[assignment]  # `solve` states it
+    at: Command = field(default=None, init=False)  # type: ignore[assignment]  # `solve` states it
     """What was commanded, of a free motion theta_2."""
 
     def __len__(self) -> int:

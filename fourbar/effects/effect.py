@@ -13,7 +13,7 @@ from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import PINS, Declared, require
-from fourbar.solution import Array
+from fourbar.quantities import Array
 
 
 class SolvedFriction(NamedTuple):

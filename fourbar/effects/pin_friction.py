@@ -14,8 +14,7 @@ from fourbar.formulas.arithmetic import is_any, make_like
 from fourbar.formulas.longer import shorten
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared
-from fourbar.quantities import JAMMED, OK, SEVERAL
-from fourbar.solution import Array
+from fourbar.quantities import JAMMED, OK, SEVERAL, Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,7 @@ from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES
 from fourbar.formulas.position import reorder_lengths
 from fourbar.linkage import PINS, POSITIVE, Declared
-from fourbar.quantities import OK, WOUND
-from fourbar.solution import Array
+from fourbar.quantities import OK, WOUND, Array
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
 """rad; at half a turn itself rounding would decide in which sense the spring turns."""

@@ -23,9 +23,8 @@ from fourbar.formulas.pin_forces import (
 from fourbar.formulas.position import HalfAngle, Loop, Position
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import COUPLE, JAMMED, LINE, DriveNames
+from fourbar.quantities import COUPLE, JAMMED, LINE, Array, DriveNames
 from fourbar.scene import Command, Scene
-from fourbar.solution import Array
 
 if TYPE_CHECKING:
     from fourbar.effects import Effect, LinearDrive

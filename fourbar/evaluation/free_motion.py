@@ -24,9 +24,9 @@ from fourbar.formulas.pin_forces import Body
 from fourbar.formulas.position import HalfAngle, Position, loop
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.scene import Independent
-from fourbar.solution import Array
 
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
 """Tolerances of a step of DOP853: below them a long fast motion errs by its round-off."""

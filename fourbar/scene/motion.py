@@ -8,8 +8,8 @@ import numpy as np
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import A_BRANCH, POSITIVE, require, require_numbers, require_whole
+from fourbar.quantities import Array
 from fourbar.scene.motion_law import COMMANDS, STEPS, Law, find_bar
-from fourbar.solution import Array
 
 OPEN, CROSSED = 1, -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}

@@ -8,7 +8,7 @@ import numpy as np
 
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.linkage import MOST_STEPS, MOVING_BARS, require_numbers, require_whole
-from fourbar.solution import Array
+from fourbar.quantities import Array
 
 ENDS = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
 """How the motion begins and ends: no condition, at rest, or as one period of a motion that goes on."""

@@ -10,11 +10,11 @@ from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.mobility import MARGIN, choose_range, find_limit_angles, follow_smooth_path
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
+from fourbar.quantities import Array
 from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, FromLimit, Motion, Sweep
 from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.numbers import Tolerance
 from fourbar.scene.point import Point
-from fourbar.solution import Array
 
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive, Load
@@ -217,7 +217,9 @@ def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = No
 
         find_triangle(scene.linkage, scene.drive).require(places)
         stroke, stroke_speed = places, speed
-        angle, speed, acceleration, lever, lost = turn_bar(scene, places, speed, acceleration)
+        angle, speed, acceleration, lever, lost = turn_bar(
+            scene.linkage, scene.drive, scene.motion.side, places, speed, acceleration
+        )
     elif motion.law is not None:
         time, (angle, speed, acceleration) = places, motion.law.at(places)
     if branch is None:

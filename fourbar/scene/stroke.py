@@ -12,12 +12,11 @@ from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import PI_LOW, Number, angle, divisor, exact_difference, namespace, polar, select
 from fourbar.formulas.longer import change_numbers, lengthen, shorten
 from fourbar.linkage import FourBar
-from fourbar.solution import Array
+from fourbar.quantities import Array
 
 if TYPE_CHECKING:
     from fourbar.effects.linear_drive import LinearDrive
     from fourbar.effects.spring import SpringEnd
-    from fourbar.scene.scene import Scene
 
 SIDES = {"left": 1.0, "right": -1.0}
 """On which side of the line from the bar's pivot to the end on the ground, seen towards that, the other end lies."""
@@ -95,14 +94,15 @@ def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
     return Triangle(own.bar, abs(own.distance), reach, towards - own.angle - _reverse(own))
 
 
-def turn_bar(scene: "Scene", stroke: Array, speed: Any, acceleration: Any) -> tuple[Any, Any, Any, Any, Any]:
+def turn_bar(
+    linkage: FourBar, drive: "LinearDrive | None", side: str | None, stroke: Array, speed: Any, acceleration: Any
+) -> tuple[Any, Any, Any, Any, Any]:
     """Compute what `Triangle.turned` does, and what angle, speed and acceleration leave out as doubles, (..., 3)."""
-    parts, side = (scene.linkage, scene.drive), scene.motion.side
-    found = find_triangle(*parts).turned(stroke, speed, acceleration, side)
+    found = find_triangle(linkage, drive).turned(stroke, speed, acceleration, side)
     if speed is None:
         return (*found, None)
     with np.errstate(all="ignore"):
-        longer = find_triangle(*change_numbers(parts, lengthen))
+        longer = find_triangle(*change_numbers((linkage, drive), lengthen))
         exact = longer.turned(lengthen(stroke), lengthen(speed), lengthen(acceleration), side)
         lost = [shorten(after - before) for before, after in zip(found[:3], exact[:3], strict=True)]
     return (*found, np.stack(np.broadcast_arrays(*lost), axis=-1))

@@ -151,7 +151,9 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     if scene.motion.stroke is not None:
         varied = replace_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
         stroke, stroke_speed = angle, speed
-        angle, speed, acceleration, lever, lost = turn_bar(varied, stroke, speed, acceleration)
+        angle, speed, acceleration, lever, lost = turn_bar(
+            varied.linkage, varied.drive, scene.motion.side, stroke, speed, acceleration
+        )
     branch = _find_branches(scene, numbers, angles if stroke is None else angle, m)
     of_stroke: Any = {"stroke": stroke, "lever": lever, "stroke_speed": stroke_speed, "lost": lost}
     at = Command(angle, branch, speed, acceleration, bar=scene.motion.bar, **of_stroke)
