@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -45,6 +45,12 @@ class Actions:
         """Between the two bars that meet at a pin, on the second of them, N m."""
         self.through: dict[str, Any] = {}
         """Forces between bars 2 and 3, 3 and 4, as if through their pin, on the second of them, complex, N."""
+
+    def add(self, terms: Iterable[Any]) -> Self:
+        """Add what loads and effects do, but for what depends on the pin forces; return these sums."""
+        for term in terms:
+            term.act(self, self.state)
+        return self
 
     def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
         """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.

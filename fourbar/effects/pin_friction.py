@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fourbar.effects.actions import Actions
-from fourbar.effects.cones import NONE, ONE, compute_step, solve_sliding
+from fourbar.effects.cones import NONE, ONE, solve_sliding
 from fourbar.effects.effect import PinRows, SolvedFriction
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import is_any, make_like
@@ -67,41 +67,53 @@ class PinFriction(PinRows):
 
         def column(force: Any) -> Any:
             """Components of a force over all positions, (n, 2)."""
-            flat = np.broadcast_to(shorten(force), shape).ravel()
+            flat = np.broadcast_to(_make_plain(force), shape).ravel()
             return np.stack([flat.real, flat.imag], axis=-1)
 
-        k = np.stack([np.broadcast_to(shorten(arms[pin]), shape).ravel() for pin in names], axis=1)
+        k = np.stack([np.broadcast_to(_make_plain(arms[pin]), shape).ravel() for pin in names], axis=1)
         F = np.stack([column(getattr(pins, PIN_FORCE[pin])) for pin in names], axis=1)
         C = np.stack(
             [np.stack([column(getattr(per_unit[q], PIN_FORCE[pin])) for q in names], axis=1) for pin in names], axis=1
         )
         found = solve_sliding(F, C, k)
         couples = {pin: make_like(found.x[:, p].reshape(shape), pins.F12.real) for p, pin in enumerate(names)}
-        if shorten(pins.F12) is not pins.F12:
-            couples = self._polish(couples, pins, per_unit)
+        if _make_plain(pins.F12) is not pins.F12:
+            couples = self._refine(couples, pins, per_unit)
         for pin, couple in couples.items():
             actions.couple(pin, -senses[pin] * couple)
         done = eliminate(actions)
-        left = [np.abs(couple - arms[pin] * np.abs(getattr(done, PIN_FORCE[pin]))) for pin, couple in couples.items()]
+        left = [
+            np.abs(_make_plain(couple - arms[pin] * np.abs(getattr(done, PIN_FORCE[pin]))))
+            for pin, couple in couples.items()
+        ]
         status = np.where(found.number == ONE, OK, np.where(found.number == NONE, JAMMED, SEVERAL)).astype(np.uint8)
         return SolvedFriction(done, found.from_jamming.reshape(shape), np.max(left, axis=0), status.reshape(shape))
 
-    def _polish(self, couples: dict[str, Any], pins: PinForces, per_unit: dict[str, PinForces]) -> dict[str, Any]:
-        """Improve couples that were searched for in doubles by Newton's steps whose gaps are longer numbers."""
+    def _refine(self, couples: dict[str, Any], pins: PinForces, per_unit: dict[str, PinForces]) -> dict[str, Any]:
+        """Take Newton's steps from couples in doubles, in the numbers of the forces: longer ones or with derivatives.
+
+        (1 - J) dx = mu r |F + C x| - x, J the slope of the right-hand side by x: of numbers that carry their
+        derivatives the same steps are the theorem of the implicit function.
+        """
         names, arms = list(couples), {pin: mu * r for pin, mu, r in self.pins}
         for _ in range(2):
             gaps, slopes = [], []
             for pin in names:
-                by = [getattr(per_unit[other], PIN_FORCE[pin]) for other in names]
-                force = getattr(pins, PIN_FORCE[pin])
+                by, force = [getattr(per_unit[q], PIN_FORCE[pin]) for q in names], getattr(pins, PIN_FORCE[pin])
                 for c, couple in zip(by, couples.values(), strict=True):
                     force = force + c * couple
-                size = np.abs(force)
-                along, k = shorten(force) / shorten(size), shorten(arms[pin])
-                gaps.append(np.ravel(shorten(arms[pin] * size - couples[pin])))
-                slopes.append([np.ravel(k * (along.conjugate() * shorten(c)).real + 0.0 * gaps[-1]) for c in by])
-            steps = compute_step(np.stack(gaps, axis=1), np.moveaxis(np.array(slopes), -1, 0))
-            couples = {pin: couples[pin] + steps[:, p].reshape(np.shape(along)) for p, pin in enumerate(names)}
+                gaps.append(arms[pin] * np.abs(force) - couples[pin])
+                along = _make_plain(force) / np.abs(_make_plain(force))
+                pulls = [_make_plain(arms[pin]) * (along.conjugate() * _make_plain(c)).real for c in by]
+                slopes.append(np.broadcast_arrays(*pulls, along.real)[:-1])
+            matrix = np.eye(len(names)) - np.moveaxis(np.array(slopes), (0, 1), (-2, -1))
+            usable = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
+            usable[usable] = np.linalg.det(matrix[usable]) != 0.0
+            inverse = np.zeros_like(matrix)
+            inverse[usable] = np.linalg.inv(matrix[usable])
+            for row, pin in enumerate(names):
+                for column, gap in enumerate(gaps):
+                    couples[pin] = couples[pin] + inverse[..., row, column] * gap
         return couples
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
@@ -109,3 +121,8 @@ class PinFriction(PinRows):
         for pin, mu, r in self.pins:
             load = np.hypot(*np.asarray(forces[PIN_FORCE[pin]]).T)
             actions.couple(pin, -actions.sense(pin) * (mu * r * load))
+
+
+def _make_plain(number: Any) -> Any:
+    """Return the double, or the array of them, of a longer number or of one that carries its derivatives."""
+    return shorten(getattr(number, "values", number))

@@ -143,10 +143,10 @@ class Case(NamedTuple):
         return self.state(where.angle, found, where.branch, speed, where.acceleration)
 
     def freed(self, bar: int, side: Any) -> "Case":
-        """Return the case of a linkage that is released, read in the angle of bar 2 or 4, which nothing drives."""
+        """Return the case of a linkage that is released, read in the angle of bar 2 or 4, which no couple drives."""
         path = prepare_path(Loop(*self.linkage.lengths, 0.0, 0.0), self.linkage.ground_angle, bar)
         path = path._replace(lengths=meet_change_points(path.lengths))
-        return self._replace(drive_bar=bar, drive=None, path=path, side=side)
+        return self._replace(drive_bar=bar, path=path, side=side)
 
     def started(self, at: Command) -> "Case":
         """With effects that know that the motion begins at a position, of as many linkages as there are."""
@@ -198,9 +198,7 @@ class Case(NamedTuple):
         of the three pairs of bars that whose directions differ most has the digits.
         """
         a, at, k = self.lengths.a, state.at, state.k
-        actions = Actions(state, self.bodies, side)
-        for term in self.terms:
-            term.act(actions, state)
+        actions = Actions(state, self.bodies, side).add(self.terms)
         own, mass_at_A = inertia_wrenches(a, self.bodies, at, state.moving)
         inertial, others = self._compute_inertial(state, acceleration)
         driven = (self.drive_bar,) if self.drive is None else self.drive.apart

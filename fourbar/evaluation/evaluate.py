@@ -74,12 +74,13 @@ def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) ->
         commanded = name_of_command(case, at, state, q) | _list_commanded(command, values, abs(at.sin_mu))
         values |= {name: value for name, value in commanded.items() if name in names}
     if wanted >= FORCE:
-        dynamics = case.dynamics(state, acceleration, case.side)
+        acting = case if free is None else case._replace(drive=None)
+        dynamics = acting.dynamics(state, acceleration, case.side)
         counted = command.branch if free is None else None
         bars = {}
         if wanted == ERROR:
-            bars = compute_error_bars(case, command, state, acceleration, branch, dynamics, exact)
-        codes, forces = _list_forces(case, state, acceleration, counted, codes, names, dynamics, bars)
+            bars = compute_error_bars(acting, command, state, acceleration, branch, dynamics, exact)
+        codes, forces = _list_forces(acting, state, acceleration, counted, codes, names, dynamics, bars)
         if free is not None:
             forces |= {name: np.zeros(codes.shape) for name in (*case.names, "power")}
         values |= {name: value for name, value in forces.items() if name in names}

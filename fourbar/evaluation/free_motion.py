@@ -258,10 +258,7 @@ class _Run:
         """Q under everything that acts, at a speed that is not zero where friction has to have a sense."""
         theta_2 = q if self.reading.bar == 2 else cmath.phase(at.u2)
         state = State(self.lengths, self.linkage.ground_angle, theta_2, at, k, rate, rates(k, rate, 0.0))
-        actions = Actions(state, self.bodies)
-        for term in self.terms:
-            term.act(actions, state)
-        return float(actions.work()[0])
+        return float(Actions(state, self.bodies).add(self.terms).work()[0])
 
     def _try_both_senses(self) -> list[float]:
         q = float(self.y[0])

@@ -297,9 +297,7 @@ def compute_energies(scene: Scene, motion: Solution) -> Energies:
     groups = {"loads": scene.loads, **{effect.key: (effect,) for effect in scene.effects}}
     work = {}
     for name, terms in groups.items():
-        actions = Actions(state, list_bodies(scene.linkage))
-        for term in terms:
-            term.act(actions, state)
+        actions = Actions(state, list_bodies(scene.linkage)).add(terms)
         power = np.zeros(len(motion)) + actions.work()[0] * motion.omega_2
         known = np.isfinite(power)  # bars 3 and 4 in line: the velocities are 0/0
         if np.count_nonzero(known) > 1 and np.any(power[known]):

@@ -39,10 +39,7 @@ class RestPosition(NamedTuple):
 
 def compute_generalised_force(scene: Scene, terms: tuple[Any, ...], state: State) -> Any:
     """Compute Q of loads and effects, by the parameter that the state's coefficients belong to."""
-    actions = Actions(state, list_bodies(scene.linkage, terms))
-    for term in terms:
-        term.act(actions, state)
-    return actions.work()[0]
+    return Actions(state, list_bodies(scene.linkage, terms)).add(terms).work()[0]
 
 
 class _Sizes(Actions):
@@ -168,9 +165,7 @@ class CircuitCurve:
 
     def size(self, points: Array) -> Array:
         """Sum of the absolute terms of Q."""
-        actions = _Sizes(state := self.state(points), self.case.bodies)
-        for term in self.case.terms:
-            term.act(actions, state)
+        actions = _Sizes(self.state(points), self.case.bodies).add(self.case.terms)
         return np.broadcast_to(actions.size, len(points))
 
     def level(self, points: Array) -> NDArray[np.bool_]:

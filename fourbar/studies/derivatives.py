@@ -8,17 +8,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects import Gravity, PinFriction
+from fourbar.effects import Gravity
 from fourbar.effects.actions import Actions
-from fourbar.effects.cones import solve_sliding
-from fourbar.effects.effect import SolvedFriction
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import list_kinematics, name_of_command
 from fourbar.formulas.arithmetic import polar
 from fourbar.formulas.path import Path
 from fourbar.formulas.position import HalfAngle, Position, find_parallel_pairs, put_parallel_pairs
-from fourbar.linkage import PIN_FORCE
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
@@ -224,53 +221,14 @@ class _Directed(Gravity):
         return polar(self.magnitude, self.angle)
 
 
-class _Sliding(PinFriction):
-    """Pin friction, derived by the implicit function: (1 - J) dx = d(k |F + C x|), J the slope by x."""
-
-    __slots__ = ()
-
-    def solve_friction(self, actions: Actions, pins: Any, eliminate: Any) -> SolvedFriction:
-        names, arms = self.loaded_pins, {pin: mu * r for pin, mu, r in self.pins}
-        senses, per_unit = {pin: actions.sense(pin) for pin in names}, self.per_unit(actions, eliminate)
-        force = [getattr(pins, PIN_FORCE[pin]) for pin in names]
-        by = [[getattr(per_unit[q], PIN_FORCE[pin]) for q in names] for pin in names]
-        shape = take_values(pins.F12).shape
-
-        def plain(number: Any) -> Any:
-            z = np.broadcast_to(take_values(number), shape)
-            return np.stack([z.real, z.imag], axis=-1) if np.iscomplexobj(z) else z
-
-        C = np.stack([np.stack([plain(c) for c in row], axis=1) for row in by], axis=1)
-        k = np.stack([plain(arms[pin]) for pin in names], axis=1)
-        found = solve_sliding(np.stack([plain(f) for f in force], axis=1), C, k)
-        x = found.x
-        gaps, J = [], np.empty((len(x), len(names), len(names)))
-        for row, pin in enumerate(names):
-            total = force[row]
-            for column in range(len(names)):
-                total = total + by[row][column] * x[:, column]
-            gaps.append(take_slopes(arms[pin] * np.abs(total)))
-            unit = total.values / np.abs(total.values)
-            for column in range(len(names)):
-                own = take_values(by[row][column])
-                J[:, row, column] = k[:, row] * (unit.conjugate() * own).real
-        rows = np.stack([np.broadcast_to(gap, (gap.shape[0], len(x))) for gap in gaps])  # (pins, p, n)
-        solvable = found.number == 0
-        dx = np.full(rows.shape, np.nan)
-        matrix = np.eye(len(names)) - J[solvable]
-        dx[:, :, solvable] = np.moveaxis(np.linalg.solve(matrix, np.moveaxis(rows[:, :, solvable], -1, 0)), 0, -1)
-        for row, pin in enumerate(names):
-            actions.couple(pin, -senses[pin] * Sloped(x[:, row], dx[row]))
-        return SolvedFriction(eliminate(actions))
-
-
 def make_differentiable(scene: Scene) -> Scene:
     """Replace the scene's effects by some that compute their derivatives too."""
-    twins: dict[Any, Any] = {
-        Gravity: lambda own: _Directed(own.magnitude, own.angle),
-        PinFriction: lambda own: _Sliding(own.pins),
-    }
-    return replace(scene, effects=tuple(twins.get(type(own), lambda own: own)(own) for own in scene.effects))
+    return replace(
+        scene,
+        effects=tuple(
+            _Directed(own.magnitude, own.angle) if isinstance(own, Gravity) else own for own in scene.effects
+        ),
+    )
 
 
 def _seed(scene: Scene, keys: dict[str, SceneNumber]) -> Scene:

@@ -81,9 +81,7 @@ def make_bodies(scene: Scene, at: Command) -> thirteen.FreeBodies:
     """Set up the free bodies with what acts on them, moments about the mass centres, by our kinematics."""
     state, parts = compute_state(scene, at), list_bodies(scene.linkage, scene.effects)
     n = len(state.theta_2)
-    actions = Actions(state, parts)
-    for term in (*scene.loads, *scene.effects):
-        term.act(actions, state)
+    actions = Actions(state, parts).add((*scene.loads, *scene.effects))
     acting = actions.wrenches(Wrenches())
     first, second, force, moment = {}, {}, {}, {}
     for k, body in zip(MOVING_BARS, parts, strict=True):

@@ -100,10 +100,9 @@ def _check_sums(question: Question) -> Iterator[Row]:
     # what acts at the speeds that were answered, not at another evaluation of them
     speeds = {f"omega_{bar}": getattr(solution, f"omega_{bar}") for bar in MOVING_BARS if bar != at.bar}
     state = state._replace(moving=state.moving._replace(**speeds))
-    actions = Actions(state, list_bodies(scene.linkage, scene.effects))
     with np.errstate(all="ignore"):
-        for term in (*scene.loads, *scene.effects):
-            term.act(actions, state)
+        actions = Actions(state, list_bodies(scene.linkage, scene.effects)).add((*scene.loads, *scene.effects))
+        for term in scene.effects:
             if term.loaded_pins:
                 term.act_known(actions, {name: getattr(solution, name) for name in PIN_FORCE.values()})
     torque, drive = solution.torque, COUPLE.value
