@@ -67,8 +67,7 @@ def list_handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
     for path_of, entry in lines:
         for end in ("from", "to"):
             if isinstance(own := entry.get(end), dict):
-                distance, angle = own.get("at", ("0 m", "0 rad"))
-                z = cmath.rect(to_si(distance, "m"), to_si(angle, "rad"))
+                z = parse_place(own.get("at", ("0 m", "0 rad")))
                 name = f"{end} of {path_of[-2:][0]} {path_of[-1] + 1 if isinstance(path_of[-1], int) else ''}".strip()
                 found.append(Handle(name, (*path_of, end, "at"), own["bar"], 0j, z))
     return found
@@ -111,7 +110,7 @@ def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], given: Dr
         own_frame = frame if handle.turns else 1.0 + 0.0j
         if list(handle.path) == given.what:
             pair = (given.to - foot) / own_frame
-            _put_pair(document, handle.path, abs(pair), cmath.phase(pair), given.grain)
+            put_place(document, handle.path, pair, given.grain)
             return
         if handle.force is not None and list(handle.force) == given.what:
             arrow = (given.to - foot - own_frame * handle.beyond) / own_frame
@@ -137,16 +136,37 @@ def _drag_pin(document: SceneDocument, given: Dragged, pins: dict[str, complex])
         document.put(key, _write_angle(document.at(key), angle, given.grain / max(abs(given.to), given.grain)))
 
 
-def _put_pair(document: SceneDocument, path: Path, size: float, angle: float, grain: float) -> None:
-    """State a distance and an angle, in the units that they have; where there is none, in those of the ground."""
-    distance = document.at((*path, 0)) or document.at(("lengths", "ground"))
-    texts = [_write_like(distance, size, grain, "m", "m")]
-    texts.append(_write_angle(document.at((*path, 1)), angle, grain / max(size, grain)))
-    if document.at(path) is None:
-        document.put(path, texts)
+def parse_place(stated: Any) -> complex:
+    """Return the place that an entry of the file states, by distance and angle or by x and y, m."""
+    if isinstance(stated, dict):
+        return complex(to_si(stated["x"], "m"), to_si(stated["y"], "m"))
+    return cmath.rect(to_si(stated[0], "m"), to_si(stated[1], "rad"))
+
+
+def put_place(document: SceneDocument, path: Path, place: complex, grain: float, by: str = "") -> None:
+    """State a place as the file does, by distance and angle or by x and y, in its units; `by` "xy" or "polar" changes.
+
+    Where the file has no place yet, its unit is that of the ground's length.
+    """
+    old = document.at(path)
+    before = "xy" if isinstance(old, dict) else "polar"
+    length = document.at((*path, "x" if before == "xy" else 0)) or document.at(("lengths", "ground"))
+    if (by or before) == "xy":
+        parts: dict[str | int, str] = {
+            name: _write_like(document.at((*path, name)) or length, x, grain, "m", "m")
+            for name, x in (("x", place.real), ("y", place.imag))
+        }
+        whole: Any = parts
     else:
-        for index, text in enumerate(texts):
-            document.put((*path, index), text)
+        size, old_angle = abs(place), document.at((*path, 1)) if before == "polar" else None
+        angle = _write_angle(old_angle, cmath.phase(place), grain / max(size, grain))
+        parts = {0: _write_like(length, size, grain, "m", "m"), 1: angle}
+        whole = list(parts.values())
+    if old is None or (by or before) != before:
+        document.put(path, whole)
+    else:
+        for step, text in parts.items():
+            document.put((*path, step), text)
 
 
 def _write_angle(old: object, angle: float, grain: float) -> str:

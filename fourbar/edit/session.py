@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.edit.document import SceneDocument, list_offers
-from fourbar.edit.dragging import Dragged, drag, write_rounded
+from fourbar.edit.document import SceneDocument, list_offers, name_entry
+from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_rounded
 from fourbar.edit.exports import Exports
 from fourbar.edit.reply import evaluate_scene
 from fourbar.errors import FourBarError, InputError
@@ -355,6 +355,17 @@ def _find_monotone(values: Any) -> tuple[int, int]:
     return best
 
 
+def _restate(session: Session, asked: dict[str, Any]) -> None:
+    """State a place by x and y, or by distance and angle."""
+    path, by = asked["path"], str(asked["by"])
+    stated = session.document.at(path)
+    if by not in ("xy", "polar") or stated is None:
+        raise InputError(name_entry(path), by, 'must be stated by "xy" or "polar"')
+    place = parse_place(stated)
+    session.change(lambda of: put_place(of, path, place, 1e-6 * abs(place), by))
+    session.document = SceneDocument(session.now.text)
+
+
 def _draw(session: Session, asked: dict[str, Any]) -> None:
     """State the lengths, the angle of the ground and the branch of four pins in the plane, given in a unit."""
     O2, A, B, O4 = (complex(*map(float, pin)) for pin in asked["pins"])
@@ -398,6 +409,7 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
     "refer": _refer,
     "units": _choose_units,
     "command": _command,
+    "restate": _restate,
     "draw": _draw,
     "save": _save,
     "export": lambda session, asked: {

@@ -21,9 +21,13 @@ class Reader:
     """The form of a number of a unit, as errors say it; likewise of several, and of a polar pair."""
     QUANTITIES = '["1 {0}", "2 {0}"]'
     POLAR = '["1 {}", "0 deg"]'
+    COORDINATES = 'or {{ x = "1 {0}", y = "0 {0}" }}'
+    """A place by coordinates; empty where it has to be polar."""
 
     def __init__(self, file: str) -> None:
         self.file = file
+        self.coordinates: dict[str, tuple[float, float]] = {}
+        """x and y of the places that are stated by them, m, by their keys."""
 
     def refuse(self, key: str, value: object, allowed: str) -> InputError:
         """Make the error for an entry, or for one that is left out (None), with the file's name."""
@@ -105,10 +109,23 @@ class Reader:
         return tuple(self.quantity(f"{key}[{index}]", entry, unit) for index, entry in enumerate(value))
 
     def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:
-        """Read a pair [magnitude, angle], in `unit` and rad."""
+        """Read a pair [magnitude, angle], in `unit` and rad; that of a place may be { x, y } instead."""
+        if isinstance(value, dict) and unit == "m" and self.COORDINATES:
+            given = self.table(key, value, ("x", "y"))
+            x, y = (self.quantity(f"{key}.{name}", given.get(name), unit) for name in "xy")
+            if not math.isfinite(math.hypot(x, y)):
+                raise self.refuse(key, value, "must be a finite distance away")
+            self.coordinates[key] = x, y
+            return convert_to_polar(x, y)
         if not isinstance(value, list) or len(value) != 2:
-            raise self.refuse(key, value, f"must be a pair like {self.POLAR.format(unit)}")
+            other = self.COORDINATES.format(unit) if unit == "m" else ""
+            raise self.refuse(key, value, f"must be a pair like {self.POLAR.format(unit)} {other}".strip())
         return (self.quantity(f"{key}[0]", value[0], unit), self.quantity(f"{key}[1]", value[1], "rad"))
+
+
+def convert_to_polar(x: float, y: float) -> tuple[float, float]:
+    """Return the distance and the angle of a place given by coordinates, rad."""
+    return math.hypot(x, y), math.atan2(y, x)
 
 
 class Written(str):

@@ -121,6 +121,7 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         _read_points(read, top.get("points", {})),
         drive=line,
     )
+    scene = replace(scene, coordinates=tuple(read.coordinates.items()))
     return replace(scene, tolerances=_read_tolerances(read, scene, top.get("tolerances", {})))
 
 

@@ -1,6 +1,8 @@
 """A scene as the text of its file: SI and radians, every digit, so that it reads back bit for bit."""
 
 import json
+import re
+from contextlib import suppress
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -12,7 +14,7 @@ import numpy as np
 from fourbar.effects import Load
 from fourbar.errors import InputError, expect
 from fourbar.files.effects import write_effect, write_ends
-from fourbar.files.fields import Reader, write_numbers, write_quantity
+from fourbar.files.fields import Reader, convert_to_polar, write_numbers, write_polar, write_quantity
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
@@ -50,6 +52,7 @@ def dump(scene: Scene) -> str:
     bars = described["bars"]
     for picture in scene.pictures:
         bars.setdefault(BAR_NAMES[picture.bar], {})["picture"] = picture.name
+    _restore_coordinates({**described, "points": points}, scene.coordinates)
     tables: list[tuple[str, dict[str, Any]]] = [
         ("", top),
         ("lengths", described["lengths"]),
@@ -62,6 +65,18 @@ def dump(scene: Scene) -> str:
         ("tolerances", _write_tolerances(scene)),
     ]
     return "\n".join(_write_table(name, entries) for name, entries in tables if entries)
+
+
+def _restore_coordinates(tables: dict[str, Any], coordinates: tuple[tuple[str, tuple[float, float]], ...]) -> None:
+    """Write places by x and y again that were read so and are the same still."""
+    for key, (x, y) in coordinates:
+        *into, last = (int(step) if step.isdigit() else step for step in re.findall(r"[^.\[\]]+", key))
+        holder: Any = tables
+        with suppress(LookupError, TypeError):
+            for step in into:
+                holder = holder[step]
+            if holder[last] == write_polar(*convert_to_polar(x, y), "m"):
+                holder[last] = {"x": write_quantity(x, "m"), "y": write_quantity(y, "m")}
 
 
 def describe(scene: Scene) -> dict[str, Any]:

@@ -37,6 +37,7 @@ class Scene:
     points : points of bars whose paths are wanted, `Point`.
     tolerances : of numbers by their keys in a scene file, `Tolerance`.
     drive : along a line, `LinearDrive`, in place of a torque on a bar.
+    coordinates : keys of the places that a scene file states by x and y, with these, m; a file is written likewise.
     """
 
     linkage: FourBar
@@ -51,6 +52,7 @@ class Scene:
     points: tuple[Point, ...] = ()
     tolerances: tuple[Tolerance, ...] = ()
     drive: "LinearDrive | None" = None
+    coordinates: tuple[tuple[str, tuple[float, float]], ...] = field(default=(), repr=False, compare=False)
 
     def __post_init__(self) -> None:
         one = {"linkage": FourBar, "motion": Motion, "title": str, "source": str}

@@ -217,6 +217,32 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_in_either_frame_and_a_nega
     assert np.angle(pulls / arrow) == pytest.approx(0.0, abs=0.02)
 
 
+def test_a_place_by_coordinates_is_dragged_and_stays_so_until_it_is_restated(session: Session) -> None:
+    load = '[[loads]]\nbar = 3\nforce = ["5 N", "10 deg"]\nat = { x = "1 in", y = "20 mm" }\n'
+    line = '[drive]\nfrom = { bar = 1, at = { x = "-30 mm", y = "40 mm" } }\nto = { bar = 2, at = ["9 cm", "0 deg"] }\n'
+    text = session.now.text.replace("[drive]\nbar = 2\n", "")
+    assert "refused" not in (told := session.do({"do": "text", "text": text + load + line})), told
+    path = ["loads", len(session.now.scene.loads) - 1, "at"]
+    to = 0.13 + 0.11j
+    dragged(session, path, to)
+    s, load = at_50(session), session.now.scene.loads[-1]
+    assert complex(*s.G3[0]) + load.at[0] * np.exp(1j * load.at[1]) == pytest.approx(to, abs=2 * PIXEL)
+    stated = session.document.at(path)
+    assert set(stated) == {"x", "y"} and stated["x"].endswith(" in") and stated["y"].endswith(" mm")
+    dragged(session, ["drive", "from", "at"], 0.02 + 0.05j)
+    turned = np.exp(1j * session.now.scene.linkage.ground_angle)
+    start = session.now.scene.drive.start
+    assert turned * start.distance * np.exp(1j * start.angle) == pytest.approx(0.02 + 0.05j, abs=2 * PIXEL)
+    for by, kind in (("polar", list), ("xy", dict)):
+        assert "refused" not in session.do({"do": "restate", "path": path, "by": by})
+        entry = session.now.plain["loads"][path[1]]["at"]
+        assert isinstance(entry, kind)
+        at = session.now.scene.loads[-1].at
+        assert at == pytest.approx(load.at, rel=1e-5)
+    for nonsense in ({"path": path, "by": "z"}, {"path": ["lengths"], "by": "xy"}, {"path": ["no"], "by": "xy"}):
+        assert "refused" in session.do({"do": "restate"} | nonsense)
+
+
 BUCKET = ROOT / "models" / "gallery" / "excavator_bucket.toml"
 
 

@@ -240,6 +240,47 @@ def test_any_scene_reads_back_bit_for_bit(scene: fourbar.Scene) -> None:
     assert facts(loads(dump(scene))) == facts(scene)
 
 
+PLACES = {
+    "bars.coupler.centre": '[bars.coupler]\nmass = "1 kg"\ncentre = {}\n',
+    "points.P.from_pin": "[points]\nP = {{ bar = 3, from_pin = {} }}\n",
+    "loads[0].at": '[[loads]]\nbar = 4\nforce = ["1 N", "0 deg"]\nat = {}\n',
+    "drive.from.at": '[drive]\nfrom = {{ bar = 1, at = {} }}\nto = {{ bar = 2, at = ["90 mm", "0 deg"] }}\n',
+    "effects.springs[0].to.at": "[effects]\nsprings = [{{ from = {{ bar = 1 }}, to = {{ bar = 4, at = {} }}, "
+    'stiffness = "9 N/m", length = "1 mm" }}]\n',
+}
+
+
+@pytest.mark.parametrize("key", PLACES)
+def test_a_place_by_coordinates_is_the_polar_one_and_is_written_back_as_it_was_read(key: str) -> None:
+    x, y = "3 in", "-5 in"
+    by_coordinates = loads(LENGTHS + PLACES[key].format(f'{{ x = "{x}", y = "{y}" }}'))
+    distance, angle = math.hypot(to_si(x, "m"), to_si(y, "m")), math.atan2(to_si(y, "m"), to_si(x, "m"))
+    polar = loads(LENGTHS + PLACES[key].format(f'["{distance!r} m", "{angle!r} rad"]'))
+    assert by_coordinates == polar and facts(by_coordinates) == facts(polar)
+    text = dump(by_coordinates)
+    stated = f'{{ x = "{to_si(x, "m")!r} m", y = "{to_si(y, "m")!r} m" }}'
+    assert stated in text and stated not in dump(polar)
+    again = loads(text)
+    assert facts(again) == facts(by_coordinates) and dump(again) == text
+    if key.startswith("bars"):  # another centre is written as what it is
+        bars = replace(again.linkage, coupler=replace(again.linkage.coupler, centre=(0.1, 0.2)))
+        assert "{ x =" not in dump(replace(again, linkage=bars))
+    for wrong, words in (
+        ('{ x = "1 mm" }', "y' = None: is missing"),
+        ('{ x = "1 mm", y = "2 kg" }', "does not convert to m"),
+        ('{ x = "1 mm", y = "2 mm", z = "0 mm" }', "unknown key"),
+        ('"1 mm"', 'or { x = "1 m", y = "0 m" }'),
+    ):
+        with pytest.raises(InputError) as caught:
+            loads(LENGTHS + PLACES[key].format(wrong))
+        assert words.replace("y' = None: ", "") in str(caught.value) and key in str(caught.value)
+
+
+def test_a_force_has_no_coordinates() -> None:
+    with pytest.raises(InputError, match="must be a pair like"):
+        loads(LENGTHS + '[[loads]]\nbar = 4\nforce = { x = "1 N", y = "2 N" }\n')
+
+
 def test_every_letter_of_a_title_reads_back() -> None:
     title = "".join(map(chr, range(0x180))) + "\u2028\ufeff\U0001f980"
     assert loads(dump(replace(load(MODELS[0]), title=title))).title == title

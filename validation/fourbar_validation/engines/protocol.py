@@ -40,6 +40,7 @@ class _Numbers(Reader):
     QUANTITY = "in {}"
     QUANTITIES = "[1.0, 2.0], in {}"
     POLAR = "[1.0, 0.0], in {} and rad"
+    COORDINATES = ""
 
     def in_si(self, key: str, value: object, unit: str, wanted: str) -> float:
         if type(value) is int and value.bit_length() < 1024:
