@@ -9,9 +9,9 @@ from fourbar.errors import DependencyError as DependencyError
 from fourbar.errors import FourBarError as FourBarError
 from fourbar.errors import InputError as InputError
 from fourbar.errors import NotAssembledError as NotAssembledError
-from fourbar.formulas.linkage_type import classify as classify
 from fourbar.formulas.mobility import change_points as change_points
 from fourbar.formulas.mobility import circuits as circuits
+from fourbar.formulas.mobility import classify as classify
 from fourbar.formulas.mobility import limit_positions as limit_positions
 from fourbar.formulas.mobility import swing as swing
 from fourbar.formulas.mobility import time_ratio as time_ratio

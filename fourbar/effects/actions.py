@@ -80,16 +80,15 @@ class Actions:
         if pin is None:
             self.pull_ends(start, end, force)
             return
-        (one, square), (other, other_square) = (point.from_pin(pin, self.state) for point in (start, end))
-        by_one, by_other = one * self.state.direction(start.bar), other * self.state.direction(end.bar)
-        arm = select(square < other_square, by_one, by_other)
         first, second = PINS[pin]
         on_second = force if start.bar == second else -force
+        (one, square), (other, other_square) = (point.from_pin(pin, self.state) for point in (start, end))
+        by_one, by_other = one * self.state.direction(start.bar), other * self.state.direction(end.bar)
+        self.couple(pin, select(square < other_square, cross(-on_second, by_one), cross(-on_second, by_other)))
         if first == 1:  # the pin is the first one of the other bar
             self.force(second, on_second)
         else:
             self.through[pin] = self.through[pin] + on_second if pin in self.through else on_second
-        self.couple(pin, cross(-on_second, arm))
 
     def pull_ends(self, start: Any, end: Any, force: Number) -> None:
         """Add the two forces where they act."""

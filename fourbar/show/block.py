@@ -6,7 +6,7 @@ from textwrap import wrap
 import numpy as np
 
 from fourbar.errors import clean_line
-from fourbar.formulas.linkage_type import classify
+from fourbar.formulas.mobility import classify
 from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene

@@ -35,7 +35,7 @@ def show_scene(scene: Scene, units: Conversion = SI) -> str:
 
 
 def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
-    from fourbar.formulas.linkage_type import classify
+    from fourbar.formulas.mobility import classify
     from fourbar.show.duty import describe_drive
     from fourbar.show.tables import write_value
 

@@ -11,7 +11,7 @@ from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import dump
 from fourbar.files.pictures import encode_picture
 from fourbar.files.scene_text import BARS
-from fourbar.formulas.linkage_type import classify
+from fourbar.formulas.mobility import classify
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command, command_at

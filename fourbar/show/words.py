@@ -4,8 +4,16 @@ import math
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from fourbar.formulas.linkage_type import classify
-from fourbar.formulas.mobility import change_points, circuits, limit_positions, reach_of, swing, time_ratio, turns_fully
+from fourbar.formulas.mobility import (
+    change_points,
+    circuits,
+    classify,
+    limit_positions,
+    reach_of,
+    swing,
+    time_ratio,
+    turns_fully,
+)
 from fourbar.formulas.transmission import transmission_extremes
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
 from fourbar.scene.motion import BRANCH_NAMES

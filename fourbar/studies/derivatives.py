@@ -15,7 +15,7 @@ from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import list_kinematics, name_of_command
 from fourbar.formulas.arithmetic import polar
 from fourbar.formulas.path import Path
-from fourbar.formulas.position import HalfAngle, Position, find_parallel_pairs, put_parallel_pairs
+from fourbar.formulas.position import HalfAngle, Position, compute_factors, find_parallel_pairs, put_parallel_pairs
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
@@ -292,12 +292,11 @@ def _compute_position(path: Path, q: Any, branch: Array) -> Position:
 
     Those of the tangent of a half angle, which has no bound, lose every digit half a turn from where it is zero.
     """
-    d, a, *_, E1, E2 = path.lengths
     h = 0.5 * (q - path.theta_1)
     s, k = np.sin(h), np.cos(h)
     if path.bar == 4:  # of half a turn less
         s, k = -k, s
-    sloped = (s * s, k * k, s * k, E1 + 4.0 * a * d * (k * k), E2 + 4.0 * a * d * (s * s))
+    sloped = compute_factors(path.lengths, s * s, k * k, s * k)
     plain = path.half_angle(q)
     half = HalfAngle(*(Sloped(take_values(x), take_slopes(same)) for x, same in zip(plain, sloped, strict=True)))
     at = path.position(q, half, branch)

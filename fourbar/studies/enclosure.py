@@ -23,7 +23,7 @@ from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.mobility import TURN, change_points, find_intervals, limit_positions, turns_fully
 from fourbar.formulas.path import Path
-from fourbar.formulas.position import HalfAngle, Loop, close_loop
+from fourbar.formulas.position import Loop, close_loop, compute_factors
 from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Scene, command, require_input
 from fourbar.solve import solve
@@ -193,8 +193,7 @@ class _Search:
         theta_1 = angles[0]
         h = 0.5 * (q - theta_1)
         s, k = np.sin(h), np.cos(h)
-        ss, kk, four_ad = s * s, k * k, 4.0 * a * d
-        half = HalfAngle(ss, kk, s * k, lengths.E1 + four_ad * kk, lengths.E2 + four_ad * ss)
+        half = compute_factors(lengths, s * s, k * k, s * k)
         u1, u2 = (np.cos(angle) + 1j * np.sin(angle) for angle in angles)
         at = close_loop(lengths, u1, u2, half, self.branch)
         terms = (*scene.loads, *scene.effects)

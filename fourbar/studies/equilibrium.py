@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import expect
-from fourbar.formulas.closed_curve import on_curve, transmission
 from fourbar.formulas.mobility import MARGIN, TURN, Circuit, choose_range, circuits, turns_fully
 from fourbar.formulas.position import Loop
 from fourbar.formulas.torque import inertia
@@ -34,6 +33,8 @@ from fourbar.studies.circuit_curve import (
     RestPosition,
     compute_generalised_force,
     of_input,
+    on_curve,
+    transmission,
 )
 from fourbar.studies.derivatives import make_differentiable
 from fourbar.studies.enclosure import PROVABLE

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.formulas.closed_curve import closure
 from fourbar.formulas.position import Loop
 from fourbar.solution import Array
+from fourbar.studies.circuit_curve import closure
 from fourbar.studies.sloped import Sloped
 
 PI = math.pi

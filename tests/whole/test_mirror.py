@@ -24,15 +24,13 @@ JUDGED_BY = {
     "whole/test_results_format.py": "validation/compare: columns",
     "whole/test_package.py": "validation: places",
     # one table or one evaluation, whose rows are no use alone
-    "fourbar/effects/test_effects.py": "fourbar/effects: actions cones effect flywheel friction gravity load "
+    "fourbar/effects/test_effects.py": "fourbar/effects: actions effect flywheel friction gravity load "
     "pin_friction torsion viscous",
     "fourbar/edit/test_session.py": "fourbar/edit: reply document dragging exports",
     "fourbar/edit/test_server.py": "fourbar/edit: redirect witness",
     "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
-    "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve zeros; fourbar/show: equilibrium; "
-    "fourbar/formulas: closed_curve",
-    "fourbar/formulas/test_mobility.py": "fourbar/formulas: linkage_type",
+    "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve zeros; fourbar/show: equilibrium",
     "fourbar/test_solve.py": "fourbar: linkage solution; fourbar/scene: motion; fourbar/evaluation: case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion_law; fourbar/studies: keys",
     "fourbar/studies/test_spread.py": "fourbar/scene: numbers",

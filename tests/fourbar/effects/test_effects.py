@@ -9,7 +9,7 @@ import pytest
 
 import fourbar
 from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Spring, SpringEnd, Springs, Table, Torsion
-from fourbar.effects.cones import NONE, ONE, SEVERAL, solve_sliding
+from fourbar.effects.pin_friction import MANY, NONE, ONE, solve_sliding
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
@@ -182,7 +182,7 @@ def test_one_cone_has_one_none_or_two_solutions() -> None:
         ((1.0, 0.0), (0.5, 0.0)): (ONE, 2.0, 0.5),
         ((1.0, 0.0), (-0.5, 0.0)): (ONE, 2.0 / 3.0, 1.0),
         ((1.0, 0.0), (2.0, 0.0)): (NONE, math.nan, None),
-        ((1.0, 0.0), (-2.0, 0.0)): (SEVERAL, 1.0 / 3.0, 1.0),
+        ((1.0, 0.0), (-2.0, 0.0)): (MANY, 1.0 / 3.0, 1.0),
         ((1.0, 0.0), (0.0, 2.0)): (NONE, math.nan, None),
         ((1.0, 0.0), (0.0, 0.6)): (ONE, 1.25, 0.64),
         ((0.0, 0.0), (0.5, 0.3)): (ONE, 0.0, 1.0),
@@ -199,7 +199,7 @@ def test_one_cone_has_one_none_or_two_solutions() -> None:
 
 def test_several_cones_one_of_which_is_known() -> None:
     """Two pins that do not feel each other are two single ones, in every outcome, each position with its own arms."""
-    for c1, c2, number in ((0.5, 0.3, ONE), (2.0, 0.3, NONE), (-2.0, 0.3, SEVERAL), (-2.0, -3.0, SEVERAL)):
+    for c1, c2, number in ((0.5, 0.3, ONE), (2.0, 0.3, NONE), (-2.0, 0.3, MANY), (-2.0, -3.0, MANY)):
         F = np.array([[[1.0, 0.0], [2.0, 0.0]]] * 2)
         C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]] * 2)
         found = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Gravity, Load, Spring, SpringEnd, Springs, Table, Torsion, cones
+from fourbar.effects import Gravity, Load, Spring, SpringEnd, Springs, Table, Torsion, pin_friction
 from fourbar.formulas import longer
 from fourbar.linkage import Bar, FourBar
 from fourbar.quantities import PIN_FORCES
@@ -131,8 +131,8 @@ def test_a_bar_is_as_wide_as_what_a_position_loses() -> None:
 
 def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Eight thousand positions of several loaded pins, each searched from many starts, took eight minutes."""
-    searched, search = [], cones._search
-    monkeypatch.setattr(cones, "_search", lambda *problems: searched.extend(problems[0]) or search(*problems))
+    searched, search = [], pin_friction._search
+    monkeypatch.setattr(pin_friction, "_search", lambda *problems: searched.extend(problems[0]) or search(*problems))
     jammed = replace(
         sized(),
         motion=Motion(np.array([0.3, 0.5]), 10.0),

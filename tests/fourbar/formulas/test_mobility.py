@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fourbar.errors import InputError
-from fourbar.formulas.linkage_type import classify
 from fourbar.formulas.mobility import (
     change_points,
     choose_range,
     circuits,
+    classify,
     find_circuit,
     find_intervals,
     follow_smooth_path,

@@ -15,7 +15,7 @@ from fourbar import Friction, InputError, Motion, Scene, Sweep, Tolerance
 from fourbar.cli import status
 from fourbar.effects import Gravity, Spring, SpringEnd, Springs
 from fourbar.scene import Command
-from fourbar.studies import enclosure, interval
+from fourbar.studies import enclosure
 from fourbar.studies.enclosure import PROVEN, Extremes, extremes
 
 MODELS = Path(__file__).parents[3] / "models"
@@ -64,7 +64,7 @@ def test_no_sample_lies_outside_and_the_enclosure_is_as_narrow_as_promised(rocke
 def test_poles_are_kept_away_from_and_the_drive_may_be_on_any_bar() -> None:
     scene = fourbar.load(MODELS / "thesis.toml")
     found = extremes(scene, ["torque"])
-    assert found.distance == interval.DISTANCE and len(found.parts) == 3 and set(found.least) == {"torque"}
+    assert found.distance == enclosure.DISTANCE and len(found.parts) == 3 and set(found.least) == {"torque"}
     theta_2 = np.concatenate([np.linspace(*part, 500) for part in found.parts])
     samples = sampled(fourbar.solve(scene, at=Command(theta_2, np.ones(1500, np.int8), 0.2244, 0.0)))
     holds(found, samples)

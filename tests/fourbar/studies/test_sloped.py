@@ -68,6 +68,7 @@ STRADDLING: dict[str, list[tuple[Scene, float, float]]] = {
     "springs": [
         (scene(Springs((MEETING,))), 0.5, 0.1),
         (scene(Springs((MEETING,))), 0.5, 1e-3),
+        (scene(Springs((MEETING,)), within={"effects.springs.0.from.at.0": 1e-3}), 2.0, 0.01),
         (scene(Springs((LOOSE,)), within={"effects.springs.0.preload": 10.0}), 0.5, 0.1),
     ],
     "flywheel": [(scene(Flywheel(0.5), within={"effects.flywheel.inertia": 1.0, "motion.alpha_2": 1.0}), 1.0, 0.1)],
@@ -79,6 +80,11 @@ FORMULAS: list[tuple[Scene, float, float]] = [
     (scene(linkage=LEVEL, within={"lengths.input": 1e-3}), 1.5, 0.01),
     (
         scene(linkage=FourBar(0.5, Bar(0.3, 1.0), Bar(0.4, 2.0), Bar(0.45, 1.5)), within={"lengths.input": 1e-2}),
+        1.0,
+        0.1,
+    ),
+    (
+        scene(linkage=FourBar(0.3, Bar(0.2, 1.0), Bar(0.25, 2.0), Bar(0.24, 1.5)), within={"lengths.input": 1e-3}),
         1.0,
         0.1,
     ),
