@@ -94,56 +94,6 @@ _ON_FIRST_USE = {
 """The file edge needs a units library, most scenes few effects: `import fourbar` loads neither."""
 
 
-def _attach_method(module: str, function: str) -> _Any:
-    """Make a method that a folder above adds to a scene or a solution; its module is loaded when it is called."""
-
-    def call(self: _Any, *arguments: _Any, **options: _Any) -> _Any:
-        return getattr(_import_module(module), function)(self, *arguments, **options)
-
-    return call
-
-
-setattr(Scene, "_repr_html_", _attach_method("fourbar.show.notebook", "show_scene"))  # noqa: B010 - declared where it is drawn
-setattr(Solution, "_repr_html_", _attach_method("fourbar.show.notebook", "show_solution"))  # noqa: B010
-
-
-def _plot(
-    self: Scene,
-    figure: str = "overview",
-    *,
-    position: float | None = None,
-    branches: str = "one",
-    units: _Any = None,
-    dimensions: bool = False,
-) -> _Any:
-    """Draw a figure that a notebook shows, and that `.save("a.pdf")` writes.
-
-    Parameters
-    ----------
-    figure : "overview", "linkage", "coupler", "kinematics", "points", "torque", "stroke", "forces", "hodograph",
-        "energy", "transmission", "freebody", "bars" or "sensitivity".
-    position : what is commanded where linkage and free bodies are drawn, rad or m; left out: the scene's own.
-    branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
-    units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI with the prefix that suits, deg.
-    dimensions : write the lengths of the bars at them.
-
-    Raises
-    ------
-    InputError : unknown figure or choice of branches; a figure of forces without omega_2; a position or dimensions
-        for a figure that shows none.
-    NotAssembledError : there is no position to draw.
-    DependencyError : matplotlib is missing.
-    """
-    from fourbar.show.plot.figures import draw_figure
-
-    given = {} if units is None else {"units": units}
-    return draw_figure(self, figure, position=position, branches=branches, dimensions=dimensions, **given)
-
-
-_plot.__name__, _plot.__qualname__ = "plot", "Scene.plot"
-setattr(Scene, "plot", _plot)  # noqa: B010
-
-
 def __getattr__(name: str) -> _Any:
     if name in _ON_FIRST_USE:
         return getattr(_import_module(_ON_FIRST_USE[name]), name)

@@ -5,6 +5,7 @@ import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,6 +88,9 @@ class Solution(Quantities):
             *(f"{name}: {write_between(values)} {find_unit(name.strip('|'))}" for name, values in shown.items()),
         ]
         return "\n".join([*lines, list_names("evaluated", self.evaluated())])
+
+    def _repr_html_(self) -> Any:
+        return import_module("fourbar.show.notebook").show_solution(self)
 
     @property
     def commanded(self) -> str:

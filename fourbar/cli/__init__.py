@@ -5,9 +5,8 @@ import sys
 import click
 
 from fourbar import __version__
-from fourbar.cli.edit import edit
 from fourbar.cli.evaluate import analyze, classify, equilibrium, extremes, new, tolerance
-from fourbar.cli.export import animate, mjcf, plot, sdf, usd
+from fourbar.cli.export import animate, edit, mjcf, plot, sdf, usd
 from fourbar.errors import run
 
 SECTIONS = {

@@ -27,8 +27,8 @@ def classify(lengths: tuple[str, ...], everything: bool, as_json: bool, out: Pat
     D A B C are ground, input, coupler and output: four bare numbers are ratios; lengths like 30cm work too.
     """
     from fourbar.linkage import Bar, FourBar
+    from fourbar.show.block import write_type, write_type_json
     from fourbar.show.units import suit_units
-    from fourbar.show.words import write_type, write_type_json
 
     ratios = [given.is_bare(text) for text in lengths]
     if any(ratios) and not all(ratios):
@@ -186,8 +186,7 @@ def _read_pressure(scene: Scene, pressure: str | None) -> float | None:
 
 
 def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
-    from fourbar.show import influence
-    from fourbar.show.tables import write_table
+    from fourbar.show.studies import write_sensitivity, write_sensitivity_json
     from fourbar.studies.derivatives import sensitivity
 
     with given.open_scene(scene) as stated:
@@ -196,11 +195,7 @@ def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
         raise NotAssembledError(
             f"{scene}: motion.{stated.motion.names[0]}: the linkage assembles at none of the positions"
         )
-    if as_json:
-        text = influence.write_json(found)
-    else:
-        text = write_table(stated.title, influence.write_heading(found), influence.make_table(found))
-    given.print_to(text, out)
+    given.print_to((write_sensitivity_json if as_json else write_sensitivity)(found), out)
 
 
 @click.command()
@@ -214,8 +209,7 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units:
     """Show what the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
-    from fourbar.show.progress import show_running
-    from fourbar.show.tables import write_table
+    from fourbar.show.tables import show_running, write_table
     from fourbar.studies.spread import SAMPLES, tolerances
 
     _refuse_units_of_json(as_json, units)
@@ -251,19 +245,14 @@ def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
 @given.text_option(*given.TABLES)
 def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: Conversion, out: Path | None) -> None:
     """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
-    from fourbar.show import extremes as shown
-    from fourbar.show.progress import show_running
-    from fourbar.show.tables import write_table
+    from fourbar.show.studies import write_extremes, write_extremes_json
+    from fourbar.show.tables import show_running
     from fourbar.studies.enclosure import extremes as proven
 
     _refuse_units_of_json(as_json, units)
     with given.open_scene(scene) as stated, show_running("pieces of the interval are halved"):
         found = proven(stated, quantities)
-    if as_json:
-        text = shown.write_json(stated, found)
-    else:
-        own = {**DEGREES, **units}
-        text = write_table(stated.title, shown.write_heading(stated, found, own), shown.make_table(found, own))
+    text = write_extremes_json(stated, found) if as_json else write_extremes(stated, found, {**DEGREES, **units})
     given.print_to(text, out)
 
 
@@ -273,10 +262,10 @@ def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: Con
 @given.text_option(*given.TABLES)
 def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
     """Find where a linkage stays by itself, stable or not, how fast it swings there, and what holds it elsewhere."""
-    from fourbar.show import equilibrium as shown
-    from fourbar.show.progress import show_running
+    from fourbar.show.studies import write_equilibria, write_equilibria_json
+    from fourbar.show.tables import show_running
     from fourbar.studies.equilibrium import equilibrium as found
 
     with given.open_scene(scene) as described, show_running("the boxes are halved"):
         result = found(described)
-    given.print_to((shown.write_json if as_json else shown.write_tables)(described.title, result), out)
+    given.print_to((write_equilibria_json if as_json else write_equilibria)(described.title, result), out)

@@ -1,17 +1,20 @@
-"""The commands that write files: pictures (plot, animate), and models for simulators (mjcf, sdf, usd)."""
+"""The commands that write files: pictures, models for simulators; and the workbench."""
 
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from fourbar.cli import given
-from fourbar.errors import InputError
+from fourbar.cli.given import FILE
+from fourbar.errors import DependencyError, InputError, say_install
 from fourbar.scene import Scene
 from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
     from fourbar.mjcf.document import Drive
+
 
 without_loads_option = click.option(
     "--without-loads", is_flag=True, help="Leave the loads out: the form has none, your program applies them."
@@ -138,7 +141,7 @@ def mjcf(
 @given.text_option(".sdf", ".world", ".xml", required=True)
 def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
     """Write a scene as SDF, the loop closed by a fourth joint (Gazebo) or a ball constraint (Drake)."""
-    from fourbar.mjcf.sdf import write_sdf as written
+    from fourbar.mjcf.assembly import write_sdf as written
 
     with given.open_scene(scene) as described:
         given.print_to(written(described, reader, without_loads=without_loads), out)
@@ -150,7 +153,30 @@ def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
 @given.text_option(".usda", ".usd", required=True)
 def usd(scene: Path, without_loads: bool, out: Path) -> None:
     """Write a scene as USD text (.usda) for Newton, the loop closed by a fourth revolute joint."""
-    from fourbar.mjcf.usd import write_usd as written
+    from fourbar.mjcf.assembly import write_usd as written
 
     with given.open_scene(scene) as described:
         given.print_to(written(described, without_loads=without_loads), out)
+
+
+@click.command()
+@click.argument("scene", type=FILE, required=False)
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Of this machine; left out: any that is free.")
+@click.option("--exports", type=FILE, metavar="FOLDER", help="For exports and reports; left out: SCENE_exports.")
+@click.option("--no-browser", is_flag=True, help="Print the address only.")
+def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) -> None:
+    """Change a scene in the browser, and see torque and forces follow; without SCENE a new one.
+
+    Ctrl-C ends it, and so does a minute and a half without a page.
+    """
+    from fourbar.writing import require_file
+
+    if scene is None:
+        names = (Path(f"linkage{number}.toml") for number in chain([""], count(2)))
+        scene = next(path for path in names if not path.exists())
+    require_file(scene)
+    try:
+        from fourbar.edit.server import edit as opened_there
+    except ModuleNotFoundError as error:
+        raise DependencyError(f"{error.name} is not installed: {say_install('edit')}") from None
+    opened_there(scene, exports or scene.with_name(f"{scene.stem}_exports"), port, browse=not no_browser)

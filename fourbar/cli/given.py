@@ -100,7 +100,7 @@ def show_waiting(scene: Scene) -> Iterator[None]:
         yield
         return
     from fourbar.evaluation.free_motion import STEPS
-    from fourbar.show.progress import show_running
+    from fourbar.show.tables import show_running
 
     with show_running(f"the free motion is integrated, in {STEPS} steps at most"):
         yield

@@ -13,10 +13,9 @@ import numpy as np
 from fourbar.edit.dragging import list_handles
 from fourbar.errors import NotAssembledError
 from fourbar.scene import Scene
-from fourbar.show.block import write_block
-from fourbar.show.page_data import collect_live_data
+from fourbar.show.animate import collect_live_data
+from fourbar.show.block import write_block, write_type
 from fourbar.show.units import COMMON
-from fourbar.show.words import write_type
 from fourbar.solution import Conversion, Solution
 from fourbar.solve import find_last_stage, solve
 

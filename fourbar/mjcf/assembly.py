@@ -1,13 +1,16 @@
-"""The assembled linkage as bodies with what acts on them, for files that hold neither speeds nor a drive: SDF, USD."""
+"""Files that hold no drive at a speed: SDF for Gazebo and Drake, USD for Newton, the bars standing assembled."""
 
 import cmath
+import json
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
+from xml.etree import ElementTree as ET
 
-from fourbar.errors import LimitError
-from fourbar.linkage import FIRST_PIN, MOVING_BARS
+from fourbar.errors import LimitError, clean_line
+from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.document import NOTES, Start, find_start
-from fourbar.mjcf.model import require_carriable
+from fourbar.mjcf.model import join, require_carriable
 from fourbar.scene import Scene, require_input
 
 PARENT = {2: 1, 3: 2, 4: 1}
@@ -84,3 +87,175 @@ def write_comment(scene: Scene, form: str, reader: str, assembly: Assembly, at_B
     lines = [notes["opens"].strip().format(*map(repr, assembly.numbers), form=form, at_B=at_B)]
     lines += [notes["drive"].format(bar=bar, joint=joint), *([notes["without_loads"]] if scene.loads else [])]
     return "\n".join([*lines, notes[reader].strip()])
+
+
+DAMPING = {"viscous": ("damping", "coefficients")}
+AT_JOINTS = {"gazebo": {**DAMPING, "friction": ("friction", "torques")}, "drake": DAMPING}
+"""What a joint holds, by effect: its element, and the field of the effect."""
+DRAKE = "http://drake.mit.edu"
+"""Namespace of the elements that only Drake reads."""
+
+
+def write_sdf(scene: Scene, reader: str = "gazebo", start: Start | None = None, *, without_loads: bool = False) -> str:
+    """Write the SDF 1.9 text of a scene: a world with gravity, four links, and the pins as joints.
+
+    Parameters
+    ----------
+    reader : who closes the loop how: "gazebo" by a fourth joint, "drake" by its own ball constraint.
+    start : the assembled state to stand in; None: that of `find_start`.
+    without_loads : leave the scene's loads out, for the program to apply; otherwise they are refused.
+
+    Raises
+    ------
+    LimitError : a load, an effect or a motion law has no counterpart there.
+    InputError : a bar without mass or inertia, which neither carries.
+    NotAssembledError : the linkage closes at none of the scene's positions.
+
+    Source: sdformat.org/spec, and Drake's documentation of its parser.
+    """
+    linkage = scene.linkage
+    form = f"SDF for {reader}"
+    assembled = assemble(scene, start, form, AT_JOINTS[reader], without_loads=without_loads)
+    turn, foot, numbers, inertia, gravity, dynamics = assembled
+    if reader == "drake" and "B" in dynamics:
+        raise LimitError("Drake's ball constraint at pin B has no damping")
+    omega_2, at_A, omega_4 = numbers[3:]
+    root = ET.Element("sdf", {"version": "1.9", **({"xmlns:drake": DRAKE} if reader == "drake" else {})})
+    at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s" if reader == "gazebo" else ""
+    for line in write_comment(scene, "SDF", reader, assembled, at_B).splitlines():
+        root.append(ET.Comment(f" {line} "))
+    world = ET.SubElement(root, "world", name="four_bar")
+    ET.SubElement(world, "gravity").text = join(*gravity, 0.0)
+    model = ET.SubElement(world, "model", name=clean_line(scene.title) or "four-bar")
+    _add_link(model, BAR_NAMES[1], 0j, 0.0, 1.0, 1.0, 0j)
+    _add_joint(model, "ground_on_world", "fixed", "world", BAR_NAMES[1])
+    for number in MOVING_BARS:
+        bar = linkage.bar(number)
+        _add_link(model, BAR_NAMES[number], foot[number], turn[number], bar.mass, inertia[number], bar.to_centre)
+        pin = FIRST_PIN[number]
+        _add_joint(model, pin, "revolute", BAR_NAMES[PARENT[number]], BAR_NAMES[number], dynamics.get(pin, {}))
+    length_3, length_4 = linkage.coupler.length, linkage.output.length
+    if reader == "gazebo":
+        joint = _add_joint(model, "B", "revolute", BAR_NAMES[4], BAR_NAMES[3], dynamics.get("B", {}))
+        ET.SubElement(joint, "pose").text = join(length_3, 0, 0, 0, 0, 0)  # in the frame of its child
+    else:
+        ball = ET.SubElement(model, "drake:ball_constraint")
+        for key, value in (("body_A", BAR_NAMES[3]), ("body_B", BAR_NAMES[4])):
+            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = value
+        for key, length in (("p_AP", length_3), ("p_BQ", length_4)):
+            ET.SubElement(ball, f"drake:ball_constraint_{key}").text = join(length, 0.0, 0.0)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_link(
+    model: ET.Element, name: str, foot: complex, turn: float, mass: float, inertia: float, centre: complex
+) -> None:
+    link = ET.SubElement(model, "link", name=name)
+    ET.SubElement(link, "pose").text = join(foot.real, foot.imag, 0, 0, 0, turn)
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "pose").text = join(centre.real, centre.imag, 0, 0, 0, 0)
+    ET.SubElement(inertial, "mass").text = join(mass)
+    tensor = ET.SubElement(inertial, "inertia")
+    for axes in ("ixx", "iyy", "izz"):  # izz alone acts in the plane; three equal ones are a possible body
+        ET.SubElement(tensor, axes).text = join(inertia)
+    for axes in ("ixy", "ixz", "iyz"):
+        ET.SubElement(tensor, axes).text = "0"
+
+
+def _add_joint(
+    model: ET.Element, name: str, kind: str, parent: str, child: str, dynamics: dict[str, float] | None = None
+) -> ET.Element:
+    joint = ET.SubElement(model, "joint", name=name, type=kind)
+    ET.SubElement(joint, "parent").text = parent
+    ET.SubElement(joint, "child").text = child
+    if dynamics is not None:
+        axis = ET.SubElement(joint, "axis")
+        ET.SubElement(axis, "xyz").text = "0 0 1"
+        if dynamics:
+            values = ET.SubElement(axis, "dynamics")
+            for key, value in dynamics.items():
+                ET.SubElement(values, key).text = join(value)
+    return joint
+
+
+def write_usd(scene: Scene, start: Start | None = None, *, without_loads: bool = False) -> str:
+    """Write the USD text (.usda) of a scene: three rigid bodies, four revolute joints, the fourth closing the loop.
+
+    Parameters and errors as of `write_sdf`; of the effects it has gravity and flywheel.
+
+    Source: openusd.org, UsdPhysics.
+    """
+    linkage = scene.linkage
+    assembled = assemble(scene, start, "USD", {}, without_loads=without_loads)
+    turn, foot, _, inertia, (x, y), _ = assembled
+    pull = math.hypot(x, y)
+    bodies = []
+    for number in MOVING_BARS:
+        bar = linkage.bar(number)
+        bodies.append(
+            f"""    def Xform "{BAR_NAMES[number]}" (
+        prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]
+    )
+    {{
+        float physics:mass = {bar.mass!r}
+        point3f physics:centerOfMass = {_place(bar.to_centre)}
+        float3 physics:diagonalInertia = ({", ".join([repr(inertia[number])] * 3)})
+        quatf physics:principalAxes = (1, 0, 0, 0)
+        double3 xformOp:translate = {_place(foot[number])}
+        quatd xformOp:orient = {_write_turn(turn[number])}
+        uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]
+    }}
+"""
+        )
+    joints = []
+    length = {number: linkage.bar(number).length for number in MOVING_BARS}
+    places = {FIRST_PIN[number]: (PARENT[number], number, 0.0) for number in MOVING_BARS} | {"B": (4, 3, length[3])}
+    for pin, (one, other, along) in places.items():
+        on_one = {"O2": 0j, "A": complex(length[2]), "B": complex(length[4]), "O4": foot[4]}[pin]
+        joints.append(
+            f"""    def PhysicsRevoluteJoint "{pin}"
+    {{
+        uniform token physics:axis = "Z"
+        {"" if one == 1 else f"rel physics:body0 = </four_bar/{BAR_NAMES[one]}>"}
+        rel physics:body1 = </four_bar/{BAR_NAMES[other]}>
+        point3f physics:localPos0 = {_place(on_one)}
+        quatf physics:localRot0 = {_write_turn(turn[other] - turn[one])}
+        point3f physics:localPos1 = {_place(complex(along))}
+        quatf physics:localRot1 = (1, 0, 0, 0)
+        bool physics:excludeFromArticulation = {"true" if pin == "B" else "false"}
+    }}
+"""
+        )
+    notes = json.dumps(write_comment(scene, "USD", "newton", assembled))
+    return f"""#usda 1.0
+(
+    doc = {notes}
+    defaultPrim = "four_bar"
+    metersPerUnit = 1
+    kilogramsPerUnit = 1
+    upAxis = "Z"
+)
+
+def PhysicsScene "physics"
+{{
+    vector3f physics:gravityDirection = ({x / pull if pull else 0.0!r}, {y / pull if pull else -1.0!r}, 0)
+    float physics:gravityMagnitude = {pull!r}
+}}
+
+def Xform "four_bar" (
+    doc = {json.dumps(clean_line(scene.title) or "four-bar", ensure_ascii=False)}
+    prepend apiSchemas = ["PhysicsArticulationRootAPI"]
+)
+{{
+{"".join([*bodies, *joints])}}}
+"""
+
+
+def _place(point: complex) -> str:
+    return f"({point.real!r}, {point.imag!r}, 0)"
+
+
+def _write_turn(angle: float) -> str:
+    """Quaternion (w, x, y, z) of a turn about z."""
+    return f"({math.cos(0.5 * angle)!r}, 0, 0, {math.sin(0.5 * angle)!r})"

@@ -1,24 +1,25 @@
-"""Scene -> MJCF text: the closed loop, a drive at omega_2 and alpha_2, and a keyframe to start from."""
+"""MJCF of a scene, for each simulator that reads it; a scene from bare bar lengths."""
 
 import math
 import tomllib
 from dataclasses import replace
 from importlib.resources import files
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from fourbar.effects.effect import PinRows
 from fourbar.errors import InputError, LimitError, NotAssembledError, clean_line
-from fourbar.formulas.mobility import change_points, choose_range
-from fourbar.linkage import MOVING_BARS, FourBar
+from fourbar.formulas.mobility import change_points, choose_range, turns_fully
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, uniform
 from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.effects import find_row, unwind
 from fourbar.mjcf.model import Model, join, make_constant_motor, make_motor, make_servo, require_carriable
 from fourbar.mjcf.settings import FULL_TURN, RECIPE, Settings, WindowMotion, fit_pad
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command, require_input
+from fourbar.scene.motion import Motion
 from fourbar.solution import Array
 from fourbar.solve import solve
 
@@ -249,3 +250,58 @@ def _compute_span(linkage: FourBar) -> float:
     """Width of the range that the input can turn through, rad."""
     least, most = choose_range(linkage)
     return min(abs(most - least), 2.0 * math.pi)
+
+
+SINGLE = replace(RECIPE, flywheel=1e3, pad=None)
+"""For single precision: there a flywheel of 1e8 and fitted pads lose the closing force entirely."""
+FAST = replace(RECIPE, time_constant_steps=2.0)
+"""For a closure whose acceleration lacks a term: the quicker it yields, the sooner its error makes up for that."""
+SIMULATORS = {"mujoco": RECIPE, "warp": SINGLE, "mjx": FAST, "genesis": RECIPE, "newton": SINGLE}
+"""Who reads the file, and the settings that carry the loop best there."""
+OWN_MOTORS = ("genesis", "newton")
+"""Who puts couples on joints itself, and takes none from the controls of a file; Genesis takes no actuator at all."""
+
+
+def write_mjcf_for(scene: Scene, simulator: str = "mujoco", drive: Drive = "flywheel") -> str:
+    """Write the MJCF text of a scene for one simulator, its comments naming where torque and pin force are read.
+
+    Raises InputError for no such simulator, or a motor for one that does not take it, and as `write_mjcf` does.
+    """
+    if simulator not in SIMULATORS:
+        raise InputError("simulator", simulator, f"must be one of {', '.join(SIMULATORS)}")
+    if drive not in get_args(Drive):
+        raise InputError("drive", drive, f"must be one of {', '.join(get_args(Drive))}")
+    if drive == "motor" and simulator in OWN_MOTORS:
+        raise InputError("drive", drive, f"is read by mujoco, warp and mjx; for {simulator} take none")
+    return write_mjcf(scene, SIMULATORS[simulator], simulator, drive=drive)
+
+
+PER_METRE = 1.0
+"""kg/m of the uniform bars."""
+OMEGA = 1.0
+"""rad/s of the input."""
+
+
+def make_scene(ground: float, input: float, coupler: float, output: float, omega: float = OMEGA) -> Scene:
+    """Uniform slender bars of 1 kg/m on the open branch, the input at omega (rad/s) from mid-range; lengths in m."""
+    linkage = uniform(ground, input, coupler, output, per_metre=PER_METRE)
+    title = f"four-bar {ground!r} {input!r} {coupler!r} {output!r}"
+    # half a turn from the ground's line would start a parallelogram in its change point
+    quarter = linkage.ground_angle + math.pi / 2.0
+    start = quarter if turns_fully(linkage) else 0.5 * sum(choose_range(linkage))
+    return Scene(linkage, Motion(start, omega), title=title)
+
+
+def list_defaults(scene: Scene) -> list[str]:
+    """List the lengths that `make_scene` was given and its defaults, one line each."""
+    theta_2 = scene.motion.theta_2
+    assert isinstance(theta_2, float)
+    return [
+        "lengths in m: "
+        + ", ".join(f"{n} {x!r}" for n, x in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)),
+        f"bars: uniform and slender, {PER_METRE:g} kg/m",
+        "branch: open",
+        f"omega_2: {scene.motion.omega_2!r} rad/s, alpha_2: 0",
+        f"start: theta_2 = {theta_2!r} rad ({math.degrees(theta_2):.6g} deg)",
+        "drive: bar 2; no gravity, no loads",
+    ]

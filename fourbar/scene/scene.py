@@ -1,6 +1,7 @@
 """A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages requested."""
 
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -82,6 +83,40 @@ class Scene:
             raise InputError("points", names, "each point has a name of its own")
         if len({picture.bar for picture in self.pictures}) < len(self.pictures):
             raise InputError("pictures", [picture.bar for picture in self.pictures], "a bar has one picture")
+
+    def plot(
+        self,
+        figure: str = "overview",
+        *,
+        position: float | None = None,
+        branches: str = "one",
+        units: Any = None,
+        dimensions: bool = False,
+    ) -> Any:
+        """Draw a figure that a notebook shows, and that `.save("a.pdf")` writes.
+
+        Parameters
+        ----------
+        figure : "overview", "linkage", "coupler", "kinematics", "points", "torque", "stroke", "forces", "hodograph",
+            "energy", "transmission", "freebody", "bars" or "sensitivity".
+        position : what is commanded where linkage and free bodies are drawn, rad or m; left out: the scene's own.
+        branches : "one" (the scene's) or "both" (open and crossed, to the same scales).
+        units : in which numbers are drawn, as `fourbar.units` makes them; left out: SI with the prefix that suits, deg.
+        dimensions : write the lengths of the bars at them.
+
+        Raises
+        ------
+        InputError : unknown figure or choice of branches; a figure of forces without omega_2; a position or dimensions
+            for a figure that shows none.
+        NotAssembledError : there is no position to draw.
+        DependencyError : matplotlib is missing.
+        """
+        figures = import_module("fourbar.show.plot.figures")  # a layer above, loaded when something is drawn
+        given = {} if units is None else {"units": units}
+        return figures.draw_figure(self, figure, position=position, branches=branches, dimensions=dimensions, **given)
+
+    def _repr_html_(self) -> Any:
+        return import_module("fourbar.show.notebook").show_scene(self)
 
     def _require_linear(self, drive: object) -> None:
         """InputError where the drive is none along a line, acts on a bar too, or never moves its ends."""

@@ -1,25 +1,253 @@
 """A scene that moves: one self-contained web page, or a film (GIF, MP4).
 
-The page needs nothing but a browser: no network, no library. It replays the numbers of
-`collect_page_data` and computes none of its own; to change a length there is `fourbar edit`.
+The page needs nothing but a browser: no network, no library. It replays the numbers that `collect_page_data` collects
+of `fourbar.solve`, and computes none of its own; to change a length there is `fourbar edit`.
 """
 
 import base64
 import hashlib
 import html
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from string import Template
+from typing import Any
 
-from fourbar.errors import InputError
-from fourbar.scene import Scene
-from fourbar.show.page_data import collect_page_data
+import numpy as np
+
+from fourbar.errors import InputError, NotAssembledError
+from fourbar.files import dump
+from fourbar.files.pictures import encode_picture
+from fourbar.files.scene_text import BARS
+from fourbar.formulas.mobility import classify
+from fourbar.linkage import MOVING_BARS
+from fourbar.quantities import ANGLES, OK, PIN_FORCES
+from fourbar.scene import Command, Scene, command, command_at
+from fourbar.show.acting import Symbol, list_acting
+from fourbar.show.duty import compute_energies
 from fourbar.show.plot.style import format_of, shorten_text
-from fourbar.solution import SI, Conversion
-from fourbar.writing import write_text
+from fourbar.show.plot.view import is_over_time, list_sweep, set_branch
+from fourbar.show.tolerances import collect_tolerances
+from fourbar.show.units import choose_unit
+from fourbar.solution import SI, Array, Conversion, Solution
+from fourbar.solve import solve
+from fourbar.writing import null_nan, write_text
+
+MAX_ROWS = 1441
+"""Positions embedded in a page: a quarter of a degree over a full turn; a finer sweep is thinned out evenly."""
+WATCHED = (1.5, 60.0)
+"""A motion through time that lasts between these, s, is shown in real time."""
+RATES = tuple(f"{letter}_{bar}" for letter in ("omega", "alpha") for bar in MOVING_BARS)
+SCALARS = (
+    *ANGLES,
+    "condition",
+    *RATES,
+    "torque",
+    "torque_error",
+    "power",
+    "drive_force",
+    "drive_force_error",
+    "stroke",
+)
+
+
+def collect_page_data(
+    scene: Scene, pictures: Mapping[str, str | Path], units: Conversion = SI, *, midway: bool = False
+) -> dict[str, Any]:
+    """Collect everything the page's script needs: SI units, radians, null where there is no value.
+
+    `midway`: the page opens in the middle of a motion, not at its beginning.
+    """
+    data = collect_live_data(scene, units, signs=(1, -1), midway=midway)
+    for columns in data["branches"].values():
+        columns |= {name: null_nan(each) for name, each in columns.items() if isinstance(each, np.ndarray)}
+    given = {str(number): picture for number, picture in _encode_pictures(scene, pictures).items()}
+    found = collect_tolerances(scene, data["over"]["values"] or data["theta_2"]) if scene.tolerances else None
+    return data | {"pictures": given, "tolerances": found, "toml": _write_scene_file(scene)}
+
+
+def collect_live_data(
+    scene: Scene,
+    units: Conversion = SI,
+    *,
+    signs: tuple[int, ...] = (),
+    stage: str | None = None,
+    midway: bool = False,
+) -> dict[str, Any]:
+    """Collect what the page's script draws, columns as arrays, without tolerances, pictures and the file.
+
+    `signs`: the branches of a sweep; left out: the scene's. `stage`: the last one evaluated; left out: as of `solve`.
+    """
+    linkage, motion = scene.linkage, scene.motion
+    shown = (
+        _collect_motion(scene, stage)
+        if is_over_time(scene)
+        else _collect_sweep(scene, signs or (motion.branch,), stage)
+    )
+    closes = np.isfinite(shown["branches"][str(motion.branch)]["theta_3"])
+    if not closes.any():
+        raise NotAssembledError("nothing to show: the linkage assembles at none of the scene's positions")
+    if shown["start"] is None:
+        rows = np.flatnonzero(closes)
+        shown["start"] = int(rows[len(rows) // 2 if midway else 0])
+    factor, unit = choose_unit(max(linkage.lengths), "m", units)
+    return {
+        "type": classify(linkage).name,
+        "lengths": list(linkage.lengths),
+        "theta_1": linkage.ground_angle,
+        "unit": {"factor": factor, "name": unit},
+        "units": {unit: list(entry) for unit, entry in units.items()},
+        "centres": {
+            str(number): [(z := linkage.bar(number).to_centre).real, z.imag] if linkage.bar(number).mass > 0.0 else None
+            for number in MOVING_BARS
+        },
+        "drive_bar": scene.drive_bar,
+        "branch": motion.branch,
+        "points": [
+            {"name": p.name, "bar": p.bar, "at": [p.from_pin[0] * f(p.from_pin[1]) for f in (math.cos, math.sin)]}
+            for p in scene.points
+        ],
+        "acting": [_write_symbol(symbol, shown["theta_2"]) for symbol in list_acting(scene)],
+        "followed": motion.through == "follow",
+        **shown,
+    }
+
+
+def _write_symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
+    """One thing that acts, as the page's script draws it."""
+    entry: dict[str, Any] = symbol._asdict()
+    for name in ("at", "beyond", "vector"):
+        entry[name] = [entry[name].real, entry[name].imag]
+    entry["end"] = None if symbol.end is None else [symbol.end[0], [symbol.end[1].real, symbol.end[1].imag]]
+    table = entry.pop("table")
+    entry["factor"] = None if table is None else np.asarray(table.at(theta_2)).tolist()
+    return entry
+
+
+def _write_scene_file(scene: Scene) -> str | None:
+    """Write the scene as its file, to be downloaded; None where a file has no form of what acts."""
+    try:
+        return dump(scene)
+    except InputError:
+        return None
+
+
+def _collect_sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> dict[str, Any]:
+    """Both branches over theta_2, or that of another command over what is commanded."""
+    motion = scene.motion
+    swept, own = list_sweep(scene), command(scene)
+    where, start, name = thin_out(swept), None, swept.commanded
+    if len(own.angle) == 1:
+        away = np.angle(np.exp(1j * (where.angle - own.angle[0]))) if own.stroke is None else where.places - own.places
+        start = int(np.argmin(np.abs(away)))
+    theta_2, branches = where.angle, {}
+    for sign in signs if name == "theta_2" else (motion.branch,):
+        branch = None if motion.through == "follow" else np.full(where.angle.shape, sign, dtype=np.int8)
+        solution = solve(each := set_branch(scene, sign), stage, at=command_at(each, where.places, branch))
+        branches[str(sign)], theta_2 = _collect_columns(solution), solution.theta_2
+    if name != "theta_2":
+        branches[str(motion.branch)]["theta_2"] = theta_2
+    return {
+        "theta_2": null_nan(theta_2),
+        "time": None,
+        "over": _over(name, name, where.places, motion.speed),
+        "rate": None,
+        "start": start,
+        "branches": branches,
+        "pace": None,
+        "positions": len(swept.angle),
+    }
+
+
+def _over(name: str, commanded: str, values: Array, speed: float | None = None) -> dict[str, Any]:
+    """Say what curves and slider run over, "time" or what is commanded, with its numbers where it is not theta_2."""
+    own = None if name == "theta_2" else values.tolist()
+    return {"name": name, "commanded": commanded, "values": own, "speed": speed}
+
+
+def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
+    """Collect the one motion that the scene makes: released, or by a law."""
+    whole = solve(scene)
+    assert whole.time is not None and whole.omega_2 is not None and whole.alpha_2 is not None
+    where = thin_out(whole.at)
+    assert where.time is not None
+    solution = solve(scene, stage, at=where)
+    columns = _collect_columns(solution)
+    columns["theta_2"] = solution.theta_2.tolist()
+    if scene.motion.free is not None:
+        for name in ("torque", "torque_error", "power", "drive_force", "drive_force_error"):
+            columns.pop(name, None)
+        columns["energy"] = compute_energies(scene, solution).kinetic
+    duration = float(where.time[-1] - where.time[0])
+    rate = _choose_rate(duration)
+    return {
+        "theta_2": null_nan(solution.theta_2),
+        "time": where.time.tolist(),
+        "over": _over("time", whole.commanded, where.time),
+        "rate": rate,
+        "start": None,
+        "branches": {str(scene.motion.branch): columns},
+        "pace": _describe_pace(whole, rate, len(where.time)),
+        "positions": len(whole),
+    }
+
+
+def thin_out(where: Command) -> Command:
+    """At most `MAX_ROWS` of the positions, evenly, both ends included."""
+    n = len(where.angle)
+    return where if n <= MAX_ROWS else where.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
+
+
+def _choose_rate(duration: float) -> float:
+    """Seconds of a motion shown in one second: 1, or the power of ten that makes it last neither too short nor long."""
+    if duration <= 0.0:
+        return 1.0
+    shortest, longest = WATCHED
+    if duration < shortest:
+        return float(10.0 ** math.floor(math.log10(duration / shortest)))
+    return float(10.0 ** math.ceil(math.log10(duration / longest))) if duration > longest else 1.0
+
+
+def _describe_pace(whole: Solution, rate: float, shown: int) -> str:
+    """Say what speed 1 means, when the linkage stops before its time, and whether instants were left out."""
+    words = "At speed 1× it moves in real time"
+    if rate < 1.0:
+        words = f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
+    elif rate > 1.0:
+        words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
+    if whole.stopped_at is not None:
+        words += f". The linkage stops at a limit position at {whole.stopped_at:.4g} s"
+    if len(whole) > shown:
+        words += f". Shown are {shown} of the {len(whole)} instants"
+    return words + "."
+
+
+def _collect_columns(solution: Solution) -> dict[str, Any]:
+    """Quantity by quantity."""
+    columns: dict[str, Any] = {"sign": solution.branch.tolist()}
+    if (solution.status_code != OK).any():
+        columns["status"] = solution.status
+    for name in (*SCALARS, *PIN_FORCES):
+        values = getattr(solution, name)
+        if values is not None:
+            columns[name] = values
+    columns["transmission"] = np.arcsin(np.abs(solution.sin_mu))
+    return columns
+
+
+def _encode_pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:
+    """Encode the pictures of the bars as data URIs: those of the scene, and those given in their place."""
+    found = {}
+    for name, path in pictures.items():
+        if name not in BARS:
+            raise InputError("picture", name, "must name one of " + ", ".join(BARS))
+        found[BARS[name]] = encode_picture(f"picture.{name}", path)
+    own = {picture.bar: picture for picture in scene.pictures if picture.bar not in found}
+    return found | {bar: picture.data_uri() for bar, picture in own.items()}
+
 
 FORMATS = ("html", "gif", "mp4")
 SCRIPTS = ("numbers.js", "picture.js", "acting.js", "chart.js", "tolerances.js", "page.js")

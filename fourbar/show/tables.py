@@ -1,8 +1,9 @@
-"""The table of positions that `fourbar analyze --table` prints, and how every printed table looks."""
+"""How every printed table looks, the table of positions of `analyze --table`, and the line of what runs long."""
 
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from fourbar.solution import DEGREES, Array, Conversion, Solution, find_unit, fi
 
 if TYPE_CHECKING:
     from rich.table import Table
+
 
 MOST_DIGITS = 16
 """Of a double."""
@@ -163,3 +165,19 @@ def _count_digits(torque: Array, error: Array) -> list[str]:
         digits = np.clip(np.floor(np.log10(np.abs(torque) / error)), 0, MOST_DIGITS)
     known = np.isfinite(torque) & np.isfinite(error)
     return write_cells(np.where(known, np.where(error == 0.0, MOST_DIGITS, digits), np.nan))
+
+
+@contextmanager
+def show_running(text: str) -> Iterator[Callable[[float], None] | None]:
+    """Move a line on standard error while the body runs; nothing where that is no terminal.
+
+    Yields what the body may report the share that is done to; None where there is no terminal.
+    """
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    with console.status(f"{text}; Ctrl-C stops it") as line:
+        yield lambda share: line.update(f"{text}, {100.0 * share:.0f} % done; Ctrl-C stops it")

@@ -11,8 +11,7 @@ import numpy as np
 from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS
 from fourbar.scene import Scene
-from fourbar.show.progress import show_running
-from fourbar.show.tables import make_plain_table
+from fourbar.show.tables import make_plain_table, show_running
 from fourbar.solution import DEGREES, Array, Conversion, find_unit_in
 from fourbar.studies.spread import BAND, PARTED, Spread, Tolerances, tolerances
 from fourbar.writing import write_object

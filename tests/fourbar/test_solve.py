@@ -19,7 +19,7 @@ from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion, Sweep
-from fourbar.show.page_data import collect_page_data
+from fourbar.show.animate import collect_page_data
 from fourbar.show.plot import draw
 from fourbar.solution import Solution
 from fourbar.solve import solve

@@ -13,8 +13,7 @@ import fourbar
 import fourbar_validation.run.run
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
 from fourbar.mjcf import write_mjcf
-from fourbar.mjcf.sdf import write_sdf
-from fourbar.mjcf.usd import write_usd
+from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.scene import Command, Scene
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer

@@ -18,7 +18,7 @@ SOURCES = {
 """Folder of tests, and folder of the modules that it mirrors."""
 JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
-    "fourbar/cli/test_cli.py": "fourbar/cli: edit evaluate export given; fourbar/show: progress tables words",
+    "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given; fourbar/show: tables",
     "whole/test_exits.py": "fourbar: errors; validation: cli; validation/report: terminal; lab: cli fuzz_files",
     "whole/test_kills.py": "validation/run: pool run selection store",
     "whole/test_results_format.py": "validation/compare: columns",
@@ -30,20 +30,17 @@ JUDGED_BY = {
     "fourbar/edit/test_server.py": "fourbar/edit: redirect witness",
     "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
-    "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve zeros; fourbar/show: equilibrium",
+    "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve zeros; fourbar/show: studies",
     "fourbar/test_solve.py": "fourbar: linkage solution; fourbar/scene: motion; fourbar/evaluation: case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion_law; fourbar/studies: keys",
     "fourbar/studies/test_spread.py": "fourbar/scene: numbers",
-    "fourbar/studies/test_derivatives.py": "fourbar/show: influence",
-    "fourbar/studies/test_enclosure.py": "fourbar/show: extremes",
     # parts of one document or picture
-    "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: defaults document effects model settings",
-    "fourbar/mjcf/test_simulators.py": "fourbar/mjcf: assembly sdf usd",
+    "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document effects model settings",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_block.py": "fourbar/show: summary",
-    "fourbar/show/test_page.py": "fourbar/show: page_data tolerances",
-    "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody hodograph labels linkage mechanism "
-    "studies style symbols transmission view",
+    "fourbar/show/test_page.py": "fourbar/show: tolerances",
+    "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody labels linkage "
+    "studies style symbols view",
     "validation/engines/mujoco/test_picture.py": "fourbar/mjcf: appearance",
     # a comparison is tested by witnesses with given answers
     "validation/run/test_judge.py": "validation/compare: answer compare effects rows; "

@@ -1,5 +1,6 @@
-"""Curves over theta_2 or time: angles and their rates, points, torque, pin forces, energy."""
+"""Curves over what is commanded or time: angles and rates, points, torque, energy, transmission angle; hodographs."""
 
+import math
 import re
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.evaluation.case import Case, compute_state
+from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import PIN_FORCES
 from fourbar.show.duty import compute_energies, read_drive
@@ -22,6 +24,7 @@ from fourbar.show.plot.style import (
     FORCE_DASHES,
     INK,
     MUTED,
+    OPEN,
     choose_force_line,
     find_greatest,
     place_legend,
@@ -35,6 +38,8 @@ from fourbar.solution import Array, Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.projections.polar import PolarAxes
+
 
 ORDINARY = 95.0
 """Percentile of the magnitudes that counts as the ordinary size of a curve ..."""
@@ -273,3 +278,139 @@ def draw_energy(axes: "Axes", view: View) -> None:
     axes.set(ylabel=f"energy ({unit})", title="Kinetic energy, and the work done")
     place_legend(axes, 3)
     note(view, "The kinetic energy has grown by the work that loads and effects have done since the release.")
+
+
+RECOMMENDED = 40.0
+"""Smallest transmission angle that is usually recommended, deg (R. L. Norton, Design of Machinery)."""
+REMARK = 0.34
+"""Part that a remark takes along an axis, as a part of its length."""
+
+
+def draw_transmission(axes: "Axes", view: View) -> None:
+    """Acute angle between coupler and output, with limit and dead-centre positions."""
+    over = draw_axes(axes, view)
+    sweep = view.sweep
+    mu = np.degrees(np.arctan2(np.abs(sweep.sin_mu), np.abs(np.cos(sweep.theta_4 - sweep.theta_3))))
+    axes.plot(over, mu, color=INK)
+    axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
+    place = find_free_place(mu)
+    at = (over[0] + place * (over[-1] - over[0]), RECOMMENDED)
+    look: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "size": 7.0, "color": MUTED}
+    axes.annotate(f"{RECOMMENDED:g}° recommended", at, xytext=(0, 2), **look)
+    axes.set(ylim=(0.0, 96.0), yticks=range(0, 91, 15))
+    for theta, height, marker, name in _list_marked(view):
+        axes.plot(theta, height, marker, ms=6.0, mew=1.1, ls="none", label=name, clip_on=False, zorder=5, **OPEN)
+    axes.set(ylabel=r"transmission angle $\mu$ (°)", title="Transmission angle")
+    if view.time is None:
+        place_legend(axes, 2)
+
+
+def find_free_place(mu: Array) -> float:
+    """Where along the axis the curve keeps furthest from a remark at 40 deg, as a part of its length."""
+    half = REMARK / 2.0
+    best, clearance = 1.0 - half, -1.0
+    for place in np.linspace(1.0 - half, half, 25):
+        part = mu[int((place - half) * len(mu)) : max(1, math.ceil((place + half) * len(mu)))]
+        away = np.abs(part[np.isfinite(part)] - RECOMMENDED - 3.0)  # the remark stands on the line
+        if away.size and away.min() > clearance:
+            best, clearance = float(place), float(away.min())
+    return best
+
+
+def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
+    """Limits of the commanded bar and dead centres, on the axis: places, mu (degrees), mark, name."""
+    if view.time is not None:
+        return []
+    at, marked = view.sweep.at, list[tuple[list[float], list[float], str, str]]()
+    own = np.degrees(at.angle)
+    order = np.argsort(own)
+    margin = 1.5 * float(np.median(np.abs(np.diff(own)))) if len(own) > 1 else 0.0
+    one, other = (bar for bar in MOVING_BARS if bar != at.bar)
+    for bar in sorted({2, 4, at.bar}, key=lambda bar: bar != at.bar):
+        turned, heights = list[float](), list[float]()
+        for found in limit_positions(view.scene.linkage, bar):
+            theta = {2: found.theta_2, 3: found.theta_3, 4: found.theta_4}
+            sign = math.copysign(1.0, math.sin(theta[other] - theta[one]))
+            difference = found.theta_4 - found.theta_3
+            for place in _list_inside(own, theta[at.bar], margin if bar == at.bar else 0.0):
+                if bar == at.bar or at.branch[np.argmin(np.abs(own - place))] == sign:
+                    turned.append(place)
+                    heights.append(math.degrees(math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))))
+        if at.stroke is not None:  # over which its bar's angle rises or falls throughout
+            turned = np.interp(turned, own[order], view.axis.values[order]).tolist()
+        pair = ", ".join(str(each) for each in MOVING_BARS if each != bar)
+        mark, what = ("s", "limit") if bar == at.bar else ("D", "dead centre")
+        marked.append((turned, heights, mark, f"{what}: bars {pair} in line"))
+    return [entry for entry in marked if entry[0]]
+
+
+def _list_inside(own: Array, angle: float, margin: float) -> list[float]:
+    """List an angle (rad) and its full turns that lie in the sweep, degrees."""
+    low, high = float(own.min()) - margin, float(own.max()) + margin
+    start = math.degrees(angle)
+    first = math.ceil((low - start) / 360.0)
+    return [start + 360.0 * k for k in range(first, math.floor((high - start) / 360.0) + 1)]
+
+
+EVERY = 60.0
+"""Dots on a hodograph stand this far apart in the commanded angle, deg ..."""
+MOST_DOTS = 12
+"""... or, over time or a stroke, a round number that gives no more than these."""
+LONG_NUMBERS = 2000.0
+"""From here on the numbers along a radius are too wide for four of them."""
+
+
+def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
+    """Draw the tips of a force's vectors from one origin; open dot: start of the sweep, dots every 60 deg."""
+    from matplotlib.ticker import MaxNLocator
+
+    force, look = getattr(view.sweep, name), choose_force_line(name)
+    direction, own = np.arctan2(force[:, 1], force[:, 0]), np.hypot(*force.T)
+    everywhere = list_force_sizes(view, (name,))
+    limit = choose_limit(everywhere)
+    top = limit or 1.08 * find_greatest(*everywhere) or 1.0
+    factor, unit = choose_unit(top, "N", view.units)
+    where = find_poles(view)
+    over, every, apart = _describe_spacing(view)
+    marks = np.unique(np.round((over - over[0]) / every).astype(int))
+    dots = [int(np.argmin(np.abs(over - over[0] - every * k))) for k in marks]
+    # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round by the longer arc
+    known = np.isfinite(direction)
+    free = _find_free_direction(direction[known])
+    direction[known] = np.unwrap(direction[known])
+    size = np.where(own <= top, own, np.nan) if limit else own
+    axes.plot(break_at_poles(direction, where), factor * break_at_poles(size, where), **look)
+    axes.plot(direction[dots], factor * size[dots], "o", ms=2.8, color=look["color"], ls="none")
+    first = int(np.argmax(np.isfinite(size)))
+    start = {**OPEN, "mec": look["color"]}
+    axes.plot(direction[[first]], factor * size[[first]], "o", ms=4.6, mew=1.1, zorder=5, **start)
+    if limit and find_greatest(own) > limit:
+        note(view, f"Hodographs of {name} clipped at {write_number(factor * top)} {unit}.")
+    axes.set_rlim(0.0, factor * top)
+    axes.set_thetagrids(range(0, 360, 45))
+    axes.tick_params(pad=0.5)
+    many = 4 if factor * top < LONG_NUMBERS else 2
+    ticks = MaxNLocator(many).tick_values(0.0, factor * top)
+    axes.set_rticks([tick for tick in ticks if 0.0 < tick < 0.97 * factor * top])
+    axes.set_rlabel_position(free)
+    axes.tick_params(axis="y", labelsize=6.5, labelcolor=MUTED)
+    axes.set_title(f"{look['label']} ({unit})", pad=12)
+    note(view, f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.")
+
+
+def _describe_spacing(view: View) -> tuple[Array, float, str]:
+    """Say what the dots are evenly spaced in, by how much, and that in words."""
+    axis = view.axis
+    if axis.unit == "°":
+        return axis.values, EVERY, f"{EVERY:g}° of {axis.symbol}"
+    duration = float(axis.values[-1] - axis.values[0]) or 1.0
+    step = 10.0 ** math.floor(math.log10(duration))
+    every = next(share * step for share in (0.1, 0.2, 0.5, 1.0) if duration <= MOST_DOTS * share * step)
+    return axis.values, every, f"{every:g}{axis.unit}"
+
+
+def _find_free_direction(directions: Array) -> float:
+    """Find the multiple of 22.5 deg that lies furthest from the curve."""
+    candidates = np.radians(np.arange(16) * 22.5)
+    away = np.abs(np.angle(np.exp(1j * (directions - candidates[:, None])))).min(axis=1, initial=math.pi)
+    return float(np.degrees(candidates[int(np.argmax(away))]))

@@ -13,10 +13,10 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.show.between import locate_between
 from fourbar.show.block import static
-from fourbar.show.plot import curves, freebody, hodograph, linkage, studies
+from fourbar.show.plot import curves, freebody, linkage, studies
+from fourbar.show.plot.curves import draw_transmission
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import CAPTION, TITLE, apply_style, format_of, render_figure, save, shorten_text
-from fourbar.show.plot.transmission import draw_transmission
 from fourbar.show.plot.view import View, choose_common_position, is_over_time, make_view, set_branch
 from fourbar.solution import SI, Conversion, require_units
 
@@ -78,7 +78,7 @@ def _draw_single(paint: Callable[[Any, View], None]) -> Painter:
 def _draw_hodographs(figure: "SubFigure", shown: View, labels: Labels) -> None:
     panels = figure.subplots(2, 2, subplot_kw={"projection": "polar"}).ravel()
     for axes, name in zip(panels, PIN_FORCES, strict=True):
-        hodograph.draw_hodograph(axes, shown, name)
+        curves.draw_hodograph(axes, shown, name)
 
 
 FIGURES: dict[str, tuple[Painter, tuple[float, float], bool]] = {

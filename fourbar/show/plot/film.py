@@ -13,11 +13,10 @@ from fourbar.errors import DependencyError, InputError
 from fourbar.scene import Scene
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.linkage import draw_paths, write_path_legend
-from fourbar.show.plot.mechanism import draw_mechanism, scale_of
+from fourbar.show.plot.linkage import draw_mechanism, draw_paths, scale_of, write_path_legend
 from fourbar.show.plot.style import TITLE, apply_style, shorten_text
 from fourbar.show.plot.view import View, make_view
-from fourbar.show.progress import show_running
+from fourbar.show.tables import show_running
 from fourbar.solution import SI, Conversion
 from fourbar.writing import write_bytes
 

@@ -16,7 +16,7 @@ from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE, 
 from fourbar.scene import Scene
 from fourbar.show.plot.curves import note
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.mechanism import draw_mass_centre, draw_plate, pin_name
+from fourbar.show.plot.linkage import draw_mass_centre, draw_plate, pin_name
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     FORCE_COLOURS,

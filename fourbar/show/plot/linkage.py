@@ -1,5 +1,6 @@
-"""The linkage drawn to scale over the paths of its points, and coupler curves."""
+"""The linkage drawn to scale, alike for a plot and for a film, over the paths of its points; coupler curves."""
 
+import cmath
 import math
 from collections.abc import Iterator
 from itertools import cycle
@@ -7,16 +8,159 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fourbar.linkage import ENDS
+from fourbar.linkage import ENDS, MOVING_BARS
+from fourbar.show.acting import list_acting
+from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.mechanism import draw_mechanism, draw_support, locate_pins, pin_name, scale_of, write_bar_name
-from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, POINT
-from fourbar.show.plot.symbols import draw_vectors
+from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, POINT, find_greatest, write_quantity
+from fourbar.show.plot.symbols import Place, draw_vectors, place_of, split_components
 from fourbar.show.plot.view import View
-from fourbar.solution import Array
+from fourbar.show.units import choose_unit
+from fourbar.solution import Array, Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
+
+Point = tuple[float, float]
+ON_BAR = 1e-3
+"""Of a bar's length: a point that lies nearer to its line is on it, as far as can be seen."""
+
+
+def locate_pins(view: View, factor: float = 1.0) -> dict[str, Point]:
+    """Locate the pins at the position drawn, in the order O2, A, B, O4, m or what the factor makes of it."""
+    place = place_of(view.scene.linkage, view.here, 0, factor)
+    return {name: split_components(pin) for name, pin in place.pins.items()}
+
+
+def draw_mechanism(axes: "Axes", view: View, solution: Solution, index: int, labels: Labels) -> list[Any]:
+    """Draw bars, pins, mass centres, own points and what acts at a position of a solution; return what was drawn.
+
+    Labels are asked for, each away from what it names; whoever calls places them.
+    """
+    factor, _, size = scale_of(view)
+    place = place_of(view.scene.linkage, solution, index, factor)
+    if view.sweep.stroke is not None:
+        place = place._replace(barrel=symbols.BARREL * factor * float(np.nanmin(view.sweep.stroke)))
+    where = {name: split_components(pin) for name, pin in place.pins.items()}
+    centre = sum(place.pins.values()) / 4.0
+    middle, drawn = split_components(centre), []
+    for number, (start, stop) in ENDS.items():
+        (x, y), colour = zip(where[start], where[stop], strict=True), BAR_COLOURS[number]
+        drawn += axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
+        labels.keep_off(axes, where[start], where[stop], width=4.5)
+        labels.add(Label(axes, write_bar_name(view, number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
+    for name, point in where.items():
+        drawn += axes.plot(*[[v] for v in point], "o", ms=6.0, mew=1.2, zorder=6, **OPEN)
+        labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
+    for name, path in solution.points.items():
+        here = split_components(factor * complex(*path[index]))
+        drawn += axes.plot(*[[v] for v in here], "D", ms=4.5, mew=1.2, zorder=8, **{**OPEN, "mec": POINT})
+        labels.keep_off(axes, here, here)
+        labels.add(Label(axes, name, here, middle, POINT, 8.5, 2.5))
+    for carrier, corner in _list_carried(view, place):
+        first, last = (place.pins[pin] for pin in ENDS.get(carrier, ("O2", "O4")))
+        drawn += draw_plate(axes, carrier, (first, corner, last), labels)
+    for number in MOVING_BARS:
+        bar, colour = view.scene.linkage.bar(number), BAR_COLOURS[number]
+        if bar.mass == 0.0:
+            continue
+        G = place.point(number, bar.to_centre)
+        here = split_components(G)
+        drawn += draw_mass_centre(axes, here)
+        labels.keep_off(axes, here, here)
+        beyond = split_components(2.0 * G - centre)  # across the bar from its number
+        labels.add(Label(axes, f"$G_{number}$", here, beyond, colour, 8.0, 3.0))
+    for symbol in list_acting(view.scene):
+        shown = symbols.draw(axes, symbol, place, size)
+        drawn += shown.artists
+        for line in shown.lines:
+            labels.keep_off(axes, *line)
+        if shown.label is not None:
+            away = split_components(complex(*shown.label) - shown.away) if shown.away else middle
+            labels.add(Label(axes, shown.text, shown.label, away, symbols.COLOURS[symbol.kind], 8.0))
+    return drawn
+
+
+def _list_carried(view: View, place: Place) -> Iterator[tuple[int, complex]]:
+    """List what may lie off its bar: own points, mass centres, and where forces, moments and springs act."""
+    for own in view.scene.points:
+        yield own.bar, place.point(own.bar, cmath.rect(*own.from_pin))
+    for number in MOVING_BARS:
+        if view.scene.linkage.bar(number).mass > 0.0:
+            yield number, place.point(number, view.scene.linkage.bar(number).to_centre)
+    for symbol in list_acting(view.scene):
+        if symbol.kind in ("force", "moment", "spring"):
+            yield symbol.bar, place.tail(symbol)
+        if symbol.end is not None:
+            yield symbol.end[0], place.point(*symbol.end)
+
+
+def draw_plate(axes: "Axes", bar: int, corners: tuple[complex, complex, complex], labels: Labels) -> list[Any]:
+    """Join a point to its bar, from pin to point to pin, as a plate; nothing where it lies on the bar."""
+    from matplotlib.colors import to_rgba
+    from matplotlib.patches import Polygon
+
+    first, point, last = corners
+    along = (point - first) / (last - first)
+    if abs(along.imag) < ON_BAR and -ON_BAR < along.real < 1.0 + ON_BAR:
+        return []
+    shape, colour = [split_components(corner) for corner in corners], BAR_COLOURS.get(bar, MUTED)
+    labels.keep_off(axes, *shape)
+    shade = to_rgba(colour, 0.08 if bar > 1 else 0.0)
+    return [axes.add_patch(Polygon(shape, closed=False, fc=shade, ec=colour, lw=0.8, ls=":", zorder=1.5))]
+
+
+def draw_mass_centre(axes: "Axes", point: Point, ms: float = 7.0) -> "list[Line2D]":
+    """Draw the quartered circle that marks a mass centre."""
+    from matplotlib.path import Path
+
+    x, y = point
+    marks = axes.plot([x], [y], "o", ms=ms, mfc="white", mec=INK, mew=0.8, zorder=7)
+    for quarter in ((0, 90), (180, 270)):
+        marks += axes.plot([x], [y], marker=Path.wedge(*quarter), ms=ms, mfc=INK, mec="none", zorder=7)
+    return marks
+
+
+def draw_support(axes: "Axes", pin: Point, size: float, labels: Labels) -> None:
+    """Draw the hatched support under a fixed pin."""
+    from matplotlib.patches import Polygon, Rectangle
+
+    (x, y), wide = pin, 1.7 * size
+    foot = y - wide
+    axes.add_patch(
+        Polygon([pin, (x - size, foot), (x + size, foot)], closed=True, fc="white", ec=INK, lw=1.0, zorder=3)
+    )
+    strip = ((x - wide, foot - 0.8 * size), 2.0 * wide, 0.8 * size)
+    axes.add_patch(Rectangle(*strip, fc="none", ec=INK, lw=0.0, hatch="//////", zorder=2))
+    axes.plot([x - wide, x + wide], [foot, foot], color=INK, lw=1.0, zorder=3)
+    for share in (0.5, 1.0, 1.7, 2.1, 2.5):
+        half = size * (share / 1.7 if share <= 1.7 else 1.7)
+        labels.keep_off(axes, (x - half, y - share * size), (x + half, y - share * size))
+
+
+def write_bar_name(view: View, number: int) -> str:
+    """Write the number of a bar, with its length where dimensions are wanted."""
+    length = write_quantity(view.scene.linkage.lengths[number - 1], "m", view.units)
+    return f"{number}: {length}" if view.dimensions else str(number)
+
+
+def scale_of(view: View) -> tuple[float, str, float]:
+    """Choose the factor to the unit of length, the same for both branches; that unit; the size of a support."""
+    most = max(
+        find_greatest(v.sweep.A, v.sweep.B, v.sweep.G3, *np.array(list(locate_pins(v).values()))) for v in view.alike
+    )
+    factor, unit = choose_unit(most, "m", view.units)
+    sweep = view.sweep
+    reached = np.concatenate([sweep.A, sweep.B, sweep.G3, *sweep.points.values(), list(locate_pins(view).values())])
+    return factor, unit, 0.03 * factor * float(np.max(np.nanmax(reached, axis=0) - np.nanmin(reached, axis=0)))
+
+
+def pin_name(name: str) -> str:
+    """Write a pin as it is typeset."""
+    return f"${name[0]}_{name[1]}$" if len(name) == 2 else f"${name}$"
+
 
 COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
     *((colour, "-") for colour in ("#0072B2", "#56A0C8", "#D55E00", "#5FA48B", "#007A5A")),

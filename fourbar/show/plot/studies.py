@@ -8,7 +8,6 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.scene import command
-from fourbar.show.influence import find_largest, list_shown, rank_numbers
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import (
     CAPTION,
@@ -24,6 +23,7 @@ from fourbar.show.plot.style import (
     shorten_text,
 )
 from fourbar.show.plot.view import View, axis_of
+from fourbar.show.studies import find_largest, list_shown, rank_numbers
 from fourbar.show.tolerances import describe_parted, find_part_unit, list_shown_parts
 from fourbar.show.units import choose_unit
 from fourbar.solution import SI, Conversion, find_unit

@@ -359,7 +359,7 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
 
 def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> None:
     from fourbar.mjcf import list_defaults, make_scene
-    from fourbar.mjcf.simulators import write_mjcf_for
+    from fourbar.mjcf.document import write_mjcf_for
 
     code, out, err = run("mjcf", MODELS / "crank_rocker.toml", "-o", tmp_path / "a.xml")
     assert (code, out, err) == (HOLDS, "", "")

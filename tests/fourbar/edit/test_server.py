@@ -342,7 +342,7 @@ def test_half_open_connections_neither_stop_the_server_nor_stay(tmp_path: Path, 
     path.write_bytes(CRANK_ROCKER.read_bytes())
     # imported before the limit holds: the server alone is tried
     program = f"""
-import resource, sys, fourbar.edit.server as server, fourbar.show.page_data, fourbar.mjcf
+import resource, sys, fourbar.edit.server as server, fourbar.show.animate, fourbar.mjcf
 from pathlib import Path
 resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))
 server.IDLE = 3.0

@@ -13,8 +13,7 @@ import fourbar
 from fourbar.effects import SpringEnd
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
-from fourbar.mjcf.sdf import write_sdf
-from fourbar.mjcf.usd import write_usd
+from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.show.duty import motor_duty, shaking_force, shaking_moment, write_motor
 from fourbar.solution import write_json
 from tests.support.scenes import crank_rocker

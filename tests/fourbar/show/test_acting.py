@@ -17,8 +17,8 @@ from fourbar.files import loads
 from fourbar.scene import Scene
 from fourbar.show import animate
 from fourbar.show.acting import NO_SYMBOL, list_acting
+from fourbar.show.animate import collect_page_data
 from fourbar.show.between import locate_between
-from fourbar.show.page_data import collect_page_data
 from tests.support.scenes import crank_rocker
 
 TURNING = Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
@@ -77,7 +77,7 @@ def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(ev
     from matplotlib.figure import Figure
 
     from fourbar.show.plot.labels import Labels
-    from fourbar.show.plot.mechanism import draw_mechanism, scale_of
+    from fourbar.show.plot.linkage import draw_mechanism, scale_of
     from fourbar.show.plot.view import make_view
 
     lengths = {"input": 0.02, "coupler": 0.25, "output": 0.22}

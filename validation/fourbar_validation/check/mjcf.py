@@ -18,7 +18,7 @@ import click
 from fourbar.errors import FourBarError, InputError
 from fourbar.quantities import UNKNOWNS
 from fourbar.scene import Scene
-from fourbar.show.progress import show_running
+from fourbar.show.tables import show_running
 from fourbar.solve import solve
 from fourbar.writing import write_text
 from fourbar_validation.check.causes import Cause, order_causes

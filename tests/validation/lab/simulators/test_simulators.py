@@ -18,7 +18,7 @@ import fourbar
 from fourbar.effects import Friction, Viscous
 from fourbar.errors import LimitError
 from fourbar.mjcf import write_mjcf
-from fourbar.mjcf.sdf import write_sdf
+from fourbar.mjcf.assembly import write_sdf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command
 from fourbar_validation.engines.free_body import FreeBody

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
 from fourbar.mjcf import size_flywheel
-from fourbar.mjcf.sdf import write_sdf
+from fourbar.mjcf.assembly import write_sdf
 from fourbar.scene import Scene
 from fourbar_validation.engines.description import FIRST_PIN, rotate
 from fourbar_validation.lab.simulators.motion import Instant, Readings, find_gravity, run_through, start, turn

@@ -9,8 +9,8 @@ import warp
 
 from fourbar.effects import Flywheel
 from fourbar.mjcf import size_flywheel
-from fourbar.mjcf.simulators import SINGLE
-from fourbar.mjcf.usd import write_usd
+from fourbar.mjcf.assembly import write_usd
+from fourbar.mjcf.document import SINGLE
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import rotate

@@ -13,8 +13,8 @@ import numpy as np
 from fourbar.effects import Effect, Friction, Gravity, Viscous
 from fourbar.errors import InputError, LimitError
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, Bar, FourBar
-from fourbar.mjcf.sdf import write_sdf as sdf_text
-from fourbar.mjcf.usd import write_usd as usd_text
+from fourbar.mjcf.assembly import write_sdf as sdf_text
+from fourbar.mjcf.assembly import write_usd as usd_text
 from fourbar.scene import Scene
 from fourbar.solve import solve
 from fourbar_validation.compare.rows import REFUSES, Row

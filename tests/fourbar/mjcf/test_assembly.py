@@ -18,8 +18,7 @@ import fourbar
 from fourbar.effects import Torsion
 from fourbar.errors import LimitError
 from fourbar.mjcf import SIMULATORS, write_mjcf_for
-from fourbar.mjcf.sdf import write_sdf
-from fourbar.mjcf.usd import write_usd
+from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.scenes.suites import list_model_files
