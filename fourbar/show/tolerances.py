@@ -138,7 +138,7 @@ def collect_tolerances(
             found = tolerances(positions, PAGE_SAMPLES, progress=report)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
-    at = np.linspace(0, len(found.theta_2) - 1, len(places)).round().astype(int)  # a law is thinned as in `page_data`
+    at = np.linspace(0, len(found.theta_2) - 1, len(places)).round().astype(int)  # a law is thinned as in `animate`
 
     def short(values: Array, digits: int) -> list[float | None]:
         return [float(f"{x:.{digits}g}") if math.isfinite(x) else None for x in values[at].tolist()]

@@ -19,7 +19,7 @@ import fourbar
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.files.pictures import LARGEST
 from fourbar.scene.motion_law import Law
-from fourbar.show import animate, page_data
+from fourbar.show import animate
 from tests.support.scenes import crank_rocker, thesis
 
 HOSTILE = "</script><script>alert(1)</script> \"'><img src=x onerror=alert(2)> $style ${data} {{x}} \u2028 \x00 é"
@@ -103,8 +103,8 @@ def test_positions_that_do_not_assemble_are_null() -> None:
 def test_a_fine_sweep_is_thinned_evenly_and_says_so() -> None:
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 2 * math.pi, 36_000), 1.0))
     data = embedded(animate.write_page(scene))
-    assert len(data["theta_2"]) == page_data.MAX_ROWS
-    assert np.diff(data["theta_2"]) == pytest.approx(2 * math.pi / (page_data.MAX_ROWS - 1))
+    assert len(data["theta_2"]) == animate.MAX_ROWS
+    assert np.diff(data["theta_2"]) == pytest.approx(2 * math.pi / (animate.MAX_ROWS - 1))
     assert data["positions"] == 36_001
 
 
