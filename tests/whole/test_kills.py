@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import ClassVar
@@ -33,6 +34,7 @@ from fourbar_validation.run.selection import choose_witnesses
 from fourbar_validation.run.store import RunningError, Store
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, read_scene_files
+from tests.support.guests import list_processes, write_program
 from tests.support.here import judge_here
 from tests.support.unlucky import Few, Moody, Unlucky, dies_at_first
 
@@ -52,7 +54,7 @@ EXACT = choose_witnesses("free-body")
 def judge_all(
     suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2, seconds: float | None = None
 ) -> Summary:
-    *steps, last = run(suite, out, witnesses, RunOptions(workers=workers, seconds=seconds, drawn=False))  # type: ignore[arg-type]
+    *steps, last = run(suite, out, witnesses, RunOptions(workers=workers, seconds=seconds, drawn=False, sample=0))  # type: ignore[arg-type]
     assert isinstance(last, Summary)
     assert sum(step for step in steps if isinstance(step, Collected)) == len(suite)  # type: ignore[arg-type]
     return last
@@ -217,11 +219,16 @@ LIMITED = LIMIT + ("" if FULL else SMALL) + HARNESS
 
 
 def start(
-    out: Path, count: int, *program: str, workers: int = 2 if FULL else 1, stderr: int = subprocess.DEVNULL
+    out: Path,
+    count: int,
+    *program: str,
+    workers: int = 2 if FULL else 1,
+    stderr: int = subprocess.DEVNULL,
+    more: Sequence[str] = (),
 ) -> subprocess.Popen[bytes]:
     command = [sys.executable, *(program or PROGRAM), "run", "--random", str(count), "--workers", str(workers)]
     return subprocess.Popen(
-        [*command, "--engines", "free-body", "--no-pictures", "--out", str(out)],
+        [*command, "--engines", "free-body", "--no-pictures", "--sample-shipped", "0", "--out", str(out), *more],
         cwd=Path(__file__).parents[2],
         stdout=subprocess.DEVNULL,
         stderr=stderr,
@@ -306,6 +313,34 @@ def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path: Path, undis
                     kills += 1
         assert process.wait(timeout=100) == 0
         assert (out / "results.csv").read_bytes() == (undisturbed / "results.csv").read_bytes()
+
+
+@pytest.mark.linux
+@pytest.mark.timeout(200 + 40 * KILLS)
+def test_any_process_of_a_run_with_a_guest_killed_changes_no_byte(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The run itself, workers, keepers and guests, whichever is met; the run is resumed until it ends."""
+    monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
+    more = [f"--witness={write_program(tmp_path, 'plain')}"]
+    assert start(tmp_path / "undisturbed", COUNT, more=more).wait(timeout=100) == 0
+    rng, kills, out = np.random.default_rng(SEED + 2), 0, tmp_path / "killed"
+    while kills < 4 * KILLS:
+        process = start(out, COUNT, more=more)
+        time.sleep(2.0)
+        while kills < 4 * KILLS and process.poll() is None:
+            time.sleep(float(rng.uniform(0.0, 1.0)))
+            victims = list_processes(f"MARK_OF_TEST={tmp_path}")
+            with suppress(ProcessLookupError, ValueError):  # it is over: nobody is there to be chosen
+                os.kill(victims[int(rng.integers(len(victims)))], signal.SIGKILL)
+                kills += 1
+        if kills < 4 * KILLS and process.wait(timeout=100) == 0:
+            shutil.rmtree(out)  # over before it was killed often enough
+    process.wait(timeout=100)
+    assert start(out, COUNT, more=more).wait(timeout=100) == 0
+    assert (out / "results.csv").read_bytes() == (tmp_path / "undisturbed" / "results.csv").read_bytes()
+    time.sleep(2.0)
+    assert not list_processes(f"MARK_OF_TEST={tmp_path}")
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="a folder that root may write to")

@@ -1,8 +1,6 @@
 """Engines outside: what they answer is judged as anybody's, and whatever they do costs their own rows alone."""
 
-import os
 import re
-import shlex
 import shutil
 import subprocess
 import sys
@@ -28,14 +26,12 @@ from fourbar_validation.run.judge import judge
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.run.selection import select_scenes
 from fourbar_validation.scenes.suites import read_scene_files
+from tests.support.guests import list_processes, write_program
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import ROOT
 
 HERE = "tests.support.hostile_class:"
-PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
-(PLAIN,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-"""The page's engine in plain Python."""
 TORQUE = '"torque": moments[0] - cross(r2, F32)'
 SCRIPT = ROOT / "tests" / "support" / "plain_engine.mjs"
 SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
@@ -129,29 +125,6 @@ FINE: dict[str, tuple[str, str]] = {
     "leaves its session": (LAST, FORK + LAST),
     "deaf": (LAST, f"{LAST}    if question['ask'] == 'answer': import os; os.close(2)\n"),
 }
-
-
-def write_program(folder: Path, name: str, *replacements: tuple[str, str]) -> str:
-    text = PLAIN.replace('"plain"', repr(name))
-    for old, new in replacements:
-        assert old in text
-        text = text.replace(old, new)
-    file = folder / f"{name.replace(' ', '_')}.py"
-    file.write_text(text, encoding="utf-8")
-    return shlex.join([sys.executable, "-I", "-S", str(file)])
-
-
-def list_processes(mark: str) -> list[int]:
-    """List the processes whose environment has the mark."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit() and int(entry.name) != os.getpid():
-            try:
-                if mark.encode() in (entry / "environ").read_bytes():
-                    found.append(int(entry.name))
-            except OSError:
-                continue
-    return found
 
 
 def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path: Path) -> None:
