@@ -12,6 +12,7 @@ import numpy as np
 
 from fourbar import effects as kinds
 from fourbar.errors import DependencyError, InputError
+from fourbar.files import loads
 from fourbar.linkage import Bar, FourBar
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.effects import NO_MJCF
@@ -25,6 +26,7 @@ from fourbar_validation.report.machine import describe_setup
 from fourbar_validation.report.templating import render
 from fourbar_validation.report.terminal import make_table
 
+LENGTHS = 'ground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"'
 EFFECTS: dict[str, kinds.Effect | None] = {
     "none": None,
     "gravity": kinds.Gravity(9.81),
@@ -43,7 +45,12 @@ EFFECTS: dict[str, kinds.Effect | None] = {
         4, (3.0, 0.7), (0.05, 1.0), 0.2, "world", kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))
     ),
 }
-"""By name, each by itself on the same linkage."""
+EFFECTS |= {
+    key: loads(f"[lengths]\n{LENGTHS}\n[effects]\n{kind.example}").effects[0]
+    for key, kind in kinds.list_kinds().items()
+    if key not in EFFECTS
+}
+"""By name, each by itself on the same linkage; one that is not listed acts as its example of a scene file says."""
 SIMULATION = "mujoco-simulated"
 NO_COUNTERPART = {(SIMULATION, name) for name in (*NO_MJCF, "load over theta_2")}
 DEFAULT_FLAGS = "none, MuJoCo's default flags"
