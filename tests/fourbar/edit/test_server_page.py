@@ -226,6 +226,45 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(chromi
 
 
 @pytest.mark.slow
+def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(chromium, opened, tmp_path: Path) -> None:
+    path, driver = tmp_path / "mine.toml", chromium
+    driver.get(opened(path).address)
+    wait_for(driver, "offers && sketch")
+    type_into(driver, "sketch-width", "1000 mm")
+    picture = driver.find_element("id", "picture")
+    corner = picture.size["width"] / 2, picture.size["height"] / 2
+    for x, y in ((120, 300), (170, 180), (400, 120), (380, 330)):
+        ActionChains(driver).move_to_element_with_offset(picture, x - corner[0], y - corner[1]).click().perform()
+    wait_for(driver, "!sketch && plain.lengths.ground !== '300 mm'")
+    type_into(driver, "field:bars/output/mass", "80 kg")
+    wait_for(driver, "plain.bars.output.mass === '80 kg'")
+    driver.find_element("xpath", "//button[.='+ cylinder in place of the bar']").click()
+    wait_for(driver, "plain.drive.from && document.getElementById('field:drive/from/bar')")
+    driver.find_element("xpath", "//fieldset[legend='from']//button[.='By x and y']").click()
+    wait_for(driver, "plain.drive.from.at.x")
+    for name, value in (("x", "300 mm"), ("y", "-250 mm")):
+        type_into(driver, f"field:drive/from/at/{name}", value)
+        wait_for(driver, f"plain.drive.from.at.{name} === '{value}'")
+    driver.find_element("css selector", "#command option[value=stroke]").click()
+    wait_for(driver, "plain.motion.stroke && data.over.name === 'stroke' && 'drive_force_error' in table()")
+    driver.execute_script("go(17)")
+    force = float(driver.find_element("id", "drive_force").text.replace("−", "-"))
+    wait_for(driver, "document.getElementById('computing').hidden")
+    summary = driver.find_element("id", "summary").text
+    driver.find_element("id", "save").click()
+    wait_for(driver, "/^saved|is saved/.test(document.getElementById('bench').textContent)")
+    scene = fourbar.load(path)
+    assert scene.drive is not None and scene.effects and scene.motion.stroke is not None
+    assert 'at = {x = "300 mm", y = "-250 mm"}' in path.read_text()
+    solution, stroke = fourbar.solve(scene), driver.execute_script("return data.over.values[17]")
+    assert force == pytest.approx(solution.drive_force[np.abs(solution.stroke - stroke).argmin()], rel=PRINTED)
+    command = [sys.executable, "-m", "fourbar", "analyze", str(path)]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert " ".join(summary.split()).startswith(" ".join(printed.split())) and "cylinder" in printed
+    assert not driver.get_log("browser")
+
+
+@pytest.mark.slow
 def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(chromium, opened, tmp_path: Path) -> None:
     path, driver = tmp_path / "mine.toml", chromium
     driver.get(opened(path).address)
