@@ -10,12 +10,13 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
 
-from fourbar.effects import list_kinds
+from fourbar.effects import Load, list_kinds
 from fourbar.errors import InputError
 from fourbar.files.scene_file import THROUGH
 from fourbar.files.scene_text import BRANCHES
-from fourbar.linkage import PINS
+from fourbar.linkage import PINS, Bar
 from fourbar.scene.motion_law import ENDS
+from fourbar.scene.point import Point
 from fourbar.scene.stroke import SIDES
 
 Path = Sequence[str | int]
@@ -30,16 +31,20 @@ LONGEST_TEXT = 10_000
 
 @cache
 def list_offers() -> dict[str, Any]:
-    """List the empty fields, the parts that can be added, and the words to choose from."""
+    """List empty fields, parts that can be added, words to choose from, and the names of what pairs consist of."""
+    declared = {name: number for kind in (Bar, Point, Load) for name, number in kind.numbers.items() if number.pair}
+    pairs = {name: ["distance" if number.unit == "m" else "size", "angle"] for name, number in declared.items()}
     found = tomllib.loads(files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8"))
     for key, effect in list_kinds().items():
         value = tomllib.loads(effect.example)[key]
         found["parts"].append({"at": ["effects", key], "value": value})
         if isinstance(value, dict) and set(value) <= set(PINS):
             found["parts"] += [{"at": ["effects", key, pin], "value": next(iter(value.values()))} for pin in PINS]
-        elif isinstance(value, list) and isinstance(value[0], dict):
+        elif isinstance(value, list) and isinstance(value[0], str):
+            pairs[key] = [*effect.numbers]
+        elif isinstance(value, list):
             found["parts"].append({"at": ["effects", key, -1], "label": "another", "value": value[0]})
-    return found | {"words": WORDS}
+    return found | {"words": WORDS, "pairs": pairs}
 
 
 class SceneDocument:

@@ -26,7 +26,7 @@ JUDGED_BY = {
     # one table or one evaluation, whose rows are no use alone
     "fourbar/effects/test_effects.py": "fourbar/effects: *",
     "fourbar/edit/test_session.py": "fourbar/edit: reply document dragging exports",
-    "fourbar/edit/test_server.py": "fourbar/edit: redirect witness",
+    "fourbar/edit/test_server.py": "fourbar/edit: redirect",
     "fourbar/files/test_files.py": "fourbar/files: effects fields reading scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve zeros; fourbar/show: studies",

@@ -1,6 +1,5 @@
 // ---- the fields of a scene, made from its file ---------------------------------------------------
 const ORDER = ["title", "source", "lengths", "bars", "motion", "drive", "points", "loads", "effects", "tolerances"];
-const PAIRS = Object.fromEntries([...["centre", "from_pin", "at"].map(key => [key, ["distance", "angle"]]), ...["force", "gravity"].map(key => [key, ["size", "angle"]])]);
 let offers = null, plain = {}, shape = "", typing = 0;
 const fieldId = path => `field:${path.join("/")}`;
 const entryAt = (node, path) => path.reduce((inner, step) => inner?.[step], node);
@@ -10,7 +9,7 @@ const nameOfKey = key => key.replace(/^(theta|omega|alpha)_(\d)$/, (_, letter, n
 // The name of the entry at a path as it is written beside it: one of a list has the name of the list and its number.
 function labelOf(path) {
   const key = path[path.length - 1], holder = path[path.length - 2];
-  return PAIRS[holder]?.[key] ?? (typeof key === "number" ? `${nameOfKey(holder).replace(/s$/, "")} ${key + 1}` : nameOfKey(key));
+  return offers.pairs[holder]?.[key] ?? (typeof key === "number" ? `${nameOfKey(holder).replace(/s$/, "")} ${key + 1}` : nameOfKey(key));
 }
 const BARS = { 1: "1 ground", 2: "2 input", 3: "3 coupler", 4: "4 output" };
 // What an entry can be, as rows of value and name; undefined where it is not one of a few.
@@ -108,7 +107,7 @@ function group(path, node, example) {
     else if (path.length || inner !== undefined || model !== undefined || partsAt(own).length) box.append(branchOf(own, inner, model));
   }
   for (const part of partsAt(path)) box.append(part);
-  if (PAIRS[path[path.length - 1]]?.[0] === "distance") {   // a place, stated in one of two ways
+  if (offers.pairs[path[path.length - 1]]?.[0] === "distance") {   // a place, stated in one of two ways
     const by = Array.isArray(node) ? "xy" : "polar", other = element("button", { type: "button", className: "take", textContent: by === "xy" ? "By x and y" : "By distance and angle" });
     other.addEventListener("click", () => ask({ do: "restate", path, by }));
     box.append(other);

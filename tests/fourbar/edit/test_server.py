@@ -23,7 +23,7 @@ pytest.importorskip("tomlkit", reason="the workbench edits scene files by tomlki
 from tornado.httpclient import AsyncHTTPClient, HTTPRequest
 from tornado.websocket import websocket_connect
 
-from fourbar.edit import server, witness
+from fourbar.edit import exports, server
 from fourbar.edit.redirect import ENDING, Redirect
 from fourbar.edit.server import GONE, LARGEST_REQUEST, MOST_CONNECTIONS, MOST_WAITING, Workbench
 from fourbar.edit.session import Session
@@ -237,8 +237,8 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(bench
     program += (
         "(out / 'report.html').write_text('<p>report'); time.sleep(float(out.parent.joinpath('wait').read_text()))"
     )
-    monkeypatch.setattr(witness, "find_harness", lambda: [sys.executable, "-c", program])
-    monkeypatch.setattr(witness, "TICK", 0.05)
+    monkeypatch.setattr(exports, "find_harness", lambda: [sys.executable, "-c", program])
+    monkeypatch.setattr(exports, "TICK", 0.05)
 
     async def ask(made: Workbench, address: str) -> None:
         folder = made.session.exports.folder

@@ -92,6 +92,11 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
     assert scene.linkage.input.inertia == pytest.approx(2e-4) and scene.title == "of the drawing"
 
 
+def test_what_a_pair_consists_of_is_read_from_the_declarations() -> None:
+    places = {key: ["distance", "angle"] for key in ("centre", "from_pin", "at")}
+    assert list_offers()["pairs"] == {**places, "force": ["size", "angle"], "gravity": ["magnitude", "angle"]}
+
+
 def test_what_the_file_refuses_is_refused_in_its_words_and_the_last_good_state_stays(session: Session) -> None:
     before = session.now.text
     for place, value, words in (
