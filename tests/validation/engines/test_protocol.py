@@ -231,3 +231,14 @@ def test_an_answer_that_is_none_is_refused_in_one_line(data):
     with pytest.raises(FourBarError) as raised:
         protocol.answer_from_json("mine", at, data)
     assert one_line(raised.value)
+
+
+def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives() -> None:
+    """omega^2 = omega_0^2 + 2 alpha theta: of a stroke too, whose bar has the motion that the formulas state."""
+    command = list_positions(fourbar.load(MODELS / "capabilities" / "stroke_input.toml"))
+    own = command._replace(stroke=None, speed=1.2 * command.speed, acceleration=1.2 * command.acceleration)
+    protocol.require_near(own, command)
+    steady = command._replace(acceleration=0.0 * command.acceleration)
+    for made, asked in ((own._replace(speed=0.0 * own.speed), command), (own, steady)):
+        with pytest.raises(InputError, match="is too far from the command"):
+            protocol.require_near(made, asked)
