@@ -1,6 +1,6 @@
 """A scene as a pure function of some of its numbers: to be compiled, mapped and differentiated by an array library."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
@@ -12,11 +12,11 @@ from fourbar.evaluation.evaluate import list_kinematics, name_of_command
 from fourbar.formulas.arithmetic import make_like, namespace
 from fourbar.formulas.mobility import change_points
 from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, SCALARS, STAGE_OF
-from fourbar.scene import Scene, command
+from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
 from fourbar.scene.stroke import find_triangle
-from fourbar.studies.keys import command_key, list_entries, read_place, refuse_key, replace_numbers
+from fourbar.studies.keys import SceneNumber, command_key, list_entries, read_place, refuse_key, replace_numbers
 
 NO_DIGIT_LEFT, UNDECIDED = 8.0, 16.0
 """Times the spacing of the numbers at 1: of |sin mu|, and of what decides whether the loop closes, as `solve` has them
@@ -74,45 +74,62 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     stated = None if theta in keys else command(scene)
     shape = () if stated is None or isinstance(motion.angle, float) else stated.angle.shape
 
-    def of_numbers(*values: Any) -> dict[str, Any]:
+    def solve_for(*values: Any) -> dict[str, Any]:
         given = _check_given(keys, values, shape)
-        if given.xp is np and given.zero.shape == ():  # as arrays, for a number of Python's own is not divided by 0
-            return {name: of[0] for name, of in of_numbers(*map(np.atleast_1d, given.values.values())).items()}
-        xp, zero, numbers, holds = given.xp, given.zero, {}, True
+        alone = given.xp is np and given.zero.shape == ()
+        if alone:  # as arrays, for a number of Python's own is not divided by 0
+            given = _check_given(keys, [np.atleast_1d(value) for value in given.values.values()], shape)
         with np.errstate(all="ignore"):
-            for key, value in given.values.items():
-                entry = known.get(key)
-                inside = xp.isfinite(value) if entry is None else entry.holds(value)
-                own = None if entry is None else read_place(scene, entry.place)
-                holds, numbers[key] = holds & inside, xp.where(inside, value, 1.0 if own is None else own)
-            q, changed = numbers.pop(theta, None), replace_numbers(scene, numbers)
-            speed, acceleration = changed.motion.speed, changed.motion.acceleration
-            if stated is not None:
-                q = make_like((stated.angle if stated.stroke is None else stated.stroke).reshape(shape), zero)
-                if motion.law is not None:
-                    speed, acceleration = (make_like(x, zero) for x in (stated.speed, stated.acceleration))
-            q, lever, commanded = q + zero, 1.0, {}
-            if motion.stroke is not None:
-                commanded = {"stroke": q, "stroke_speed": speed}
-                triangle = find_triangle(changed.linkage, changed.drive)
-                q, speed, acceleration, lever = triangle.turned(q, speed, acceleration, motion.side)
-                holds = holds & (lever > NO_DIGIT_LEFT * given.eps)
-            case, moved = Case.of(changed, motion.bar), (0.0 if speed is None else speed, acceleration)
-            found, ok = _evaluate(case, q, float(motion.branch), moved, given, wanted)
-            found |= commanded
-            if "condition" in wanted:
-                found["condition"] = found["condition"] * lever
-            ok = ok & holds
-            parts = {
-                name: (found[name] + zero,) if name in SCALARS else (found[name].real + zero, found[name].imag + zero)
-                for name in wanted
-            }
-            kept = {
-                name: [xp.where(ok & xp.isfinite(sum(of)), part, xp.nan) for part in of] for name, of in parts.items()
-            }
-        return {name: of[0] if name in SCALARS else xp.stack(of, axis=-1) for name, of in kept.items()}
+            changed, q, holds = _replace_given(scene, known, given)
+            result = _evaluate(changed, _command_given(changed, q, stated, given), holds, given, wanted)
+        return {name: value[0] for name, value in result.items()} if alone else result
 
-    return of_numbers
+    return solve_for
+
+
+def _replace_given(scene: Scene, known: Mapping[str, SceneNumber], given: Given) -> tuple[Scene, Any, Any]:
+    """Replace the numbers of the scene that are given; return what is commanded too, if it is, and where all hold.
+
+    A number that a scene would refuse is replaced by the scene's own: what is finite has finite derivatives.
+    """
+    numbers: dict[str, Any] = {}
+    holds: Any = True
+    for key, value in given.values.items():
+        entry = known.get(key)
+        inside = given.xp.isfinite(value) if entry is None else entry.holds(value)
+        own = None if entry is None else read_place(scene, entry.place)
+        holds, numbers[key] = holds & inside, given.xp.where(inside, value, 1.0 if own is None else own)
+    q = numbers.pop(command_key(scene), None)
+    return replace_numbers(scene, numbers), q, holds
+
+
+class Moved(NamedTuple):
+    """What the commanded bar does."""
+
+    q: Any
+    speed: Any
+    acceleration: Any
+    lever: Any = None
+    """Lever of a commanded stroke, as a part of the longest that it could be."""
+    stated: dict[str, Any] = {}  # noqa: RUF012 - read alone
+    """The stroke and its speed, as commanded."""
+
+
+def _command_given(scene: Scene, q: Any, stated: Command | None, given: Given) -> Moved:
+    """Return the command of a scene whose numbers are replaced: q where it is given, else as the scene states it."""
+    motion, zero = scene.motion, given.zero
+    speed, acceleration = motion.speed, motion.acceleration
+    if stated is not None:
+        own = stated.angle if stated.stroke is None else stated.stroke
+        q = make_like(own if own.size > 1 else own.reshape(()), zero)
+        if motion.law is not None:
+            speed, acceleration = (make_like(x, zero) for x in (stated.speed, stated.acceleration))
+    q = q + zero
+    if motion.stroke is None:
+        return Moved(q, 0.0 if speed is None else speed, acceleration)
+    turned = find_triangle(scene.linkage, scene.drive).turned(q, speed, acceleration, motion.side)
+    commanded = {"stroke": q, "stroke_speed": speed}
+    return Moved(turned[0], 0.0 if turned[1] is None else turned[1], turned[2], turned[3], commanded)
 
 
 def _expect_names(**lists: Sequence[str]) -> None:
@@ -125,14 +142,15 @@ def _expect_names(**lists: Sequence[str]) -> None:
             raise InputError(name, names, "must be one or more, each once")
 
 
-def _evaluate(
-    case: Case, q: Any, branch: float, motion: tuple[Any, Any], given: Given, wanted: dict[str, str]
-) -> tuple[dict[str, Any], Any]:
-    """Evaluate quantities, and where they have a value; elsewhere they are finite, as in their derivatives.
+def _evaluate(scene: Scene, moved: Moved, holds: Any, given: Given, wanted: dict[str, str]) -> dict[str, Any]:
+    """Evaluate quantities, NaN where they have no value; what is put there meanwhile is finite, as its derivatives.
 
     A loop that does not close is evaluated with a right angle at B in its place, its sides those of the bars.
     """
-    xp, path, (speed, acceleration) = given.xp, case.path, motion
+    case, q, branch = Case.of(scene, scene.motion.bar), moved.q, float(scene.motion.branch)
+    if moved.lever is not None:
+        holds = holds & (moved.lever > NO_DIGIT_LEFT * given.eps)
+    xp, path, speed, acceleration = given.xp, case.path, moved.speed, moved.acceleration
     lengths, half = path.lengths, path.half_angle(q)
     square = 2.0 * lengths.b * lengths.c
     size, turned, part = 4.0 * lengths.a * lengths.d, abs(half.sk * (q - path.theta_1)), UNDECIDED * given.eps
@@ -145,7 +163,9 @@ def _evaluate(
     at = path.position(q, half, branch)
     state = case.state(q, at, branch, speed, acceleration, moving=stages != {"position"})
     found = {"theta_2": state.theta_2, **list_kinematics(case, state, wanted.keys())}
-    found |= name_of_command(case, at, state, q)
+    found |= name_of_command(case, at, state, q) | moved.stated
+    if moved.lever is not None and "condition" in wanted:
+        found["condition"] = found["condition"] * moved.lever
     if "force" in stages:
         done = case.dynamics(state, acceleration)
         power = xp.where(xp.isfinite(done.drive), done.work * speed, xp.nan)
@@ -158,7 +178,13 @@ def _evaluate(
                 ok = ok & (status == OK)
         if case.drive is not None and (status := case.drive.status(state, case.sines(state.at))) is not None:
             ok = ok & (status == OK)
-    return found, ok
+    result, zero = {}, given.zero
+    for name in wanted:
+        value = found[name]
+        parts = (value + zero,) if name in SCALARS else (value.real + zero, value.imag + zero)
+        kept = [xp.where(ok & holds & xp.isfinite(sum(parts)), part, xp.nan) for part in parts]
+        result[name] = kept[0] if name in SCALARS else xp.stack(kept, axis=-1)
+    return result
 
 
 def _check_given(keys: Sequence[str], values: Sequence[Any], positions: tuple[int, ...]) -> Given:

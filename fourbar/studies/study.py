@@ -139,25 +139,30 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     for key, array in numbers.items():
         invalid = invalid | ~known[key].holds(array)
     numbers = {key: np.where(invalid, np.nan, array) for key, array in numbers.items()}
-    angle = np.broadcast_to(angles, (m, angles.shape[1]))
-    stroke = lever = stroke_speed = lost = None
+    at = _list_commands(scene, numbers, angles, m)
+    rates = {f"motion.{name}" for name in scene.motion.names[1:]}
+    return Study(scene, {key: array for key, array in numbers.items() if key not in rates}, invalid, at)
+
+
+def _list_commands(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> Command:
+    """Return the command of each member, (m, n), from the angles or strokes and the numbers that vary."""
     motion: Any = scene.motion if scene.motion.law is None else command(scene)
+    angle = np.broadcast_to(angles, (m, angles.shape[1]))
     speed, acceleration = (
-        numbers.pop(f"motion.{name}")[:, None] if f"motion.{name}" in numbers else number
+        numbers[f"motion.{name}"][:, None] if f"motion.{name}" in numbers else number
         for name, number in zip(scene.motion.names[1:], (motion.speed, motion.acceleration), strict=True)
     )
     if scene.motion.law is not None:
         speed, acceleration = (np.broadcast_to(value, angle.shape) for value in (speed, acceleration))
-    if scene.motion.stroke is not None:
-        varied = replace_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
-        stroke, stroke_speed = angle, speed
-        angle, speed, acceleration, lever, lost = turn_bar(
-            varied.linkage, varied.drive, scene.motion.side, stroke, speed, acceleration
-        )
-    branch = _find_branches(scene, numbers, angles if stroke is None else angle, m)
-    of_stroke: Any = {"stroke": stroke, "lever": lever, "stroke_speed": stroke_speed, "lost": lost}
-    at = Command(angle, branch, speed, acceleration, bar=scene.motion.bar, **of_stroke)
-    return Study(scene, numbers, invalid, at)
+    if scene.motion.stroke is None:
+        branch = _find_branches(scene, numbers, angles, m)
+        return Command(angle, branch, speed, acceleration, bar=scene.motion.bar)
+    varied = replace_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
+    theta, omega, alpha, lever, lost = turn_bar(
+        varied.linkage, varied.drive, scene.motion.side, angle, speed, acceleration
+    )
+    at = Command(theta, _find_branches(scene, numbers, theta, m), omega, alpha, bar=scene.motion.bar)
+    return at._replace(stroke=angle, lever=lever, stroke_speed=speed, lost=lost)
 
 
 def _find_branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:
