@@ -22,6 +22,7 @@ COMMANDS = {
     "findings": "fourbar_validation.lab.simulators.findings:command",
     "write": "fourbar_lab.write:command",
     "problems": "fourbar_validation.lab.simulators.problems:command",
+    "benchmark": "fourbar_lab.benchmark:command",
 }
 
 

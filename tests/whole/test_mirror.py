@@ -78,6 +78,7 @@ JUDGED_BY = {
     "validation/advise: worst_errors; validation/engines/mujoco: one_state",
     "validation/advise/test_advise.py": "validation/advise: matters; "
     "validation/run: required_error; validation/engines/mujoco: trial",
+    "lab/test_benchmark.py": "validation/lab/simulators: slider_engines slider_mujoco slider_pinocchio states",
     "validation/lab/simulators/test_problems.py": "validation/lab/simulators: slider_crank; validation/check: problem",
     # simulators that need not be there: their scripts run where they are installed
     "validation/lab/simulators/test_simulators.py": "validation/lab/simulators: drake_sap examine exudyn_simulated "

@@ -64,9 +64,13 @@ class TestFourBar(unittest.TestCase):
     def test_constraint_dynamics(self):
         self.check("constraintDynamics", 1e-8)
 
-    @unittest.expectedFailure  # the force stands with the other sign, in the axes of the coupler
-    def test_lcaba(self):
-        self.check("lcaba", 1e-6)
+    def test_lcaba_finds_the_force_of_constraint_dynamics(self):
+        for theta_2, (theta_3, theta_4, torque, _) in EXPECTED.items():
+            q = np.array([np.deg2rad(theta_2), theta_3 - np.deg2rad(theta_2), theta_4])
+            state = q, np.array([OMEGA, -OMEGA, OMEGA]), np.array([torque, 0.0, 0.0])
+            (a, one), (b, other) = (self.dynamics(name, *state) for name in ("constraintDynamics", "lcaba"))
+            np.testing.assert_allclose(b, a, atol=1e-6)
+            np.testing.assert_allclose(other, one, atol=1e-6 * 133.0)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ SCHEMA, RESULT = "fourbar-problem/2", "fourbar-result/1"
 LEVELS = {"A": 1e-9, "B": 1e-6, "C": 1e-3}
 """Largest error of each level, of the largest value; D is worse. Error bars of the problem are allowed."""
 WORSE, MISSING = "D", "-"
-GROUPS = {"reactions": (*PIN_FORCES, "guide_force"), "torque": ("torque", "drive_force")}
+GROUPS = {"reactions": (*PIN_FORCES, "guide_force"), "torque": ("torque", "drive_force"), "frequency": ("frequency",)}
 """What each letter stands for; every other quantity is of the motion."""
 SAFE = 8.0
 """Times the error bars of the formulas, which are estimates: against many digits an answer is up to 6.6 of them off."""

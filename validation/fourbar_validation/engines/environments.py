@@ -16,12 +16,15 @@ from typing import Any
 from filelock import FileLock
 
 from fourbar.errors import DependencyError, InputError
+from fourbar.files.reading import read_text
 from fourbar.writing import write_text
 from fourbar_validation.engines.guests import Guest, Program, name_guests, serve
 from fourbar_validation.engines.processes import run_to_end
 from fourbar_validation.engines.witnesses import Witness
 
 FILE = "engines.toml"
+LARGEST_FILE = 10**6
+"""Bytes."""
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-engines"
 HELD = ("tolerance", "expected", "positions", "through_time", "predictor", "residuals", "nearby", "stated")
 """What an adapter of ours is held to, in whatever environment."""
@@ -48,15 +51,22 @@ def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
     """Read engines.toml of these folders and of the package, by name; InputError for what is no entry."""
     result: dict[str, Entry] = {}
     for file in dict.fromkeys(folder / FILE for folder in (*folders, Path(__file__).parent)):
-        if not file.is_file():
-            continue
-        try:
-            tables = tomllib.loads(file.read_text(encoding="utf-8")).get("engine", [])
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise InputError("engine", None, f"is no TOML: {error}", str(file)) from None
-        for table in tables:
-            entry = _read_entry(file, table)
-            result.setdefault(entry.name, entry)
+        if file.is_file():
+            result = result | {name: entry for name, entry in read_engines_of(file).items() if name not in result}
+    return result
+
+
+def read_engines_of(file: Path) -> dict[str, Entry]:
+    """Read the engines of one file, by name."""
+    text = read_text(file, "engines", LARGEST_FILE)
+    try:
+        tables = tomllib.loads(text).get("engine", [])
+    except tomllib.TOMLDecodeError as error:
+        raise InputError("engine", None, f"is no TOML: {error}", str(file)) from None
+    result: dict[str, Entry] = {}
+    for table in tables:
+        entry = _read_entry(file, table)
+        result.setdefault(entry.name, entry)
     return result
 
 
@@ -106,20 +116,22 @@ def make_environment(entry: Entry, cache: Path = CACHE) -> str:
     return str(inside)
 
 
+def prepare_program(entry: Entry, seconds: float | None = None) -> Program:
+    """Make an engine's environment; return the program that answers there."""
+    python = make_environment(entry)
+    if entry.adapter:
+        return serve(entry.adapter, seconds, python)
+    program = shutil.which(entry.command[0], path=f"{Path(python).parent}{os.pathsep}{os.environ.get('PATH')}")
+    if program is None:
+        raise InputError("engine.command", entry.command[0], "no such program", FILE)
+    return Program((program, *entry.command[1:]), seconds)
+
+
 def start_engines(
     entries: Sequence[Entry], witnesses: Sequence[Witness], seconds: float | None = None
 ) -> tuple[Guest, ...]:
     """Make the environments of engines and read each hello; an adapter of ours is held to what it is held to here."""
-    programs = []
-    for entry in entries:
-        python = make_environment(entry)
-        if entry.adapter:
-            programs.append((entry.adapter, entry.name, serve(entry.adapter, seconds, python)))
-        else:
-            program = shutil.which(entry.command[0], path=f"{Path(python).parent}{os.pathsep}{os.environ.get('PATH')}")
-            if program is None:
-                raise InputError("engine.command", entry.command[0], "no such program", FILE)
-            programs.append((entry.name, entry.name, Program((program, *entry.command[1:]), seconds)))
+    programs = [(entry.adapter or entry.name, entry.name, prepare_program(entry, seconds)) for entry in entries]
     held = {witness.name: witness for witness in witnesses}
     guests = zip(entries, name_guests(programs, held), strict=True)
     return tuple(

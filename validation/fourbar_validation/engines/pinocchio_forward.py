@@ -144,7 +144,7 @@ class PinocchioForward:
 class PinocchioReleased:
     """Free motion of the closed loop with a fixed step, s."""
 
-    name = NAME
+    name, version = NAME, pin.__version__
 
     def __init__(self, step: float = 2e-3) -> None:
         self.step = step

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import re
+import zipfile
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fourbar_lab.cli import status as lab_status
 from fourbar_validation.check.problem import LEVELS, RESULT, SCHEMA, find_levels, judge, read_problem
 from fourbar_validation.cli import status
 from fourbar_validation.compare.tolerance import EPS, K, magnitude
@@ -283,3 +285,11 @@ def test_the_command_judges_a_result_file(tmp_path: Path, capsys: pytest.Capture
         file.write_text(text)
         assert status(["check", problem, str(file)]) == 2
         assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_archive_holds_the_set_and_is_the_same_bytes_each_time(tmp_path: Path) -> None:
+    for name in ("one.zip", "two.zip"):
+        assert lab_status(["problems", "--archive", str(tmp_path / name)]) == 0
+    assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "two.zip").read_bytes()
+    names = {Path(name).name for name in zipfile.ZipFile(tmp_path / "one.zip").namelist()}
+    assert {f"{name}.json" for name in NAMES} | {"LICENSE", "CITATION.cff", "problems.md"} <= names

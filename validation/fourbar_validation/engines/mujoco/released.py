@@ -24,7 +24,7 @@ FRICTION = (mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF, mujoco.mjtConstraint.mjCN
 class MujocoForward:
     """Free motion of the closed loop with a fixed step, s."""
 
-    name = NAME
+    name, version = NAME, mujoco.__version__
 
     def __init__(self, step: float = 1e-3) -> None:
         self.step = step

@@ -5,10 +5,9 @@ from functools import partial
 from typing import Any
 
 import mujoco
-import numpy as np
 
 from fourbar.mjcf import SIMULATORS, write_mjcf
-from fourbar.scene import Scene
+from fourbar.scene import Scene, command
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
@@ -67,10 +66,10 @@ def states(scene: Scene, setting: str) -> Readings:
 
 
 def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
-    """Assemble states of a turn by MuJoCo's own kinematics: Newton on the gap, speeds by its Jacobian."""
+    """Assemble the scene's positions by MuJoCo's own kinematics: Newton on the gap, speeds by its Jacobian."""
     loop, made = ClosedLoop(written), []
-    position, begin = Assembler(loop), start(scene).qpos[0]
-    for theta_2 in (begin + np.linspace(0.0, 2.0 * np.pi, 25)).tolist():
+    position = Assembler(loop)
+    for theta_2 in command(scene).theta_2.tolist():
         if (q := position.find(theta_2, scene.motion.branch)) is not None:
             loop.set_state(q, scene.motion.omega_2 or 0.0)
             made.append((loop.data.qpos.copy(), loop.data.qvel.copy()))

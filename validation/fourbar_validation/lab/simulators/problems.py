@@ -1,7 +1,9 @@
 """`problems`: the problems with their answers, as JSON that needs nothing of ours."""
 
 import json
+from pathlib import Path
 from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import click
 import numpy as np
@@ -28,6 +30,7 @@ CONVENTIONS = (
     "(follow) or its branch (sign). error: how far off the value may be, besides the rounding of its last digit; of "
     "a vector, its Euclidean norm. The rest is the protocol's: docs/protocol.md."
 )
+ARCHIVE = "fourbar-problems-1.0"
 PROMISED = 1e-9
 """rad in 5 s of a released motion, held by test_free_motion_reference.py; beyond them in proportion."""
 PROMISED_FOR = 5.0
@@ -100,12 +103,29 @@ def _measure_period(time: Array, theta: Array, omega: Array, alpha: Array) -> fl
 
 
 @click.command()
-def command() -> None:
+@click.option("--archive", type=click.Path(path_type=Path, dir_okay=False), help="Pack the set into this file instead.")
+def command(archive: Path | None) -> None:
     """Write the problems of models/problems and their answers as JSON."""
-    find_checkout("problems")
+    checkout = find_checkout("problems")
+    if archive is not None:
+        write_archive(checkout, archive)
+        click.echo(f"wrote {archive}")
+        return
     for name in list_problems():
         write_text((PROBLEMS / name).with_suffix(".json"), write_json(collect_problem(name)))
         click.echo(f"wrote {name}.json")
+
+
+def write_archive(checkout: Path, archive: Path) -> None:
+    """Pack the problems with their page, schema, licence and citation, the same bytes each time."""
+    files = sorted(PROBLEMS.iterdir())
+    files += [checkout / name for name in ("docs/problems.md", "docs/protocol.md", "docs/protocol.schema.json")]
+    files += [checkout / name for name in ("LICENSE", "CITATION.cff")]
+    with ZipFile(archive, "w", ZIP_DEFLATED) as packed:
+        for file in files:
+            entry = ZipInfo(f"{ARCHIVE}/{file.relative_to(checkout)}", date_time=(1980, 1, 1, 0, 0, 0))
+            entry.compress_type = ZIP_DEFLATED
+            packed.writestr(entry, file.read_bytes())
 
 
 def write_json(problem: dict[str, Any]) -> str:

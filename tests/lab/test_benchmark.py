@@ -1,0 +1,111 @@
+"""The benchmark: engines are asked by the protocol, a letter is what the numbers earn, and nothing is asked twice."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from fourbar_lab.benchmark import ENGINES, REFUSED, read_reasons
+from fourbar_lab.cli import status
+from fourbar_validation.check.problem import judge, read_problem, read_result
+from fourbar_validation.engines.environments import read_engines
+from fourbar_validation.lab.simulators.problems import PROBLEMS
+from tests.whole.test_imports import ROOT
+
+PROBLEMS_ASKED = ("crank_rocker", "slider_crank", "sprung")
+WRONG = ('"torque": moments[0]', '"torque": 1.1 * moments[0]')
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A stranger's folder: the engine of the page, one that is wrong, and the entries of both."""
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "protocol.md").read_text(), re.DOTALL)[:1]
+    assert WRONG[0] in code
+    (tmp_path / "mine.py").write_text(code)
+    (tmp_path / "wrong.py").write_text(code.replace(*WRONG))
+    (tmp_path / "dead.py").write_text("raise SystemExit('no licence')")
+    names = ("mine", "wrong", "dead")
+    entries = [f'[[engine]]\nname = "{name}"\ncommand = ["python", "{tmp_path / name}.py"]\n' for name in names]
+    entries.append('[[engine]]\nname = "absent"\ncommand = ["no_such_program"]\n')
+    (tmp_path / "engines.toml").write_text("\n".join(entries))
+    return tmp_path
+
+
+def run(folder: Path, *problems: str) -> dict[tuple[str, str], str]:
+    """The letters of a run, by engine and problem, as they stand in the page's text."""
+    options = [option for name in problems or PROBLEMS_ASKED for option in ("--problem", name)]
+    line = ["benchmark", "--engines", str(folder / "engines.toml"), "-o", str(folder / "out"), "--time-limit", "60"]
+    assert status([*line, *options]) == 0
+    rows = [line.strip("| ").split(" | ") for line in (folder / "out" / "benchmark.md").read_text().splitlines()
+            if line.startswith("|") and "---" not in line]  # fmt: skip
+    _, *problems = rows[0]
+    return {(row[0].replace("\\", "").partition(" ")[0], name.replace("\\", "")): letters
+            for row in rows[1:] for name, letters in zip(problems, row[1:], strict=True)}  # fmt: skip
+
+
+def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(folder: Path) -> None:
+    letters = run(folder)
+    assert letters["mine", "crank_rocker"] == "AA" and letters["wrong", "crank_rocker"] == "AD"
+    assert letters["mine", "slider_crank"] == letters["mine", "sprung"] == REFUSED
+    assert {letters[name, "crank_rocker"] for name in ("dead", "absent")} == {"-"}
+    table = list(csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines()))
+    reasons = {row["engine"]: row["reason"] for row in table if row["problem"] == "crank_rocker"}
+    assert "no licence" in reasons["dead"] and "no_such_program" in reasons["absent"]
+    wrong = {row["quantity"]: row for row in table if row["engine"] == "wrong" and row["problem"] == "crank_rocker"}
+    assert wrong["torque"]["level"] == "D" and wrong["F12"]["level"] == "A"
+    assert 5e-3 < float(wrong["torque"]["error"]) < 2e-1
+    page = (folder / "out" / "benchmark.html").read_text()
+    assert all(
+        f'href="#{name}-crank_rocker"' in page and f'id="{name}-crank_rocker"' in page for name in ("mine", "dead")
+    )
+
+
+def test_what_was_answered_is_not_asked_again(folder: Path) -> None:
+    first = run(folder, "crank_rocker")
+    code = (folder / "mine.py").read_text()
+    (folder / "mine.py").write_text(code.replace('question["ask"] == "answer"', "1 / 0"))  # hello too
+    (folder / "mine.py").write_text(code.replace("        told = [", "        1 / 0\n        told = ["))
+    assert run(folder, "crank_rocker") == first
+    file = folder / "out" / "results" / "mine" / "crank_rocker.json"
+    problem = read_problem(PROBLEMS / "crank_rocker.json")
+    assert {row.level for row in judge(problem, read_result(file, problem))} == {"A"}
+    file.unlink()
+    assert run(folder, "crank_rocker")["mine", "crank_rocker"] == "-"
+
+
+def test_the_engines_of_the_lab_are_entries_that_can_be_read() -> None:
+    engines, reasons = read_engines([ENGINES.parent]), read_reasons([ENGINES])
+    assert len(engines) >= 15 and reasons.keys() <= engines.keys()
+
+
+@pytest.mark.parametrize(
+    "text", ["[[engine]]", '[[engine]]\nname = "x"', '[[engine]]\nname = "x"\ncommand = "y"\ncolour = 1', "]", None]
+)
+def test_entries_that_cannot_be_read_are_named_in_one_line(
+    text: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if text is not None:
+        (tmp_path / "engines.toml").write_text(text)
+    assert status(["benchmark", "--engines", str(tmp_path / "engines.toml"), "-o", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("library", ["mujoco", "pinocchio"])
+def test_an_engine_answers_the_slider_cranks(library: str, folder: Path) -> None:
+    pytest.importorskip(library)
+    program = ["python", "-m", "fourbar_validation.lab.simulators.slider_engines", library]
+    (folder / "engines.toml").write_text(f'[[engine]]\nname = "it"\ncommand = {json.dumps(program)}\n')
+    letters = run(folder, "slider_crank", "slider_crank_offset", "crank_rocker")
+    assert sorted(letters.values()) == ["AA", "AA", REFUSED]
+
+
+def test_a_simulator_answers_single_states_at_its_own_motion(folder: Path) -> None:
+    pytest.importorskip("mujoco")
+    program = ["python", "-m", "fourbar_validation.lab.simulators.states", "mujoco_c", "generated file"]
+    (folder / "engines.toml").write_text(f'[[engine]]\nname = "it"\ncommand = {json.dumps(program)}\n')
+    letters = run(folder, "crank_rocker", "sprung", "change_point", "second_on_the_crank")
+    assert sorted(letters.values()) == ["AA", REFUSED, REFUSED, REFUSED]
+    (file,) = (folder / "out" / "results").glob("*/crank_rocker.json")
+    assert "at" in json.loads(file.read_text())

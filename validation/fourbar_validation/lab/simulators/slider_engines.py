@@ -1,0 +1,135 @@
+"""`python -m fourbar_validation.lab.simulators.slider_engines mujoco | pinocchio`: serve slider-cranks by the protocol.
+
+The loop is cut at B: crank and rod in series, the slider on its guide. Each engine finds its own position, speeds and
+accelerations, and the closing force and the torque by its inverse dynamics; what each bar bears it reads itself.
+"""
+
+import json
+import math
+import os
+import sys
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from typing import IO, Any, NamedTuple, Protocol
+
+import numpy as np
+
+from fourbar.errors import LimitError
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.compare.rows import say_error
+
+CLOSED = 1e-15
+"""Of the rod's length: a gap that Newton's method is done with."""
+STEPS = 50
+ANSWERS = ("theta_3", "stroke", "torque", "F12", "F32", "F43", "guide_force")
+
+
+class SliderBar(NamedTuple):
+    """One bar: mass, kg; inertia about its mass centre, kg m^2; mass centre from its first pin, along and across, m."""
+
+    mass: float
+    inertia: float
+    centre: tuple[float, float]
+
+
+class CutLoop(Protocol):
+    """What an engine does with the tree, whose joints turn the crank and the rod and move the slider."""
+
+    def set(self, q: Array, v: Array) -> None:
+        """Set joint positions and speeds."""
+
+    def gap(self) -> tuple[Array, Array, Array]:
+        """Return the rod's end less the slider (2,), its Jacobian (2, 3), and its acceleration at none of q (2,)."""
+
+    def inverse(self, a: Array) -> Array:
+        """Return the joint forces of accelerations a, without the closing force."""
+
+    def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
+        """Return what ground bears on the crank, the crank on the rod and the guide on the slider (2,) each."""
+
+
+def describe(scene: dict[str, Any]) -> tuple[list[SliderBar], tuple[float, float, float], Array, Array]:
+    """Return the bodies, (crank, rod, offset), the field of gravity and the force on the slider."""
+    lengths, bodies = scene["lengths"], []
+    for name in ("crank", "rod", "slider"):
+        bar, length = scene.get("bars", {}).get(name, {}), lengths.get(name, 0.0)
+        mass = bar.get("mass", 0.0)
+        r, phi = bar.get("centre", (0.5 * length, 0.0))
+        bodies.append(
+            SliderBar(mass, bar.get("inertia", mass * length**2 / 12.0), (r * math.cos(phi), r * math.sin(phi)))
+        )
+    field = _direct(*scene.get("effects", {}).get("gravity", (0.0, 0.0)))
+    loads = scene.get("loads", ())
+    if any(load["bar"] != 4 or "table" in load or load.get("moment") for load in loads):
+        raise LimitError("a force on the slider is the only load here")
+    push = sum((_direct(*load["force"]) for load in loads), np.zeros(2))
+    return bodies, (lengths["crank"], lengths["rod"], lengths.get("offset", 0.0)), field, push
+
+
+def _direct(size: float, angle: float) -> Array:
+    return size * np.array([math.cos(angle), math.sin(angle)])
+
+
+def answer(make: Callable[..., CutLoop], question: dict[str, Any]) -> dict[str, Any]:
+    """Answer the positions of a question."""
+    scene, command = question["scene"], question["command"]
+    tree = make(*describe(scene))
+    _, (crank, rod, _), *_ = describe(scene)
+    rows: dict[str, list[Any]] = {name: [] for name in ANSWERS}
+    n = len(command["theta_2"])
+    rates = [np.broadcast_to(command.get(name, default), n) for name, default in
+             (("omega_2", 0.0), ("alpha_2", 0.0), ("branch", 1))]  # fmt: skip
+    for theta, omega, alpha, branch in zip(command["theta_2"], *rates, strict=True):
+        q = np.array([theta, (0.0 if branch > 0 else math.pi) - theta, crank * math.cos(theta) + branch * rod])
+        for _ in range(STEPS):
+            tree.set(q, np.zeros(3))
+            apart, J, _ = tree.gap()
+            step = np.linalg.solve(J[:, 1:], -apart)
+            q[1:] += step
+            if np.abs(step).max() <= CLOSED * rod:
+                break
+        tree.set(q, np.zeros(3))
+        _, J, _ = tree.gap()
+        v = np.array([omega, *np.linalg.solve(J[:, 1:], -J[:, 0] * omega)])
+        tree.set(q, v)
+        _, J, drift = tree.gap()
+        a = np.array([alpha, *np.linalg.solve(J[:, 1:], -J[:, 0] * alpha - drift)])
+        *closing, torque = np.linalg.solve(np.column_stack([J.T, [1.0, 0.0, 0.0]]), tree.inverse(a))
+        F12, F23, guide = tree.borne(a, np.array(closing))
+        values = (math.remainder(q[0] + q[1], math.tau), q[2], torque, F12.tolist(), (-F23).tolist(), closing, guide[1])
+        for name, value in zip(ANSWERS, values, strict=True):
+            rows[name].append(value)
+    return {"answers": {name: np.array(values).tolist() for name, values in rows.items()}}
+
+
+def serve(
+    hello: dict[str, Any],
+    answer: Callable[[dict[str, Any]], dict[str, Any]],
+    questions: IO[bytes],
+    replies: IO[bytes],
+) -> None:
+    """Answer line by line."""
+    for line in questions:
+        question, reply = json.loads(line), hello
+        if question["ask"] == "answer":
+            try:
+                reply = answer(question)
+            except LimitError as limit:
+                reply = {"refusal": str(limit)}
+            except Exception as error:
+                reply = {"error": say_error(error)}
+        elif question["ask"] != "hello":
+            reply = {"refusal": f"{question['ask']} is not answered here"}
+        replies.write(json.dumps({"id": question["id"], **reply}, allow_nan=False).encode() + b"\n")
+        replies.flush()
+
+
+if __name__ == "__main__":
+    with os.fdopen(os.dup(1), "wb") as stdout:
+        os.dup2(2, 1)  # what an engine prints is no answer
+        module = import_module(f"fourbar_validation.lab.simulators.slider_{sys.argv[1]}")
+        loop = getattr(module, f"{sys.argv[1].capitalize()}Slider")
+        hello = {"engine": sys.argv[1], "version": module.VERSION, "answers": list(ANSWERS),
+                 "mechanisms": ["slider-crank"], "effects": ["gravity", "loads"]}  # fmt: skip
+        serve(hello, partial(answer, loop), sys.stdin.buffer, stdout)

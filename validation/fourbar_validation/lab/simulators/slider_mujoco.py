@@ -1,0 +1,65 @@
+"""A slider-crank in MuJoCo: the tree that is open at B, by mj_inverse without constraints."""
+
+import mujoco
+import numpy as np
+
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.lab.simulators.slider_engines import SliderBar
+
+VERSION = mujoco.__version__
+
+
+class MujocoSlider:
+    """The tree, with sites at the rod's end and the slider."""
+
+    def __init__(self, bodies: list[SliderBar], lengths: tuple[float, float, float], field: Array, push: Array) -> None:
+        crank, rod, offset = lengths
+        inertials = [
+            f'<inertial pos="{b.centre[0]!r} {b.centre[1]!r} 0" mass="{b.mass!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
+            for b, i in ((body, body.inertia or 1e-12) for body in bodies)  # the slider does not turn
+        ]
+        hinge = '<joint type="hinge" axis="0 0 1"/>'
+        self.model = mujoco.MjModel.from_xml_string(
+            f'<mujoco><option gravity="{float(field[0])!r} {float(field[1])!r} 0"><flag constraint="disable"/></option>'
+            f"<worldbody>"
+            f'<body name="crank">{hinge}{inertials[0]}<body name="rod" pos="{crank!r} 0 0">{hinge}{inertials[1]}'
+            f'<site name="end" pos="{rod!r} 0 0"/></body></body><body name="slider" pos="0 {offset!r} 0">'
+            f'<joint type="slide" axis="1 0 0"/>{inertials[2]}<site name="slider"/></body></worldbody></mujoco>'
+        )
+        self.data, self.push = mujoco.MjData(self.model), push
+        self.bodies = [self.model.body(name).id for name in ("crank", "rod", "slider")]
+        self.sites = [self.model.site(name).id for name in ("end", "slider")]
+
+    def set(self, q: Array, v: Array) -> None:
+        """Set joint positions and speeds."""
+        self.data.qpos[:], self.data.qvel[:], self.data.qacc[:] = q, v, 0.0
+        mujoco.mj_fwdPosition(self.model, self.data)
+        mujoco.mj_fwdVelocity(self.model, self.data)
+
+    def gap(self) -> tuple[Array, Array, Array]:
+        """Return the rod's end less the slider, its Jacobian, and its acceleration at none of q."""
+        slopes, rates = np.zeros((2, 3, 3)), np.zeros((2, 3, 3))
+        for slope, rate, site in zip(slopes, rates, self.sites, strict=True):
+            mujoco.mj_jacSite(self.model, self.data, slope, None, site)
+            body = self.model.site_bodyid[site]
+            mujoco.mj_jacDot(self.model, self.data, rate, None, self.data.site_xpos[site], body)
+        end, slider = (self.data.site_xpos[site][:2] for site in self.sites)
+        return end - slider, (slopes[0] - slopes[1])[:2], (rates[0] - rates[1])[:2] @ self.data.qvel
+
+    def inverse(self, a: Array) -> Array:
+        """Return the joint forces of accelerations a, without the closing force."""
+        self.data.xfrc_applied[:], self.data.qacc[:] = 0.0, a
+        mujoco.mj_inverse(self.model, self.data)
+        slope = np.zeros((3, 3))
+        mujoco.mj_jacSite(self.model, self.data, slope, None, self.sites[1])
+        return np.array(self.data.qfrc_inverse) - slope[:2].T @ self.push
+
+    def borne(self, a: Array, closing: Array) -> tuple[Array, Array, Array]:
+        """Return what ground bears on the crank, the crank on the rod and the guide on the slider."""
+        for body, force, site in zip(self.bodies[1:], (closing, self.push - closing), self.sites, strict=True):
+            arm, pull = self.data.site_xpos[site] - self.data.xipos[body], np.array([*force, 0.0])
+            self.data.xfrc_applied[body] = [*pull, *np.cross(arm, pull)]
+        self.data.qacc[:] = a
+        mujoco.mj_rnePostConstraint(self.model, self.data)
+        forces = [np.array(self.data.cfrc_int[body][3:5]) for body in self.bodies]
+        return forces[0], forces[1], forces[2]
