@@ -157,9 +157,9 @@ def analyze(
 def _write_solution(
     scene: Scene, solution: Solution, form: Form, units: Conversion, pressure: float | None, out: Path | None
 ) -> str:
-    from fourbar.show.between import locate_between
     from fourbar.show.block import write_block
     from fourbar.show.duty import write_motor
+    from fourbar.show.summary import locate_between
     from fourbar.show.tables import print_positions
     from fourbar.solution import write_csv, write_json
 

@@ -13,9 +13,16 @@ from fourbar.effects.effect import PinRows
 from fourbar.errors import InputError, LimitError, NotAssembledError, clean_line
 from fourbar.formulas.mobility import change_points, choose_range, turns_fully
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, uniform
-from fourbar.mjcf.appearance import add_appearance
 from fourbar.mjcf.effects import find_row, unwind
-from fourbar.mjcf.model import Model, join, make_constant_motor, make_motor, make_servo, require_carriable
+from fourbar.mjcf.model import (
+    Model,
+    add_appearance,
+    join,
+    make_constant_motor,
+    make_motor,
+    make_servo,
+    require_carriable,
+)
 from fourbar.mjcf.settings import FULL_TURN, RECIPE, Settings, WindowMotion, fit_pad
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command, require_input

@@ -36,11 +36,9 @@ JUDGED_BY = {
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document effects model settings",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
-    "fourbar/show/test_block.py": "fourbar/show: summary",
     "fourbar/show/test_page.py": "fourbar/show: tolerances",
     "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody labels linkage "
     "studies style symbols view",
-    "validation/engines/mujoco/test_picture.py": "fourbar/mjcf: appearance",
     # a comparison is tested by witnesses with given answers
     "validation/run/test_judge.py": "validation/compare: answer compare effects rows; "
     "validation/run: answers command identities pictures question run",

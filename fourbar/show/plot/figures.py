@@ -11,13 +11,13 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
-from fourbar.show.between import locate_between
 from fourbar.show.block import static
 from fourbar.show.plot import curves, freebody, linkage, studies
 from fourbar.show.plot.curves import draw_transmission
 from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.style import CAPTION, TITLE, apply_style, format_of, render_figure, save, shorten_text
 from fourbar.show.plot.view import View, choose_common_position, is_over_time, make_view, set_branch
+from fourbar.show.summary import locate_between
 from fourbar.solution import SI, Conversion, require_units
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from fourbar.scene import Scene
 from fourbar.show import animate
 from fourbar.show.acting import NO_SYMBOL, list_acting
 from fourbar.show.animate import collect_page_data
-from fourbar.show.between import locate_between
+from fourbar.show.summary import locate_between
 from tests.support.scenes import crank_rocker
 
 TURNING = Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")

@@ -23,7 +23,6 @@ from fourbar.formulas.path import compute_state
 from fourbar.formulas.torque import inertia
 from fourbar.scene.motion_law import Law
 from fourbar.show import plot
-from fourbar.show.between import locate_between
 from fourbar.show.duty import compute_energies
 from fourbar.show.plot.curves import break_at_poles, choose_limit, find_free_place, find_poles
 from fourbar.show.plot.figures import FIGURES, TAKERS, draw_figure
@@ -33,6 +32,7 @@ from fourbar.show.plot.labels import Labels
 from fourbar.show.plot.linkage import draw_mechanism
 from fourbar.show.plot.style import INK, shorten_text, write_number
 from fourbar.show.plot.view import CLEAR, choose_common_position, make_view, set_branch
+from fourbar.show.summary import locate_between
 from fourbar.show.units import choose_unit
 from tests.support.scenes import crank_rocker, thesis
 

@@ -8,7 +8,7 @@ import pytest
 
 import fourbar
 from fourbar.mjcf import write_mjcf
-from fourbar.mjcf.appearance import compute_frame
+from fourbar.mjcf.model import compute_frame
 from fourbar_validation.engines.mujoco.picture import HEIGHT, MOST, WIDTH, render_pictures
 from tests.support.scenes import crank_rocker, thesis
 

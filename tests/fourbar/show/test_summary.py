@@ -14,7 +14,7 @@ import fourbar
 from fourbar.effects import SpringEnd
 from fourbar.scene import Command
 from fourbar.scene.motion_law import Law
-from fourbar.show.between import list_sizes, locate_between
+from fourbar.show.summary import list_sizes, locate_between
 from tests.support.scenes import crank_rocker, thesis
 
 LOCATED = 1e-7
