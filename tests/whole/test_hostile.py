@@ -175,6 +175,7 @@ def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(
     assert len(printed.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_a_suite_file_of_hostile_names_runs_and_they_are_shown_and_not_sent(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -274,6 +275,7 @@ def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch: pyte
     assert asked
 
 
+@pytest.mark.slow
 @pytest.mark.linux
 def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))

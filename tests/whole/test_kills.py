@@ -60,6 +60,7 @@ def judge_all(
     return last
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)  # its hangs alone take half a minute, and every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
@@ -76,6 +77,7 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
         assert any(row.scene == scene and row.engine == "free-body" for row in rows)
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 @pytest.mark.parametrize(("parent", "limit"), [("os.getppid()", 1.0), ("1", 100.0)], ids=["hangs", "orphan"])
 def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent(parent: str, limit: float) -> None:
@@ -95,6 +97,7 @@ def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent(parent
     assert not done.stderr and time.monotonic() - began < 60.0
 
 
+@pytest.mark.slow
 @pytest.mark.posix
 @pytest.mark.parametrize("how", ["killed", "locked out"])
 def test_what_comes_from_outside_is_not_held_against_the_engine(
@@ -110,6 +113,7 @@ def test_what_comes_from_outside_is_not_held_against_the_engine(
     assert not list((tmp_path / "lives").iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lives", "pools"), [(3, workers.POOLS), (9, 2)])
 def test_workers_that_die_with_nothing_to_do_are_on_nobodys_account(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lives: int, pools: int
@@ -129,6 +133,7 @@ def test_workers_that_die_with_nothing_to_do_are_on_nobodys_account(
         assert not list((tmp_path / "lives").iterdir())
 
 
+@pytest.mark.slow
 def test_the_bytes_do_not_depend_on_the_workers(
     tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
