@@ -18,11 +18,11 @@ from fourbar.solution import DEGREES, Conversion, Solution
 
 @click.command()
 @click.argument("lengths", nargs=4, metavar="D A B C")
-@click.option("--all", "everything", is_flag=True, help="The limits of all bars; left out: those of the output.")
+@click.option("--all", "everything", is_flag=True, help="Print the limits of all bars, not only of the output.")
 @given.json_option
 @given.text_option(*given.TABLES)
 def classify(lengths: tuple[str, ...], everything: bool, as_json: bool, out: Path | None) -> None:
-    """Name a linkage by its four lengths, and say what turns and how far.
+    """Classify a linkage by its lengths: which bars turn, and how far.
 
     D A B C are ground, input, coupler and output: four bare numbers are ratios; lengths like 30cm work too.
     """
@@ -42,11 +42,17 @@ def classify(lengths: tuple[str, ...], everything: bool, as_json: bool, out: Pat
 
 @click.command()
 @click.argument("file", type=given.FILE, required=False)
-@click.option("-o", "--out", type=given.FILE, metavar="FILE", help="The same, as an option.")
-@click.option("--lengths", nargs=4, required=True, metavar="D A B C", help="Ground, input, coupler, output: 300mm ...")
-@click.option("--unit", metavar="UNIT", help="Of bare numbers, like mm.")
+@click.option("-o", "--out", type=given.FILE, metavar="FILE", help="Name of the new file.")
+@click.option(
+    "--lengths",
+    nargs=4,
+    required=True,
+    metavar="D A B C",
+    help="Lengths of ground, input, coupler, output, like 300mm.",
+)
+@click.option("--unit", metavar="UNIT", help="Unit of lengths that are given without one, like mm.")
 def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str | None) -> None:
-    """Write a new scene file with the four lengths, the rest explained in comments.
+    """Write a new scene file with these lengths and comments that explain the rest.
 
     Each length has a unit, like 300mm; or --unit mm is the unit of all.
     """
@@ -82,12 +88,12 @@ class Form(NamedTuple):
 def _form_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options that choose between summary, table, JSON and CSV, of which there is one."""
 
-    @click.option("--table", is_flag=True, help="The positions one by one, in place of the summary.")
-    @click.option("--every", type=click.IntRange(min=1), metavar="N", help="Of the table: show every N-th position.")
-    @click.option("--all", "every", flag_value=1, help="Of the table: show every position, as in a file or a pipe.")
-    @click.option("--json", "as_json", is_flag=True, help="One object, SI, every digit.")
-    @click.option("--csv", "decimal", flag_value=".", help="One line per position, SI, every digit.")
-    @click.option("--csv-comma", "decimal", flag_value=",", help="With decimal commas, and semicolons between.")
+    @click.option("--table", is_flag=True, help="Print the positions one by one.")
+    @click.option("--every", type=click.IntRange(min=1), metavar="N", help="Print every N-th position of the table.")
+    @click.option("--all", "every", flag_value=1, help="Print every position of the table.")
+    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object in SI units.")
+    @click.option("--csv", "decimal", flag_value=".", help="Print one line per position in SI units.")
+    @click.option("--csv-comma", "decimal", flag_value=",", help="Print CSV with decimal commas and semicolons.")
     @wraps(command)
     def formed(table: bool, every: int | None, as_json: bool, decimal: str | None, **others: Any) -> None:
         if as_json and decimal:
@@ -109,10 +115,10 @@ def _form_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.command()
 @given.scene_argument
 @_form_options
-@click.option("--degrees/--radians", default=None, help="Angles theta; left out: deg, in JSON and CSV rad.")
+@click.option("--degrees/--radians", default=None, help="Unit of the angles (default: degrees; rad in JSON and CSV).")
 @given.own_units_option
-@click.option("--pressure", metavar="P", help='Of a cylinder, like "210 bar": the bore that it takes is added.')
-@click.option("--sensitivity", is_flag=True, help="What the quantities depend on: d(quantity)/d(number).")
+@click.option("--pressure", metavar="P", help='Pressure of the cylinder, like "210 bar"; adds the bore that it needs.')
+@click.option("--sensitivity", is_flag=True, help="Rank the numbers of the scene by what the results depend on.")
 @given.text_option(*given.TABLES, ".csv")
 def analyze(
     scene: Path,
@@ -123,7 +129,7 @@ def analyze(
     sensitivity: bool,
     out: Path | None,
 ) -> None:
-    """Solve a scene: ranges, driving torque, pin forces, what a motor or a cylinder must deliver.
+    """Solve a scene: ranges, torque, pin forces, and what the drive must deliver.
 
     A FILE that ends in .csv or .json asks for that form.
     """
@@ -200,13 +206,13 @@ def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
 
 @click.command()
 @given.scene_argument
-@click.option("--samples", type=int, metavar="N", help="Linkages that are tried; left out: 8192.")
-@click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Of the quasi-random samples.")
+@click.option("--samples", type=int, metavar="N", help="Number of linkages that are tried (default: 8192).")
+@click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Seed of the quasi-random samples.")
 @given.json_option
 @given.units_option
-@click.option("-o", "--out", type=given.FILE, metavar="PLOT", help="Draw the bands: svg, png or pdf.")
+@click.option("-o", "--out", type=given.FILE, metavar="PLOT", help="Draw the bands into PLOT (svg, png or pdf).")
 def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units: Conversion, out: Path | None) -> None:
-    """Show what the [tolerances] of a scene do to torque, pin forces and points, and which dimension does it."""
+    """Compute what the [tolerances] do to the results, and which dimension does most."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
     from fourbar.show.tables import show_running, write_table
@@ -238,13 +244,17 @@ def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
 @click.command()
 @given.scene_argument
 @click.option(
-    "--quantity", "quantities", multiple=True, metavar="NAME", help="torque or drive_force, F12 .. F14, transmission."
+    "--quantity",
+    "quantities",
+    multiple=True,
+    metavar="NAME",
+    help="Quantity: torque, drive_force, F12, F32, F43, F14 or transmission.",
 )
 @given.json_option
 @given.units_option
 @given.text_option(*given.TABLES)
 def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: Conversion, out: Path | None) -> None:
-    """Prove the largest and smallest torque, pin forces and transmission angle over the input's whole interval."""
+    """Prove bounds of torque, pin forces and transmission angle over the input's range."""
     from fourbar.show.studies import write_extremes, write_extremes_json
     from fourbar.show.tables import show_running
     from fourbar.studies.enclosure import extremes as proven
@@ -261,7 +271,7 @@ def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: Con
 @given.json_option
 @given.text_option(*given.TABLES)
 def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
-    """Find where a linkage stays by itself, stable or not, how fast it swings there, and what holds it elsewhere."""
+    """Find the positions of rest, their stability and frequency, and what holds the others."""
     from fourbar.show.studies import write_equilibria, write_equilibria_json
     from fourbar.show.tables import show_running
     from fourbar.studies.equilibrium import equilibrium as found

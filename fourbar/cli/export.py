@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 without_loads_option = click.option(
-    "--without-loads", is_flag=True, help="Leave the loads out: the form has none, your program applies them."
+    "--without-loads", is_flag=True, help="Leave the loads to your program; the file format has none."
 )
 
 
@@ -29,17 +29,17 @@ without_loads_option = click.option(
     default="overview",
     show_default=True,
     metavar="NAME",
-    help="overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, transmission, freebody, "
-    "bars, sensitivity, stroke.",
+    help="Figure: overview, linkage, coupler, kinematics, points, torque, forces, hodograph, energy, "
+    "transmission, freebody, bars, sensitivity or stroke.",
 )
-@click.option("--position", metavar="PLACE", help='Of the linkage and free bodies: what is commanded, like "135 deg".')
-@click.option("--branches", default="one", show_default=True, metavar="WHICH", help="one or both.")
+@click.option("--position", metavar="PLACE", help='Position of linkage and free bodies, like "135 deg".')
+@click.option("--branches", default="one", show_default=True, metavar="WHICH", help="Draw one branch or both.")
 @click.option("--dimensions", is_flag=True, help="Write the lengths of the bars at them.")
 @given.units_option
 def plot(
     scene: Path, out: Path, figure: str, position: str | None, branches: str, dimensions: bool, units: Conversion
 ) -> None:
-    """Draw a scene as SVG, PNG or PDF (by the ending of FILE)."""
+    """Draw a scene as SVG, PNG or PDF."""
     from fourbar.show.plot import draw
 
     with given.open_scene(scene) as described, given.show_waiting(described):
@@ -58,19 +58,19 @@ def plot(
     "pictures",
     multiple=True,
     metavar="BAR=FILE",
-    help="A PNG or JPEG laid along input, coupler or output (pages).",
+    help="Picture (PNG, JPEG) laid along input, coupler or output of a page.",
 )
 @click.option(
     "--seconds",
     type=click.FloatRange(min=0.1, max=60.0),
-    help="Length of a film; left out: 6, of a motion through time its own.",
+    help="Duration of a film (default: 6, or that of the motion).",
 )
-@click.option("--vectors", is_flag=True, help="With arrows of velocity and acceleration at the points.")
+@click.option("--vectors", is_flag=True, help="Draw velocity and acceleration at the points.")
 @given.units_option
 def animate(
     scene: Path, out: Path, pictures: tuple[str, ...], seconds: float | None, vectors: bool, units: Conversion
 ) -> None:
-    """Show a scene moving: one web page (.html), or a film (.gif, .mp4)."""
+    """Animate a scene as a web page (.html) or a film (.gif, .mp4)."""
     from fourbar.show.animate import write
 
     attached = {}
@@ -85,22 +85,22 @@ def animate(
 
 @click.command()
 @click.argument("scene", type=given.FILE, required=False)
-@click.option("--lengths", nargs=4, metavar="D A B C", help="Ground, input, coupler, output (bare numbers: m).")
-@click.option("--omega", metavar="W", help="Speed of the input with --lengths (a bare number: rad/s).")
+@click.option("--lengths", nargs=4, metavar="D A B C", help="Lengths of ground, input, coupler, output, m.")
+@click.option("--omega", metavar="W", help="Speed of the input with --lengths, rad/s.")
 @click.option(
     "--for",
     "simulator",
     type=click.Choice(["mujoco", "warp", "mjx", "genesis", "newton"]),
     default="mujoco",
     show_default=True,
-    help="What loads it: settings that suit it, and where its numbers stand.",
+    help="Simulator that will load the file.",
 )
 @click.option(
     "--drive",
     type=click.Choice(["flywheel", "motor", "none"]),
     default="flywheel",
     show_default=True,
-    help="flywheel keeps omega_2; for a controller of your own: motor, whose ctrl is the couple or force, or none.",
+    help="What drives it: a flywheel keeps omega_2; a motor takes the couple or force of your controller.",
 )
 @given.text_option(".xml", ".mjcf", required=True)
 def mjcf(
@@ -111,7 +111,7 @@ def mjcf(
     drive: "Drive",
     out: Path,
 ) -> None:
-    """Write a scene, or a linkage of uniform bars, as MJCF that runs on its own in MuJoCo and its kin."""
+    """Write a scene, or four lengths, as MJCF for MuJoCo and its kin."""
     from fourbar import mjcf as writer
 
     if (scene is None) == (lengths is None):
@@ -140,7 +140,7 @@ def mjcf(
 @without_loads_option
 @given.text_option(".sdf", ".world", ".xml", required=True)
 def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
-    """Write a scene as SDF, the loop closed by a fourth joint (Gazebo) or a ball constraint (Drake)."""
+    """Write a scene as SDF for Gazebo or Drake."""
     from fourbar.mjcf.assembly import write_sdf as written
 
     with given.open_scene(scene) as described:
@@ -152,7 +152,7 @@ def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:
 @without_loads_option
 @given.text_option(".usda", ".usd", required=True)
 def usd(scene: Path, without_loads: bool, out: Path) -> None:
-    """Write a scene as USD text (.usda) for Newton, the loop closed by a fourth revolute joint."""
+    """Write a scene as USD text (.usda) for Newton."""
     from fourbar.mjcf.assembly import write_usd as written
 
     with given.open_scene(scene) as described:
@@ -161,11 +161,11 @@ def usd(scene: Path, without_loads: bool, out: Path) -> None:
 
 @click.command()
 @click.argument("scene", type=FILE, required=False)
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Of this machine; left out: any that is free.")
-@click.option("--exports", type=FILE, metavar="FOLDER", help="For exports and reports; left out: SCENE_exports.")
-@click.option("--no-browser", is_flag=True, help="Print the address only.")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of this machine (default: any free one).")
+@click.option("--exports", type=FILE, metavar="FOLDER", help="Folder of exports and reports (default: SCENE_exports).")
+@click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
 def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) -> None:
-    """Change a scene in the browser, and see torque and forces follow; without SCENE a new one.
+    """Edit a scene in the browser while torque and forces follow; without SCENE a new one.
 
     Ctrl-C ends it, and so does a minute and a half without a page.
     """

@@ -33,13 +33,13 @@ units_option = click.option(
     default="SI",
     callback=_read_units,
     metavar="UNITS",
-    help='"imperial", or a list like "mm N.mm deg"; left out: SI.',
+    help='Units: SI (default), imperial, or a list like "mm N.mm deg".',
 )
 own_units_option = click.option(
     "--units",
     callback=_read_units,
     metavar="UNITS",
-    help='"SI", "imperial", or a list like "mm N.mm deg"; left out: those of the file.',
+    help='Units: SI, imperial or a list like "mm N.mm deg" (default: those of the file).',
 )
 
 
@@ -62,7 +62,9 @@ def json_option(command: Callable[..., None]) -> Callable[..., None]:
     def formed(as_json: bool, **others: Any) -> None:
         command(as_json=as_json or ends_in(others.get("out"), ".json"), **others)
 
-    return click.option("--json", "as_json", is_flag=True, help="One object, SI and rad, every digit.")(formed)
+    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object in SI units and radians.")(
+        formed
+    )
 
 
 def ends_in(out: Path | None, suffix: str) -> bool:

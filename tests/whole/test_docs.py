@@ -98,7 +98,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        *(("README.md", 2), ("docs/commands.md", 8), ("docs/gallery.md", 8)),
+        *(("README.md", 2), ("docs/commands.md", 7), ("docs/gallery.md", 8)),
         *(("docs/guide-designer.md", 3), ("docs/guide-roboticist.md", 3)),
     ],
 )
@@ -253,6 +253,10 @@ def test_pages_keep_to_their_length() -> None:
         prose = re.sub(r"^```console\n.*?^```$", "", read(name), flags=re.MULTILINE | re.DOTALL)  # what is printed
         assert len(prose.split()) <= most, name
     assert len(read("CHANGELOG.md").splitlines()) <= 60
+
+
+def test_the_page_of_the_commands_is_the_one_that_is_written() -> None:
+    assert read("docs/commands.md") == runpy.run_path(str(DOCS / "commands.py"))["text"]()
 
 
 def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
