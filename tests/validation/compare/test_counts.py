@@ -317,3 +317,25 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(
         monkeypatch.setattr("fourbar_validation.cost.cost.fit_laws", lambda _, found=found: found)
         assert status(["cost", "--out", str(tmp_path)]) == code
         assert ("Nothing was compared" in capsys.readouterr().out) == (code == FAILED)
+
+
+@pytest.mark.parametrize(
+    ("error", "allowed", "where", "verdict", "worst"),
+    [
+        ([0.0, 2.0, 1.0], 2.0, None, AGREES, 1),
+        ([0.0, 2.0, 1.0], [1.0, 3.0, 0.5], None, FAILS, 2),
+        ([0.0, math.nan, 1.0], 2.0, None, FAILS, 1),
+        ([0.0, math.inf, 1.0], math.inf, None, FAILS, 1),
+        ([0.0, 0.0, 0.0], 0.0, None, AGREES, 0),
+        ([0.0, 1e-300, 0.0], 0.0, None, FAILS, 1),
+        ([0.0, math.nan, 1.0], 2.0, [True, False, True], AGREES, 2),
+        ([9.0, math.nan, 9.0], 2.0, [False, False, False], UNDECIDED, 0),
+    ],
+)
+def test_one_rule_of_agreement(
+    error: list[float], allowed: float | list[float], where: list[bool] | None, verdict: str, worst: int
+) -> None:
+    mask, places = None if where is None else np.array(where), np.array([1.0, 2.0, 3.0])
+    bound = np.array(allowed) if isinstance(allowed, list) else allowed
+    row = Row.judged(("a", "b", "c"), "F12", np.array(error), bound, "", places, 1.0, mask)
+    assert (row.verdict, row.theta_2) == (verdict, worst + 1.0)

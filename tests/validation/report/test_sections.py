@@ -5,10 +5,12 @@ from html import unescape
 from pathlib import Path
 
 import pytest
+from markupsafe import escape
 
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
 from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard
+from fourbar_validation.engines.limits import LIMITS
 from fourbar_validation.engines.witnesses import WORK
 from fourbar_validation.report.costs import draw_costs
 from fourbar_validation.report.html import write_html
@@ -44,25 +46,24 @@ def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
     (tmp_path / "hard").mkdir()
     write_results(rows, tmp_path / "hard" / "results.csv")
     assert collect_sections(None, tmp_path) == []  # unfinished: its page is not written yet
-    (tmp_path / "hard" / "hard.html").touch()
+    (tmp_path / "hard" / "report.html").touch()
     (found,) = collect_sections(None, tmp_path)
     assert found.rows == collect_hard_cases(rows).rows
-    assert [file for _, file in found.links] == ["hard/hard.html", "hard/report.html"]
+    assert [file for _, file in found.links] == ["hard/report.html"]
 
 
-def test_a_run_of_the_hard_suite_writes_its_page_and_its_part_of_the_report(
+def test_the_report_of_the_hard_suite_has_its_picture_every_statement_and_every_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        "fourbar_validation.report.hard_page.draw_picture", lambda: "<svg><text>the picture</text></svg>"
-    )
-    (part,) = collect_sections([judged("toggle-b", AGREES)], tmp_path)
-    assert (part.key, part.links[0][1]) == ("hard", "hard.html")
-    assert (
-        "the picture" in (tmp_path / "hard.html").read_text(encoding="utf-8") and "the picture" in part.figures[0].svg
-    )
-    text = write_html(summary_of([]), {}, sections=[part])
-    assert 'href="#hard"' in text and 'href="hard.html"' in text and "<text>the picture</text>" in text
+    picture = "<svg><text>the picture</text></svg>"
+    monkeypatch.setattr("fourbar_validation.report.hard_picture.draw_picture", lambda: picture)
+    hard = Hard()
+    parts = collect_sections([judged(hard.name(index), AGREES) for index in range(len(hard))], tmp_path)
+    text = write_html(summary_of([]), {}, sections=parts)
+    assert [part.key for part in parts] == ["hard", "engine-limits"] and not list(tmp_path.iterdir())
+    assert 'href="#hard"' in text and 'href="#engine-limits"' in text and "<text>the picture</text>" in text
+    assert all(escape(family.statement) in text for family in FAMILIES)
+    assert all(escape(limit.name) in text for limit in LIMITS)
 
 
 @pytest.mark.slow

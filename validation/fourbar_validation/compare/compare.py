@@ -41,7 +41,6 @@ from fourbar_validation.compare.tolerance import (
     find_error,
     find_gap,
     find_used,
-    find_worst,
     magnitude,
     mark_touching,
     replace_zero_size,
@@ -120,13 +119,15 @@ class Comparison:
         rows += [self.row("watch", FAILS, alarm) for alarm in answer.alarms]
         return [*rows, *self.undecided()]
 
+    @property
+    def who(self) -> tuple[str, str, str]:
+        """Scene, engine and setting of its rows."""
+        return self.name, self.answer.engine, self.answer.setting or "-"
+
     def row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
         """Make a row of this answer."""
         error, allowed, theta_2, condition = (float(numbers.get(key, math.nan)) for key in NUMBERS)
-        engine, setting = self.answer.engine, self.answer.setting or "-"
-        return Row(
-            self.name, engine, setting, quantity, error, allowed, verdict, make_plain(reason), theta_2, condition
-        )
+        return Row(*self.who, quantity, error, allowed, verdict, make_plain(reason), theta_2, condition)
 
     def closure(self) -> Row:
         """Check that the own angles of an engine close the loop."""
@@ -134,13 +135,11 @@ class Comparison:
         assert answer.at is not None and answer.assembled is not None
         theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else answer.quantities["theta_2"]
         theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
-        error = np.where(answer.assembled, find_gap(linkage, theta_2, theta_3, theta_4), 0.0)
-        index, condition = find_worst(error), 1.0 / count_half_turns(linkage.ground_angle, theta_2)
+        condition = 1.0 / count_half_turns(linkage.ground_angle, theta_2)
         allowed = (IDENTITY if answer.setting == "exact" else self.tolerance).factor / condition
-        verdict = AGREES if error[index] <= allowed else FAILS
-        verdict, reason = (verdict, f"identity: {CLOSURE}") if answer.assembled.any() else (UNDECIDED, NOWHERE)
-        at = {"theta_2": theta_2[index], "condition": condition}
-        return self.row("closure", verdict, reason, error=error[index], allowed=allowed, **at)
+        reason = f"identity: {CLOSURE}" if answer.assembled.any() else NOWHERE
+        gap = find_gap(linkage, theta_2, theta_3, theta_4)
+        return Row.judged(self.who, "closure", gap, allowed, reason, theta_2, condition, answer.assembled)
 
     def assembled(self) -> Row:
         """Compare where both close the loop."""
@@ -148,15 +147,8 @@ class Comparison:
         assert theirs is not None and at is not None
         differ = (theirs != ours.assembled) & ~mark_touching(self.scene.linkage, at.angle, at.bar)
         count = np.count_nonzero(differ)
-        return self.row(
-            "assembled",
-            FAILS if count else AGREES,
-            f"{count} of {len(differ)} positions differ" if count else "the same positions",
-            error=float(count),
-            allowed=0.0,
-            theta_2=ours.theta_2[int(np.argmax(differ))],
-            condition=1.0,
-        )
+        reason = f"{count} of {len(differ)} positions differ" if count else "the same positions"
+        return Row.judged(self.who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2)
 
     def compared(self, quantity: str) -> Iterator[Row]:
         """Compare a quantity, if either side has it."""
@@ -232,8 +224,7 @@ class Comparison:
         missing = self.numbers - self.decided
         share = missing / self.numbers
         reason = f"{missing} of {self.numbers} numbers are undecided"
-        verdict = AGREES if share <= MOST_UNDECIDED else FAILS
-        yield self.row("undecided", verdict, reason, error=share, allowed=MOST_UNDECIDED, condition=1.0)
+        yield Row.judged(self.who, "undecided", share, MOST_UNDECIDED, reason)
 
 
 class _Finding(NamedTuple):

@@ -7,8 +7,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
+import numpy as np
+
 from fourbar.writing import write_text
 from fourbar_validation.compare.answer import WitnessError
+from fourbar_validation.compare.tolerance import Array, Mask, find_used
 
 AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
     *("agrees", "degraded as predicted"),
@@ -27,7 +30,7 @@ IDENTITIES = (
 )
 """Rows of the formulas that no engine answers: they do not count as compared."""
 
-SHIPPED = ("study", "sensitivity", "extremes", "tolerances", "equilibria", "sdf", "usd")
+SHIPPED = ("study", "sensitivity", "internal_forces", "extremes", "tolerances", "equilibria", "sdf", "usd")
 """Engines of the rows that judge what else is shipped. With the formulas' own they are our own consistency."""
 LONGEST = 500
 """Characters of what somebody else's code gives as a reason."""
@@ -62,6 +65,38 @@ class Row:
         """Make a verdict without numbers: a refusal, a breakdown, an answer that is missing."""
         nan = math.nan
         return cls(scene, engine, setting or "-", quantity, nan, nan, verdict, make_plain(reason), nan, nan)
+
+    @classmethod
+    def judged(
+        cls,
+        who: tuple[str, str, str],
+        quantity: str,
+        error: Array | float,
+        allowed: Array | float,
+        reason: str,
+        theta_2: Array | float = math.nan,
+        condition: Array | float = 1.0,
+        where: Mask | None = None,
+    ) -> "Row":
+        """Judge errors by the one rule of agreement, at the position where they use most of what is allowed.
+
+        Parameters
+        ----------
+        who : scene, engine and setting.
+        error : each a number, or an array over the positions, (n,), as `allowed`, `theta_2` and `condition`; one that
+            is no finite number fails.
+        where : positions that are held to it; undecided where there are none.
+        """
+        errors = np.atleast_1d(np.asarray(error, dtype=float))
+        errors = errors if where is None else np.where(where, errors, 0.0)
+        index = int(np.argmax(find_used(errors, allowed)))
+        numbers = (np.ravel(x) for x in (allowed, theta_2, condition))
+        bound, place, at = (float(x[index] if len(x) > 1 else x[0]) for x in numbers)
+        worst = float(errors[index])
+        verdict = AGREES if math.isfinite(worst) and worst <= bound else FAILS
+        if where is not None and not where.any():
+            verdict = UNDECIDED
+        return cls(*who, quantity, worst, bound, verdict, make_plain(reason), place, at)
 
     @property
     def compared(self) -> bool:

@@ -5,15 +5,14 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from fourbar.writing import write_text
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import VERDICTS, Row
 from fourbar_validation.report.html import Section, SectionFigure
 from fourbar_validation.scenes.hard_families import FAMILIES
 
-HARD, PAGE, COST = "hard", "hard.html", "cost"
-"""Folder and page of the hard cases, folder of the study, in OUT."""
+HARD, COST = "hard", "cost"
+"""Folders of the hard cases and of the study, in OUT."""
 ALT = "Error of each engine over the distance to a toggle, a pole of T4 and a change point"
 CAPTION = (
     "Error against the formulas, relative to the value itself, towards a singular position. Dotted: the law "
@@ -33,43 +32,38 @@ MOST = 3
 
 
 def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
-    """Collect the hard cases of this run or one in OUT/hard, and the study in OUT/cost, where there are any.
+    """Collect the hard cases of this run or of one in OUT/hard, and the study in OUT/cost, where there are any.
 
-    Of rows of the hard suite the page hard.html is written too.
+    Those of this run have their picture, and the limits of the engines with them.
     """
-    results = out / HARD / "results.csv"
-    found = []
+    results, sections = out / HARD / "results.csv", []
     if hard is not None:
-        from fourbar_validation.report.hard_page import draw_picture, write_page
-        from fourbar_validation.report.svg import shrink_svg
+        from fourbar_validation.report.hard_picture import draw_picture
 
-        svg = draw_picture()
-        write_text(out / PAGE, write_page(svg))
-        found.append(collect_hard_cases(hard, shrink_svg(svg)))
-    elif results.is_file() and (out / HARD / PAGE).is_file():
-        links = [(f"{HARD}/{name}", f"{HARD}/{name}") for name in (PAGE, "report.html")]
-        found.append(
-            replace(collect_hard_cases(read_columns(results)), text=f"From the run in {HARD}/: {MUST}", links=links)
-        )
+        sections += [collect_hard_cases(hard, draw_picture()), _list_limits()]
+    elif results.is_file() and (out / HARD / "report.html").is_file():
+        found = collect_hard_cases(read_columns(results))
+        links = [(f"{HARD}/report.html",) * 2]
+        sections.append(replace(found, text=f"From the run in {HARD}/: {MUST}", links=links))
     folders = sorted(path.parent for path in (out / COST).glob("*/cost.csv"))
-    return [*found, *(_read_study(folder) for folder in folders[:MOST])]
+    return [*sections, *(_read_study(folder) for folder in folders[:MOST])]
 
 
 def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Section:
-    """Of a run of the hard suite; `picture`: the inline SVG of `fourbar_validation.report.hard_page`."""
-    found = {family.name: Counts() for family in FAMILIES}
+    """Of a run of the hard suite; `picture`: the inline SVG of `fourbar_validation.report.hard_picture`."""
+    counts = {family.name: Counts() for family in FAMILIES}
     scenes: dict[str, set[str]] = {family.name: set() for family in FAMILIES}
     for row in rows:
         family = find_family(row.scene)
         if family is not None:
-            found[family].add([row])
+            counts[family].add([row])
             scenes[family].add(row.scene)
     table = [
         (
             family.name,
             str(len(scenes[family.name])),
-            *(str(found[family.name][verdict]) for verdict in VERDICTS),
-            found[family.name].word,
+            *(str(counts[family.name][verdict]) for verdict in VERDICTS),
+            counts[family.name].word,
             family.statement,
         )
         for family in FAMILIES
@@ -77,8 +71,16 @@ def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Secti
     ]
     headings = ("family", "scenes", *VERDICTS, "verdict", "what must happen")
     figures = [SectionFigure(ALT, CAPTION, svg=picture)] if picture else []
-    links = [("Limits of the engines, and the picture to download: " + PAGE, PAGE)]
-    return Section(HARD, "Hard cases", MUST.capitalize(), headings, table, figures, links, (1, 2 + len(VERDICTS)))
+    return Section(HARD, "Hard cases", MUST.capitalize(), headings, table, figures, (), (1, 2 + len(VERDICTS)))
+
+
+def _list_limits() -> Section:
+    """List the limits that engines declare, with the reason of each."""
+    from fourbar_validation.engines.limits import LIMITS
+
+    rows = [(of.engine, of.name, f"{of.boundary:g} {of.unit}".rstrip(), of.reason) for of in LIMITS]
+    text = "Where an engine refuses to answer, declared as data before it is asked."
+    return Section("engine-limits", "Limits of the engines", text, ("engine", "of what", "boundary", "why"), rows)
 
 
 def find_family(scene: str) -> str | None:

@@ -14,9 +14,9 @@ from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer, Engine, explain_refusal
 from fourbar_validation.compare.compare import Scales
 from fourbar_validation.compare.reversals import Reversal, find_reversals, mark_reversing
-from fourbar_validation.compare.rows import AGREES, FAILS, FORMULAS, UNDECIDED, Row, make_breakdown, make_plain
+from fourbar_validation.compare.rows import FORMULAS, Row, make_breakdown, make_plain
 from fourbar_validation.compare.scales import make_reference
-from fourbar_validation.compare.tolerance import Array, Mask, find_worst
+from fourbar_validation.compare.tolerance import Array, Mask
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.output import keep_printed
 from fourbar_validation.engines.protocol import require_near
@@ -126,16 +126,9 @@ class Question:
         `where`: positions that are held to it; none of them: undecided.
         `theta_2`: of the errors; left out: of the command.
         """
-        if where is not None:
-            error = np.where(where, error, 0.0)
-        index = find_worst(error)
-        verdict = AGREES if error[index] <= allowed else FAILS
-        if where is not None and not where.any():
-            verdict = UNDECIDED
-        place = float((self.at.angle if theta_2 is None else theta_2)[index])
-        return Row(
-            self.name, FORMULAS, "exact", quantity, float(error[index]), allowed, verdict, reason, place, condition
-        )
+        place = self.at.angle if theta_2 is None else theta_2
+        who = (self.name, FORMULAS, "exact")
+        return Row.judged(who, quantity, error, allowed, reason, place, condition, where)
 
     def record(self, rows: list[Row], seconds: float) -> Record:
         """Make the record of the scene; `seconds`: that the formulas took."""
@@ -183,7 +176,8 @@ def remove_angles(at: Command) -> Command:
     if at.stroke is None:
         return at
     unknown = np.full_like(at.angle, np.nan)
-    return at._replace(angle=unknown, speed=None if at.speed is None else unknown, acceleration=unknown, lever=None)
+    speed = None if at.speed is None else unknown
+    return at._replace(angle=unknown, speed=speed, acceleration=unknown, lever=None, lost=None)
 
 
 def select_positions(at: Command, where: NDArray[np.intp]) -> Command:

@@ -154,11 +154,8 @@ def _compare_forces(question: Question) -> Iterator[Row]:
     name, scene, solution = question.name, question.scene, question.solution
     none = solution.torque if solution.drive is None else solution.drive_force
     assert solution.omega_2 is not None and solution.alpha_2 is not None and none is not None
-    driven = find_worst(np.abs(none))
-    torque = float(np.abs(none[driven]))
     what = "a released linkage has no drive"
-    place = float(solution.theta_2[driven])
-    yield Row(name, FORMULAS, "exact", "torque", torque, 0.0, FAILS if torque else AGREES, what, place, 1.0)
+    yield Row.judged((name, FORMULAS, "exact"), "torque", np.abs(none), 0.0, what, solution.theta_2)
     held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2, drive=None)
     at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
     driven_ones = [

@@ -12,7 +12,7 @@ from fourbar.quantities import FORCES, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.answer import Answer, Engine
-from fourbar_validation.compare.rows import AGREES, FAILS, Row
+from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE, count_half_turns, find_used, wrap_angle
 
 Place = tuple[float, int]
@@ -33,13 +33,11 @@ class Finding(NamedTuple):
 
 def make_worst_row(name: str, answer: Answer, quantity: str, findings: Sequence[Finding]) -> Row:
     """Make the row of a quantity of the finding that exceeds what it is allowed by most."""
-    errors, bounds = (np.array(column) for column in zip(*(each[:2] for each in findings), strict=True))
-    result = findings[int(np.argmax(find_used(errors, bounds)))]
-    holds = result.error <= result.allowed
-    error, allowed, theta_2 = (float(number) for number in result[:3])
-    verdict, condition = AGREES if holds else FAILS, float(EQUIVALENCE.factor / max(result.allowed, EQUIVALENCE.factor))
+    error, allowed, theta_2 = (np.array(column) for column in zip(*(each[:3] for each in findings), strict=True))
+    worst = findings[int(np.argmax(find_used(error, allowed)))]
+    condition = EQUIVALENCE.factor / np.maximum(allowed, EQUIVALENCE.factor)
     who = (name, answer.engine, answer.setting)
-    return Row(*who, quantity, error, allowed, verdict, result.what, theta_2, condition)
+    return Row.judged(who, quantity, error, allowed, worst.what, theta_2, condition)
 
 
 def look(engine: Engine, linkage: FourBar, places: Iterable[Place]) -> Seen:

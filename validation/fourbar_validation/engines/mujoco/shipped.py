@@ -9,7 +9,7 @@ from fourbar.errors import InputError, LimitError, NotAssembledError
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar_validation.compare.rows import AGREES, FAILS, UNDECIDED, Row
+from fourbar_validation.compare.rows import FAILS, UNDECIDED, Row
 from fourbar_validation.compare.tolerance import EPS, SIMULATED, K
 from fourbar_validation.engines.limits import FASTEST, NEAREST_TOGGLE, compute_least_sine
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
@@ -68,8 +68,7 @@ def compare_shipped(name: str, scene: Scene, at: Command) -> Row | None:
     speed = math.inf if lost else abs(float(d.qvel[O2]) - moving) / (SPEED * max(abs(omega), abs(moving)))
     result.append((speed, f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of {moving:.6g} rad/s"))
     error, reason = _find_worst(result)
-    verdict = AGREES if error <= 1.0 else FAILS
-    return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
+    return Row.judged((name, NAME, "shipped"), QUANTITY, error, 1.0, reason, float(d.qpos[O2]))
 
 
 def _find_worst(found: list[tuple[float, str]]) -> tuple[float, str]:

@@ -19,7 +19,7 @@ from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.studies.equilibrium import Equilibrium
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.compare.rows import AGREES, FAILS, Row
+from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, WELL_CONDITIONED, ErrorBound, K
 from fourbar_validation.engines.description import find_centre, find_inertia
 from fourbar_validation.engines.free_body import FreeBody
@@ -72,8 +72,7 @@ def equilibria(question: Question) -> Iterator[Row]:
         found = [(each.place.theta_2, off) for each, (off, _) in judged if each.place.branch in (branch, 0)]
         missed += _count_missed(scene, branch, theta_2, torque, found)
     reason = f"{len(result.found)} equilibria; {SAMPLES} positions of a turn held by free bodies"
-    verdict = FAILS if missed else AGREES
-    yield Row(question.name, "equilibria", "exact", "missed", float(missed), 0.0, verdict, reason, float("nan"), 1.0)
+    yield Row.judged((question.name, "equilibria", "exact"), "missed", missed, 0.0, reason)
     for name in ("torque", "slope", "inertia", "frequency"):
         of = [(each.place.theta_2, errors[name]) for each, (_, errors) in judged if name in errors]
         if of:

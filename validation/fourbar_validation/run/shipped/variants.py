@@ -18,7 +18,7 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED, Comparison
 from fourbar_validation.compare.reversals import mark_reversing
-from fourbar_validation.compare.rows import AGREES, FAILS, VERDICTS, Row
+from fourbar_validation.compare.rows import VERDICTS, Row
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, ErrorBound, find_used, magnitude
 from fourbar_validation.engines.free_body import FreeBody
@@ -169,10 +169,8 @@ def make_row(
     question: Question, engine: str, quantity: str, error: Array, tolerance: ErrorBound, theta_2: Array, reason: str
 ) -> Row:
     """Make the row of a quantity whose errors at some positions are held to one tolerance."""
-    index = int(np.argmax(find_used(error, tolerance.factor)))
-    verdict = AGREES if find_used(error[index], tolerance.factor) <= 1.0 else FAILS
-    numbers = float(error[index]), tolerance.factor, verdict, f"{tolerance.name}: {reason}", float(theta_2[index]), 1.0
-    return Row(question.name, engine, "exact", quantity, *numbers)
+    who = (question.name, engine, "exact")
+    return Row.judged(who, quantity, error, tolerance.factor, f"{tolerance.name}: {reason}", theta_2)
 
 
 def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:

@@ -1,6 +1,5 @@
-"""The page "where it gets hard": error against distance to the singular position, per engine, and the limits."""
+"""The picture of the hard cases: error against distance to the singular position, per engine."""
 
-import base64
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -13,13 +12,11 @@ from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, divide, find_condition, find_error, magnitude
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES
-from fourbar_validation.engines.limits import LIMITS
 from fourbar_validation.engines.prediction import predict_in_world_axes
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.colours import choose_style
-from fourbar_validation.report.svg import draw_svg, shrink_svg
-from fourbar_validation.report.templating import render
-from fourbar_validation.scenes.hard_families import CHANGE_POINTS, CRANK, FAMILIES, ROCKER
+from fourbar_validation.report.svg import write_svg
+from fourbar_validation.scenes.hard_families import CHANGE_POINTS, CRANK, ROCKER
 from fourbar_validation.scenes.hard_linkages import (
     draw_linkage,
     dress,
@@ -81,7 +78,7 @@ def list_errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, A
 
 
 def draw_picture() -> str:
-    """SVG that stands by itself: a column per singular position, a row per quantity; law and prediction drawn in."""
+    """Draw the SVG of the page: a column per singular position, a row per quantity; law and prediction drawn in."""
     from matplotlib.figure import Figure
 
     columns = list_approaches()
@@ -96,7 +93,7 @@ def draw_picture() -> str:
         axes[row][0].set_ylabel(f"error of {quantity}, of its own size")
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False, fontsize=8)
-    return draw_svg(figure, "where it gets hard")
+    return write_svg(figure, "where it gets hard")
 
 
 def _draw(axes: Any, approach: Approach, quantity: str) -> None:
@@ -130,15 +127,3 @@ def _find_singular(approach: Approach) -> float:
     theta_2 = command(approach.scene).theta_2
     side = math.copysign(1.0, float(theta_2[0] - theta_2[-1]))
     return float(theta_2[0]) - side * float(approach.distances[0])
-
-
-def write_page(svg: str) -> str:
-    """Make the page, self-contained: the picture, what each family must show, the limits."""
-    return render(
-        "fourbar_validation.report",
-        "hard.html.j2",
-        svg=shrink_svg(svg),
-        source=base64.b64encode(svg.encode()).decode("ascii"),
-        families=[(family.name, family.statement) for family in FAMILIES],
-        limits=[(of.engine, of.name, f"{of.boundary:g} {of.unit}".rstrip(), of.reason) for of in LIMITS],
-    )
