@@ -26,6 +26,20 @@ class Angle(Right):
         return Answer(self.name, "exact", at, answer.assembled, {"theta_3": answer.quantities["theta_3"]})
 
 
+class Releases(Right):
+    """MuJoCo's forward dynamics, and a step that it is given."""
+
+    name = "releases"
+
+    def __init__(self, step: float = 1e-3) -> None:
+        self.step = step
+
+    def release(self, scene: Any, times: Any) -> Any:
+        from fourbar_validation.engines.mujoco.released import MujocoForward
+
+        return MujocoForward(self.step).release(scene, times)
+
+
 class OfAnyBar(Right):
     """What is commanded of a stroke's bar is not given."""
 

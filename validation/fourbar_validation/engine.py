@@ -13,6 +13,8 @@ from importlib.metadata import PackageNotFoundError, distributions, version
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
+
 from fourbar import effects
 from fourbar.errors import InputError
 from fourbar.quantities import UNKNOWNS
@@ -98,7 +100,7 @@ def answer(engine: Any, question: dict[str, Any]) -> dict[str, Any]:
     if question["ask"] == "release":
         scene = protocol.release_from_json(scene, question["command"], question["times"])
         step = [float(question["step"])] if "step" in question else []
-        return protocol.released_to_json(engine(*step).release(scene, question["times"]))
+        return protocol.released_to_json(engine(*step).release(scene, np.array(question["times"])))
     scene, command = protocol.command_from_json(scene, question["command"])
     made = engine()
     if refusal := explain_refusal(made, command):

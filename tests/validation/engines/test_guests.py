@@ -17,8 +17,9 @@ import fourbar
 from fourbar.effects.spring import SpringEnd
 from fourbar.errors import InputError
 from fourbar.files import save
+from fourbar.scene.motion import Free
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests
 from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.witnesses import WITNESSES
@@ -83,6 +84,11 @@ PROGRAMS: dict[str, tuple[str, str, str]] = {
     "one number short": ("values in found]", "values in found[1:]]", "answers.theta_3 = "),
     "log line": ("for question in", 'print("started")\nfor question in', f"{NO_JSON} (Expecting value"),
     "dead": (LAST, f"{AFTER_HELLO}    sys.exit(3)\n", "exit status 3"),
+    "another hello": (
+        '["gravity"]}',
+        '["gravity"], "version": str(__import__("os").getpid())}',
+        "its hello is another",
+    ),
     "raises": (LAST, f"{AFTER_HELLO}    1 / 0\n", "exit status 1: ZeroDivisionError: division"),
     "early": (LAST, LAST + LAST, "answered question 1 where 2 was asked"),
     "for another": (LAST, LAST.replace('question["id"],', 'question["id"] + 1,'), "answered question 2 where 1 was"),
@@ -215,6 +221,17 @@ def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
     assert judged(three, "OfAnyBar")["of any bar"]["all"][0] == REFUSES
     loaded = judged(crank_rocker(), write_program(tmp_path, "plain"))["plain"]
     assert loaded["all"] == (REFUSES, "it does not name loads among its effects")
+
+
+def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setattr("fourbar_validation.run.released.LONGEST_STEP", 1e-3)  # MuJoCo's here
+    motion = fourbar.Motion(1.0, 2.0, free=Free(0.2, 10))
+    found = judged(crank_rocker(motion=motion, loads=()), "Releases", "Right")
+    assert verdicts(found["releases"]) <= {AGREES, DEGRADED} and verdicts(found["right"]) <= {AGREES, DEGRADED}
+    assert {"theta_2", "omega_2", "energy", "stopped_at", "F12"} <= found["releases"].keys()
+    assert "energy" not in found["right"]
+    assert {name: found["releases"][name] for name in found["mujoco-forward"]} == found["mujoco-forward"]
 
 
 def test_names_stand_apart() -> None:

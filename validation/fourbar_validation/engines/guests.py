@@ -21,7 +21,7 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
-from fourbar.errors import InputError
+from fourbar.errors import FourBarError, InputError
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer, WitnessError
@@ -287,9 +287,8 @@ class Asked:
             "scene": protocol.scene_to_json(scene),
             "command": protocol.command_to_json(scene, command),
         }
-        reply = self._ask(data, len(command.angle))
         try:
-            return protocol.answer_from_json(self.name, command, reply)
+            return protocol.answer_from_json(self.name, command, self._ask(data, len(command.angle)))
         except InputError as error:
             raise WitnessError(str(error)) from None
 
@@ -299,9 +298,8 @@ class Asked:
             return ReleasedAnswer.refused(self.name, "-", refusal)
         data = {"ask": "release", "scene": protocol.scene_to_json(scene), **protocol.release_to_json(scene)}
         data |= {} if self.step is None else {"step": self.step}
-        reply = self._ask(data, len(times))
         try:
-            return protocol.released_from_json(self.name, len(times), reply)
+            return protocol.released_from_json(self.name, len(times), self._ask(data, len(times)))
         except InputError as error:
             raise WitnessError(str(error)) from None
 
@@ -334,17 +332,22 @@ class Running:
         with self._lock:
             for attempt in range(1, ATTEMPTS + 1):
                 try:
-                    if hello is not None and self._process is None and (greeting := read_hello(self._greet())) != hello:
-                        self.end()
-                        raise WitnessError(f"its hello is another than before: {greeting.name} {greeting.version}")
+                    if hello is not None and self._process is None:
+                        self._greet(hello)
                     return self._ask(data, positions)
                 except _KilledError:
                     if attempt == ATTEMPTS:
                         raise
         raise AssertionError
 
-    def _greet(self) -> dict[str, Any]:
-        return self._ask(HELLO, 0)
+    def _greet(self, hello: Hello) -> None:
+        """Begin with hello, which must be as before; a program that fails to say so is ended."""
+        try:
+            if read_hello(self._ask(HELLO, 0)) != hello:
+                raise WitnessError("its hello is another than before")
+        except FourBarError:
+            self.end()
+            raise
 
     def _ask(self, data: dict[str, Any], positions: int) -> dict[str, Any]:
         """Send a question and return the object that answers it; a program that fails is ended, and the error says how.
