@@ -78,12 +78,14 @@ const sketched = make(picture, "g", { id: "sketched" });
 const sketchBar = element("div", { id: "sketch-bar", className: "bar", hidden: true },
   element("p", { id: "next-pin", className: "hint", role: "status" }),
   element("label", {}, "Width of the drawing", element("input", { id: "sketch-width", value: "500 mm", size: 8, spellcheck: false })),
+  element("label", {}, "or type x, y in its unit", element("input", { id: "pin-xy", placeholder: "60, -5", size: 10, spellcheck: false })),
   element("button", { type: "button", id: "no-sketch", textContent: "Keep the linkage as it is" }));
 picture.before(sketchBar);
 let sketch = null;   // pins placed so far, and where the next one would be
 function beginSketch() {
   if (playing) play(false);
-  sketch = { pins: [], here: [0.35 * view.width, 0.6 * view.height] };
+  const origin = [0.35 * view.width, 0.6 * view.height];   // of what is typed
+  sketch = { pins: [], origin, here: [...origin], typed: false };
   document.body.classList.add("sketching");
   sketchBar.hidden = false;
   picture.focus();
@@ -110,12 +112,16 @@ function drawSketch() {
   const [x, y] = sketch.here;
   make(sketched, "path", { class: "cross", d: `M${x - 9} ${y}H${x + 9}M${x} ${y - 9}V${y + 9}` });
 }
+const sketchWidth = () => {
+  const [, wide, unit] = /^\s*([\d.]+)\s*(.*)$/.exec(byId("sketch-width").value) ?? [null, "500", "mm"];
+  return [Number(wide), unit];
+};
 function putPin() {
   if (sketch.pins.push([...sketch.here]) < PINS_IN_TURN.length) { drawSketch(); return; }
-  const [, wide, unit] = /^\s*([\d.]+)\s*(.*)$/.exec(byId("sketch-width").value) ?? [null, "500", "mm"], grain = Number(wide) / view.width;
-  const pins = sketch.pins.map(([x, y]) => [x * grain, -y * grain]);
+  const [wide, unit] = sketchWidth(), grain = wide / view.width, [x0, y0] = sketch.origin;
+  const pins = sketch.pins.map(([x, y]) => [(x - x0) * grain, (y0 - y) * grain]), finest = sketch.typed ? 1e-6 * wide : grain;
   endSketch();
-  ask({ do: "draw", pins, unit, grain }, null, Math.atan2(pins[1][1] - pins[0][1], pins[1][0] - pins[0][0]));
+  ask({ do: "draw", pins, unit, grain: finest }, null, Math.atan2(pins[1][1] - pins[0][1], pins[1][0] - pins[0][0]));
 }
 const placeOf = event => {
   const box = picture.getBoundingClientRect();
@@ -131,5 +137,15 @@ picture.addEventListener("keydown", event => {
   else if (event.key === "Escape") endSketch();
   else return;
   event.preventDefault(); event.stopPropagation();
+});
+byId("pin-xy").addEventListener("keydown", event => {
+  if (event.key !== "Enter") return;
+  const place = event.target.value.trim().split(/[,;\s]+/).map(Number), good = place.length === 2 && place.every(Number.isFinite), grain = sketchWidth()[0] / view.width;
+  event.target.setAttribute("aria-invalid", String(!good));
+  if (!good) return;
+  event.target.value = "";
+  sketch.here = [sketch.origin[0] + place[0] / grain, sketch.origin[1] - place[1] / grain];
+  sketch.typed = true;
+  putPin();
 });
 byId("no-sketch").addEventListener("click", endSketch);

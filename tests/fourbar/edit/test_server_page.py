@@ -222,6 +222,13 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(chromi
     wait_for(driver, "sketch")
     driver.find_element("id", "no-sketch").click()
     wait_for(driver, "!sketch && document.getElementById('bar-2').checkVisibility()")
+    driver.find_element("id", "sketch").click()
+    type_into(driver, "sketch-width", "2 m")
+    for place in ("0, 0", "nowhere", "0, 0.125", "1.5 0.5", "1.25; -0.25"):  # as they stand in somebody's drawing
+        type_into(driver, "pin-xy", place + Keys.ENTER)
+    wait_for(driver, "!sketch && Math.abs(data.lengths[1] - 0.125) < 1e-6")
+    expected = [math.hypot(1.25, 0.25), 0.125, math.hypot(1.5, 0.375), math.hypot(0.25, 0.75)]
+    assert driver.execute_script("return data.lengths") == pytest.approx(expected, abs=2e-6)
     assert not driver.get_log("browser")
 
 
