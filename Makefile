@@ -41,7 +41,7 @@ long-engines:
 long-simulators:
 	$(BIN)/python -m pytest -m nightly
 long-problems:
-	PROBLEMS=all $(BIN)/python -m pytest tests/validation/lab/simulators/test_problems.py
+	PROBLEMS=all $(BIN)/python -m pytest tests/lab/simulators/test_problems.py
 long-standing:
 	$(BIN)/python -m fourbar_lab standing
 long-free:

@@ -12,12 +12,12 @@ import click
 
 from fourbar.errors import DependencyError, InputError
 from fourbar.writing import write_text
+from fourbar_lab.simulators.problems import PROBLEMS, list_problems
 from fourbar_validation.check.problem import MISSING, RESULT, find_levels, judge, read_problem
 from fourbar_validation.compare.answer import WitnessError
 from fourbar_validation.compare.rows import write_csv, write_one_line
 from fourbar_validation.engines.environments import FILE, Entry, prepare_program, read_engines, read_engines_of
 from fourbar_validation.engines.guests import HELLO, Running
-from fourbar_validation.lab.simulators.problems import PROBLEMS, list_problems
 from fourbar_validation.places import find_checkout
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.templating import render

@@ -18,10 +18,10 @@ COMMANDS = {
     "fuzz-files": "fourbar_lab.fuzz_files:fuzz_files",
     "faults": "fourbar_lab.faults:command",
     "mutants": "fourbar_lab.mutants:command",
-    "standing": "fourbar_validation.lab.simulators.standing:command",
-    "findings": "fourbar_validation.lab.simulators.findings:command",
+    "standing": "fourbar_lab.simulators.standing:command",
+    "findings": "fourbar_lab.simulators.findings:command",
     "write": "fourbar_lab.write:command",
-    "problems": "fourbar_validation.lab.simulators.problems:command",
+    "problems": "fourbar_lab.simulators.problems:command",
     "benchmark": "fourbar_lab.benchmark:command",
 }
 

@@ -9,9 +9,9 @@ import pytest
 
 from fourbar_lab.benchmark import ENGINES, REFUSED, read_reasons
 from fourbar_lab.cli import status
+from fourbar_lab.simulators.problems import PROBLEMS
 from fourbar_validation.check.problem import judge, read_problem, read_result
 from fourbar_validation.engines.environments import read_engines
-from fourbar_validation.lab.simulators.problems import PROBLEMS
 from tests.whole.test_imports import ROOT
 
 PROBLEMS_ASKED = ("crank_rocker", "slider_crank", "sprung")
@@ -95,7 +95,7 @@ def test_entries_that_cannot_be_read_are_named_in_one_line(
 @pytest.mark.parametrize("library", ["mujoco", "pinocchio"])
 def test_an_engine_answers_the_slider_cranks(library: str, folder: Path) -> None:
     pytest.importorskip(library)
-    program = ["python", "-m", "fourbar_validation.lab.simulators.slider_engines", library]
+    program = ["python", "-m", "fourbar_lab.simulators.slider_engines", library]
     (folder / "engines.toml").write_text(f'[[engine]]\nname = "it"\ncommand = {json.dumps(program)}\n')
     letters = run(folder, "slider_crank", "slider_crank_offset", "crank_rocker")
     assert sorted(letters.values()) == ["AA", "AA", REFUSED]
@@ -103,7 +103,7 @@ def test_an_engine_answers_the_slider_cranks(library: str, folder: Path) -> None
 
 def test_a_simulator_answers_single_states_at_its_own_motion(folder: Path) -> None:
     pytest.importorskip("mujoco")
-    program = ["python", "-m", "fourbar_validation.lab.simulators.states", "mujoco_c", "generated file"]
+    program = ["python", "-m", "fourbar_lab.simulators.states", "mujoco_c", "generated file"]
     (folder / "engines.toml").write_text(f'[[engine]]\nname = "it"\ncommand = {json.dumps(program)}\n')
     letters = run(folder, "crank_rocker", "sprung", "change_point", "second_on_the_crank")
     assert sorted(letters.values()) == ["AA", REFUSED, REFUSED, REFUSED]

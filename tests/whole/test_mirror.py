@@ -76,10 +76,10 @@ JUDGED_BY = {
     "validation/advise: worst_errors; validation/engines/mujoco: one_state",
     "validation/advise/test_advise.py": "validation/advise: matters; "
     "validation/run: required_error; validation/engines/mujoco: trial",
-    "lab/test_benchmark.py": "validation/lab/simulators: slider_engines slider_mujoco slider_pinocchio states",
-    "validation/lab/simulators/test_problems.py": "validation/lab/simulators: slider_crank; validation/check: problem",
+    "lab/test_benchmark.py": "lab/simulators: slider_engines slider_mujoco slider_pinocchio states",
+    "lab/simulators/test_problems.py": "lab/simulators: slider_crank; validation/check: problem",
     # simulators that need not be there: their scripts run where they are installed
-    "validation/lab/simulators/test_simulators.py": "validation/lab/simulators: drake_sap examine exudyn_simulated "
+    "lab/simulators/test_simulators.py": "lab/simulators: drake_sap examine exudyn_simulated "
     "genesis_rigid gradients motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco "
     "pinocchio_simulated pybullet standing work",
 }

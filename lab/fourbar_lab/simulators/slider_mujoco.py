@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
+from fourbar_lab.simulators.slider_engines import SliderBar
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.lab.simulators.slider_engines import SliderBar
 
 VERSION = mujoco.__version__
 

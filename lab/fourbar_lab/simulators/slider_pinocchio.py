@@ -3,8 +3,8 @@
 import numpy as np
 import pinocchio as pin
 
+from fourbar_lab.simulators.slider_engines import SliderBar
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.lab.simulators.slider_engines import SliderBar
 
 VERSION = pin.__version__
 

@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from fourbar_lab.cli import status
-from fourbar_validation.lab.simulators import findings as module
-from fourbar_validation.lab.simulators.findings import FIELDS, FOLDER, MENDED, find_interpreter, read, read_findings
+from fourbar_lab.simulators import findings as module
+from fourbar_lab.simulators.findings import FIELDS, FOLDER, MENDED, find_interpreter, read, read_findings
 
 ALL = read_findings()
 SECONDS = 100.0

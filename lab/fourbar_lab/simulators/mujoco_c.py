@@ -8,11 +8,11 @@ import mujoco
 
 from fourbar.mjcf import SIMULATORS, write_mjcf
 from fourbar.scene import Scene, command
+from fourbar_lab.simulators.motion import Instant, Readings, run_through, start, turn
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 from fourbar_validation.engines.mujoco.drives import remove_attributes
-from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through, start, turn
 
 VERSION = mujoco.__version__
 STEPS = (157, 314, 628, 1256)

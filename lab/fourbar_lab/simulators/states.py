@@ -1,4 +1,4 @@
-"""`python -m fourbar_validation.lab.simulators.states MODULE SETTING`: serve a simulator's single states.
+"""`python -m fourbar_lab.simulators.states MODULE SETTING`: serve a simulator's single states.
 
 Each position is a state that is set by itself; it is answered at the motion that the simulator then has.
 """
@@ -13,8 +13,8 @@ import numpy as np
 
 from fourbar.errors import InputError, LimitError
 from fourbar.quantities import PIN_FORCES
+from fourbar_lab.simulators.slider_engines import serve
 from fourbar_validation.engines import protocol
-from fourbar_validation.lab.simulators.slider_engines import serve
 
 ANSWERS = ("theta_3", "theta_4", "torque", *PIN_FORCES)
 
@@ -45,6 +45,6 @@ def answer(module: Any, setting: str, question: dict[str, Any]) -> dict[str, Any
 if __name__ == "__main__":
     with os.fdopen(os.dup(1), "wb") as stdout:
         os.dup2(2, 1)  # what a simulator prints is no answer
-        module = import_module(f"fourbar_validation.lab.simulators.{sys.argv[1]}")
+        module = import_module(f"fourbar_lab.simulators.{sys.argv[1]}")
         hello = {"engine": sys.argv[1], "version": module.VERSION, "answers": list(ANSWERS), "effects": ["gravity"]}
         serve(hello, partial(answer, module, sys.argv[2]), sys.stdin.buffer, stdout)

@@ -8,10 +8,10 @@ import numpy as np
 import warp
 
 from fourbar.scene import Scene
+from fourbar_lab.simulators import gradients
+from fourbar_lab.simulators.motion import Instant, Readings, run_through
+from fourbar_lab.simulators.mujoco_c import find_bars, reading, states_of, text
 from fourbar_validation.engines.mujoco.closed_loop import open_model
-from fourbar_validation.lab.simulators import gradients
-from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through
-from fourbar_validation.lab.simulators.mujoco_c import find_bars, reading, states_of, text
 
 VERSION = mjw.__version__ if hasattr(mjw, "__version__") else ""
 DEVICE = str(warp.get_preferred_device().name)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fourbar_validation.lab.simulators.problems import PROBLEMS
+from fourbar_lab.simulators.problems import PROBLEMS
 from tests.whole.test_imports import ROOT, imported
 
 FILES = sorted((ROOT / "docs/upstream").glob("*/*four_bar*.py")) + sorted((ROOT / "docs/upstream").glob("*/*fourbar*"))

@@ -10,11 +10,11 @@ import numpy as np
 
 from fourbar.scene import Scene
 from fourbar.studies.keys import command_key, list_entries, read_place, replace_numbers
+from fourbar_lab.simulators.motion import start
+from fourbar_lab.simulators.mujoco_c import text
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
-from fourbar_validation.lab.simulators.motion import start
-from fourbar_validation.lab.simulators.mujoco_c import text
 
 STEPS = 156
 """In a turn; the quarter of them is run through."""

@@ -7,8 +7,7 @@ import pybullet as bullet
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN
 from fourbar.scene import Scene
-from fourbar_validation.engines.description import list_parts, rotate
-from fourbar_validation.lab.simulators.motion import (
+from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     find_gravity,
@@ -17,6 +16,7 @@ from fourbar_validation.lab.simulators.motion import (
     turn,
     write_temp,
 )
+from fourbar_validation.engines.description import list_parts, rotate
 
 VERSION = version("pybullet")
 STEPS = (628, 2512, 10048)

@@ -11,7 +11,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import PIN_FORCE
 from fourbar.scene import Scene
 from fourbar_lab.engines.exudyn import JOINTS, SIZE, ExudynBars
-from fourbar_validation.lab.simulators.motion import Instant, Readings, start, turn
+from fourbar_lab.simulators.motion import Instant, Readings, start, turn
 
 VERSION = version("exudyn")
 STEPS = (314, 1256, 5024)

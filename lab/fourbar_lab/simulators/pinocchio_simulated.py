@@ -9,10 +9,10 @@ import pinocchio as pin
 from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.settings import RECIPE
 from fourbar.scene import Scene
+from fourbar_lab.simulators.motion import Instant, Readings, run_through, start, turn
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.pinocchio import PinocchioTree
 from fourbar_validation.engines.pinocchio_forward import ClosedTree, make_step
-from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through, start, turn
 
 VERSION = pin.__version__
 STEPS = (314, 628, 1256)

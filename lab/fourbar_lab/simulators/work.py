@@ -1,4 +1,4 @@
-"""`python -m fourbar_validation.lab.simulators.work MODULE SCENE`: one simulator in its own environment; prints JSON.
+"""`python -m fourbar_lab.simulators.work MODULE SCENE`: one simulator in its own environment; prints JSON.
 
 It needs numpy, mpmath, pint and the simulator.
 """
@@ -19,7 +19,7 @@ FURTHER = ("APART", "MADE_FOR", "NOT_RUN")
 
 def main(module: str, file: str, answers: TextIO) -> None:
     """Try every setting: a turn at each number of steps, and single states where the simulator takes them."""
-    simulator, scene = import_module(f"fourbar_validation.lab.simulators.{module}"), fourbar.load(Path(file))
+    simulator, scene = import_module(f"fourbar_lab.simulators.{module}"), fourbar.load(Path(file))
     found = []
     for setting in simulator.SETTINGS:
         at_states = simulator.states(scene, setting) if hasattr(simulator, "states") else None

@@ -1,4 +1,4 @@
-"""`python -m fourbar_validation.lab.simulators.slider_engines mujoco | pinocchio`: serve slider-cranks by the protocol.
+"""`python -m fourbar_lab.simulators.slider_engines mujoco | pinocchio`: serve slider-cranks by the protocol.
 
 The loop is cut at B: crank and rod in series, the slider on its guide. Each engine finds its own position, speeds and
 accelerations, and the closing force and the torque by its inverse dynamics; what each bar bears it reads itself.
@@ -128,7 +128,7 @@ def serve(
 if __name__ == "__main__":
     with os.fdopen(os.dup(1), "wb") as stdout:
         os.dup2(2, 1)  # what an engine prints is no answer
-        module = import_module(f"fourbar_validation.lab.simulators.slider_{sys.argv[1]}")
+        module = import_module(f"fourbar_lab.simulators.slider_{sys.argv[1]}")
         loop = getattr(module, f"{sys.argv[1].capitalize()}Slider")
         hello = {"engine": sys.argv[1], "version": module.VERSION, "answers": list(ANSWERS),
                  "mechanisms": ["slider-crank"], "effects": ["gravity", "loads"]}  # fmt: skip

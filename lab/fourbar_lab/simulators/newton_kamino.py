@@ -12,9 +12,9 @@ from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_usd
 from fourbar.mjcf.document import SINGLE
 from fourbar.scene import Scene
+from fourbar_lab.simulators.motion import Instant, Readings, run_through, start, turn, write_temp
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import rotate
-from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through, start, turn, write_temp
 
 VERSION = version("newton")
 DEVICE = str(warp.get_preferred_device().name)

@@ -7,7 +7,7 @@ import newton
 import warp
 
 from fourbar.scene import Scene
-from fourbar_validation.lab.simulators.motion import (
+from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     find_gravity,
@@ -16,7 +16,7 @@ from fourbar_validation.lab.simulators.motion import (
     turn,
     write_temp,
 )
-from fourbar_validation.lab.simulators.mujoco_c import reading, text
+from fourbar_lab.simulators.mujoco_c import reading, text
 
 VERSION = version("newton")
 DEVICE = str(warp.get_preferred_device().name)

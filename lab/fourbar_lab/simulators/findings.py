@@ -11,8 +11,8 @@ from textwrap import dedent
 import click
 
 from fourbar.errors import DependencyError, InputError
+from fourbar_lab.simulators.examine import LOOK
 from fourbar_validation.engines.processes import Ended, run_to_end
-from fourbar_validation.lab.simulators.examine import LOOK
 from fourbar_validation.places import CHECKOUT
 
 FOLDER = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"

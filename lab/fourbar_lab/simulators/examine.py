@@ -100,7 +100,7 @@ def examine(scene: Scene, file: Path, pythons: list[Path], seconds: float) -> Ex
         if python is None:
             found.left_out[name] = "not installed under any --python"
             continue
-        line = [python, "-m", "fourbar_validation.lab.simulators.work", module, file.absolute()]
+        line = [python, "-m", "fourbar_lab.simulators.work", module, file.absolute()]
         done = start_harness(line, seconds=seconds)
         if done.why:
             found.left_out[name] = done.why

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from fourbar_lab.cli import status as lab_status
+from fourbar_lab.simulators.problems import PROBLEMS, collect_problem, list_problems
 from fourbar_validation.check.problem import LEVELS, RESULT, SCHEMA, find_levels, judge, read_problem
 from fourbar_validation.cli import status
 from fourbar_validation.compare.tolerance import EPS, K, magnitude
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.lab.simulators.problems import PROBLEMS, collect_problem, list_problems
 from tests.whole.test_imports import ROOT
 
 NAMES = list_problems()

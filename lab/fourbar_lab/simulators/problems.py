@@ -13,10 +13,10 @@ from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.scene import command as list_positions
 from fourbar.solution import Solution
 from fourbar.writing import write_text
+from fourbar_lab.simulators import slider_crank
 from fourbar_validation.check.problem import SAFE, SCHEMA, collect_answers
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines import protocol
-from fourbar_validation.lab.simulators import slider_crank
 from fourbar_validation.places import MODELS, find_checkout
 
 PROBLEMS = MODELS / "problems"

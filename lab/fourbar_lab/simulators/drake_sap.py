@@ -11,8 +11,8 @@ from pydrake.systems.analysis import Simulator
 from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_sdf
 from fourbar.scene import Scene
+from fourbar_lab.simulators.motion import Instant, Readings, find_gravity, run_through, start, turn
 from fourbar_validation.engines.description import FIRST_PIN, rotate
-from fourbar_validation.lab.simulators.motion import Instant, Readings, find_gravity, run_through, start, turn
 
 VERSION = version("drake")
 STEPS = (628, 2512)

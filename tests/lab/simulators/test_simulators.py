@@ -21,11 +21,11 @@ from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command
+from fourbar_lab.simulators import examine, motion, standing
+from fourbar_lab.simulators.findings import read_findings
+from fourbar_lab.simulators.standing import PROBLEM
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.processes import Ended
-from fourbar_validation.lab.simulators import examine, motion, standing
-from fourbar_validation.lab.simulators.findings import read_findings
-from fourbar_validation.lab.simulators.standing import PROBLEM
 from tests.whole.test_imports import ROOT, imported
 
 EXACT = 1e-10
@@ -58,9 +58,7 @@ def sealed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("sealed")
 def test_a_subject_starts_from_its_own_assembly_without_the_formulas() -> None:
-    for path in (
-        path for path in (ROOT / "validation/fourbar_validation/lab/simulators").glob("*.py") if path.name not in JUDGES
-    ):
+    for path in (path for path in (ROOT / "validation/fourbar_lab/simulators").glob("*.py") if path.name not in JUDGES):
         assert not {name for name in imported(path) if name.startswith(("fourbar.solve", "fourbar.formulas"))}, path
         assert not {name for name in imported(path) if name.endswith(("at_start", "mjcf_for"))}, path
         assert "fourbar.solve" not in path.read_text(), path
@@ -86,7 +84,7 @@ def test_a_subject_is_judged_on_the_branch_of_its_scene() -> None:
 
 @pytest.mark.usefixtures("sealed")
 def test_mujoco_answers_at_states_and_through_a_turn() -> None:
-    mujoco_c = pytest.importorskip("fourbar_validation.lab.simulators.mujoco_c", exc_type=ImportError)
+    mujoco_c = pytest.importorskip("fourbar_lab.simulators.mujoco_c", exc_type=ImportError)
     scene = fourbar.load(PROBLEM)
     setting = "generated file"
     readings = [mujoco_c.states(scene, setting), mujoco_c.through(scene, 157, setting)]
@@ -99,7 +97,7 @@ def test_mujoco_answers_at_states_and_through_a_turn() -> None:
 
 @pytest.mark.usefixtures("sealed")
 def test_each_solver_of_pinocchio_carries_the_loop() -> None:
-    simulated = pytest.importorskip("fourbar_validation.lab.simulators.pinocchio_simulated", exc_type=ImportError)
+    simulated = pytest.importorskip("fourbar_lab.simulators.pinocchio_simulated", exc_type=ImportError)
     scene = fourbar.load(PROBLEM)
     for setting in simulated.SETTINGS:
         found = examine.compute_errors(scene, simulated.through(scene, 314, setting).plain())
@@ -113,8 +111,8 @@ def test_each_solver_of_pinocchio_carries_the_loop() -> None:
 
 def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() -> None:
     """By differences of what MuJoCo itself answers along the changes that a differentiable simulator is given."""
-    mujoco_c = pytest.importorskip("fourbar_validation.lab.simulators.mujoco_c", exc_type=ImportError)
-    from fourbar_validation.lab.simulators import gradients
+    mujoco_c = pytest.importorskip("fourbar_lab.simulators.mujoco_c", exc_type=ImportError)
+    from fourbar_lab.simulators import gradients
 
     scene = fourbar.load(PROBLEM)
     _, theta_2 = gradients.choose_quarter(scene)
@@ -143,7 +141,7 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
 
 
 def test_a_wrong_a_missing_and_a_nan_reading_show() -> None:
-    mujoco_c = pytest.importorskip("fourbar_validation.lab.simulators.mujoco_c", exc_type=ImportError)
+    mujoco_c = pytest.importorskip("fourbar_lab.simulators.mujoco_c", exc_type=ImportError)
     scene = fourbar.load(PROBLEM)
     reading = json.loads(json.dumps(mujoco_c.states(scene, "generated file").plain()))
     reading["forces"]["F43"] = [[-x, -y] for x, y in reading["forces"]["F43"]]
@@ -157,7 +155,7 @@ def test_a_wrong_a_missing_and_a_nan_reading_show() -> None:
 
 @pytest.mark.nightly
 def test_exudyn_refuses_what_it_has_no_element_for() -> None:
-    exudyn = pytest.importorskip("fourbar_validation.lab.simulators.exudyn_simulated", exc_type=ImportError)
+    exudyn = pytest.importorskip("fourbar_lab.simulators.exudyn_simulated", exc_type=ImportError)
     scene, (_, setting) = fourbar.load(PROBLEM), exudyn.SETTINGS
     damped = replace(scene, effects=(*scene.effects, Viscous.at(B=0.01)))
     assert max(examine.compute_errors(damped, exudyn.through(damped, 314, setting).plain()).values()) < IN_EXUDYN
@@ -226,12 +224,12 @@ def test_a_state_that_is_no_number_has_no_error_that_is_one(name: str) -> None:
 @pytest.mark.slow
 def test_what_a_simulator_prints_is_no_part_of_its_answer(tmp_path: Path) -> None:
     (tmp_path / "loud.py").write_text(
-        "import atexit, os\nfrom fourbar_validation.lab.simulators.motion import Readings\nVERSION = CHANGED = '-'\n"
+        "import atexit, os\nfrom fourbar_lab.simulators.motion import Readings\nVERSION = CHANGED = '-'\n"
         "SETTINGS, STEPS = ['s'], [1]\natexit.register(print, 'bye')\n"
         "def through(scene, steps, setting):\n    print('hello'); os.write(1, b'there')\n    return Readings(setting)\n"
     )
-    code = "import runpy, sys; from fourbar_validation.lab import simulators as s; s.__path__.append(sys.argv.pop(1)); "
-    code += "runpy.run_module('fourbar_validation.lab.simulators.work', run_name='__main__', alter_sys=True)"
+    code = "import runpy, sys; from fourbar_lab import simulators as s; s.__path__.append(sys.argv.pop(1)); "
+    code += "runpy.run_module('fourbar_lab.simulators.work', run_name='__main__', alter_sys=True)"
     line = [sys.executable, "-c", code, str(tmp_path), "loud", str(PROBLEM.absolute())]
     done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True)
     assert json.loads(done.stdout)["readings"][0]["setting"] == "s"
@@ -258,9 +256,9 @@ def test_the_page_is_written_and_names_what_is_not_there(tmp_path: Path, monkeyp
     given = examine.Examination([line, fine, aside], {"MuJoCo": "nothing"}, {"MuJoCo": "CPU, Python 3"})
     given.made_for["MuJoCo"] = "many worlds"
     given.left_out["PyBullet"] = "not installed under any --python"
-    monkeypatch.setattr("fourbar_validation.lab.simulators.standing.examine", lambda *_: given)
+    monkeypatch.setattr("fourbar_lab.simulators.standing.examine", lambda *_: given)
     stated = [(finding, f"mended in {number}") for number, finding in enumerate(read_findings())]
-    monkeypatch.setattr("fourbar_validation.lab.simulators.standing.run_findings", lambda *_: stated)
+    monkeypatch.setattr("fourbar_lab.simulators.standing.run_findings", lambda *_: stated)
     done = CliRunner().invoke(standing.command, ["--out", str(tmp_path)], catch_exceptions=False)
     assert done.exit_code == 0 and "not examined: PyBullet" in done.output
     for name in ("standing.html", "standing.md"):
@@ -293,6 +291,6 @@ def test_each_simulator_that_is_installed_carries_the_loop(module: str) -> None:
         found = None
     if found is None:
         pytest.skip(f"not run: {name} is not installed")
-    scene, simulator = fourbar.load(PROBLEM), import_module(f"fourbar_validation.lab.simulators.{module}")
+    scene, simulator = fourbar.load(PROBLEM), import_module(f"fourbar_lab.simulators.{module}")
     reading = simulator.through(scene, simulator.STEPS[0], next(iter(simulator.SETTINGS))).plain()
     assert max(examine.compute_errors(scene, reading).values()) < COARSE_OF.get(module, COARSE)

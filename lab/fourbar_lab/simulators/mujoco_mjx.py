@@ -10,10 +10,10 @@ import numpy as np
 from mujoco import mjx
 
 from fourbar.scene import Scene
+from fourbar_lab.simulators import gradients
+from fourbar_lab.simulators.motion import Instant, Readings, run_through
+from fourbar_lab.simulators.mujoco_c import find_bars, reading, states_of, text
 from fourbar_validation.engines.mujoco.closed_loop import open_model
-from fourbar_validation.lab.simulators import gradients
-from fourbar_validation.lab.simulators.motion import Instant, Readings, run_through
-from fourbar_validation.lab.simulators.mujoco_c import find_bars, reading, states_of, text
 
 VERSION = version("mujoco-mjx")
 DEVICE = "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)

@@ -11,9 +11,9 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar.quantities import PIN_FORCES
 from fourbar.writing import write_text
+from fourbar_lab.simulators.examine import TORQUE_AND_FORCES, Examination, Line, examine
+from fourbar_lab.simulators.findings import run_findings
 from fourbar_validation.compare.rows import write_csv
-from fourbar_validation.lab.simulators.examine import TORQUE_AND_FORCES, Examination, Line, examine
-from fourbar_validation.lab.simulators.findings import run_findings
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.svg import draw_svg, shrink_svg
@@ -87,9 +87,7 @@ def command(scene: Path, pythons: tuple[Path, ...], out: Path, time_limit: float
         "svg": shrink_svg(chart),
     }
     for ending in ("html", "md"):
-        write_text(
-            out / f"standing.{ending}", render("fourbar_validation.lab.simulators", f"standing.{ending}.j2", **page)
-        )
+        write_text(out / f"standing.{ending}", render("fourbar_lab.simulators", f"standing.{ending}.j2", **page))
     write_text(out / "standing.svg", chart)
     write_text(out / "standing.csv", write_table(found))
     for name, why in found.left_out.items():

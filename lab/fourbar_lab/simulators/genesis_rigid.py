@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from fourbar.scene import Scene
-from fourbar_validation.lab.simulators.motion import (
+from fourbar_lab.simulators.motion import (
     Instant,
     Readings,
     find_gravity,
@@ -17,7 +17,7 @@ from fourbar_validation.lab.simulators.motion import (
     turn,
     write_temp,
 )
-from fourbar_validation.lab.simulators.mujoco_c import text
+from fourbar_lab.simulators.mujoco_c import text
 
 VERSION = version("genesis-world")
 DEVICE = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"

@@ -1,1 +1,0 @@
-"""Studies of the harness and of simulators; nothing that judges needs them."""
