@@ -6,6 +6,7 @@ them: closure, the sum of forces on the three bars, and the sum of moments about
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,13 +92,75 @@ def _make_row(question: Question, quantity: str, equation: str, error: Array, wh
     return question.row(quantity, error, IDENTITY.factor / condition, reason, where, condition)
 
 
+class _Balance:
+    """Forces, and moments about O2, that must vanish in sum, with the sums of their sizes."""
+
+    def __init__(self) -> None:
+        self.force: Any = 0.0
+        self.moment: Any = 0.0
+        self.forces: Any = 0.0
+        self.moments: Any = 0.0
+
+    def push(self, force: Array, point: Array, sense: float = 1.0) -> None:
+        """Add a force at a point."""
+        self.force = self.force + sense * force
+        self.forces = self.forces + magnitude(force)
+        self.moment = self.moment + sense * _compute_cross(point, force)
+        self.carry(force, point)
+
+    def carry(self, force: Array, point: Array) -> None:
+        """Add the size alone of the moment of a force inside, which cancels."""
+        self.moments = self.moments + np.hypot(point[..., 0], point[..., 1]) * magnitude(force)
+
+    def twist(self, couple: Array, sense: float = 1.0) -> None:
+        """Add a couple."""
+        self.moment = self.moment + sense * couple
+        self.moments = self.moments + np.abs(couple)
+
+
 def _check_sums(question: Question) -> Iterator[Row]:
-    """F12 + F14 + sum of loads = sum of m a_G, and the moments of the same about O2 with the torque."""
-    scene, at, solution = question.scene, question.at, question.solution
-    assert solution.F12 is not None and solution.F14 is not None
+    """Check that F12 + F14 + loads = sum of m a_G, the moments of the same about O2 with the torque, and the power."""
+    scene, solution = question.scene, question.solution
+    assert solution.F12 is not None and solution.F14 is not None and solution.drive_condition is not None
     assert solution.F32 is not None and solution.F43 is not None
+    actions, O4 = _sum_actions(question)
+    drive = COUPLE.value if solution.drive is None else LINE.value
+    balance = _Balance()
+    if solution.torque is not None:
+        balance.twist(solution.torque)
+    balance.push(solution.F12, np.zeros(2))
+    balance.push(solution.F14, O4)
+    balance.carry(solution.F32, solution.A)
+    balance.carry(solution.F43, solution.B)
+    acting = actions.wrenches(Wrenches())
+    first_pins = {2: np.zeros(2), 3: solution.A, 4: O4}
+    for number in MOVING_BARS:
+        force_on, couple = acting.on(number)
+        # what the ground pulls at bars 2 and 4 goes through their pins; between moving bars it cancels
+        resultant = force_on + actions.through.get({2: "O2", 4: "O4"}.get(number, ""), 0.0)
+        load = np.broadcast_to(resultant, len(solution))
+        balance.push(np.stack([load.real, load.imag], axis=1), first_pins[number])
+        balance.twist(couple)
+        accelerated = scene.linkage.bar(number).mass * getattr(solution, f"a_G{number}")
+        balance.push(accelerated, getattr(solution, f"G{number}"), -1.0)
+        balance.twist(actions.bodies[number - 2].I * getattr(solution, f"alpha_{number}"), -1.0)
+    # the forces of the bars that are not driven are solved apart, and the torque is that of virtual work
+    with np.errstate(divide="ignore", invalid="ignore"):
+        force_size = balance.forces / (find_lever(scene.linkage) * solution.drive_condition)
+        moment_size = balance.moments / find_condition(drive, scene.linkage, solution)
+    where = solution.status_code == OK
+    # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
+    where &= ~question.reversing(IDENTITY.factor)
+    yield _check_power(question, drive, where)
+    forces, moments = divide(magnitude(balance.force), force_size), divide(np.abs(balance.moment), moment_size)
+    yield _make_row(question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, where)
+    yield _make_row(question, "moment_sum", "moments about O2, with the torque", moments, where)
+
+
+def _sum_actions(question: Question) -> tuple[Actions, Array]:
+    """Sum what acts at the speeds that were answered, not at another evaluation of them; also the place of O4."""
+    scene, at, solution = question.scene, question.at, question.solution
     state = compute_state(scene, at)
-    # what acts at the speeds that were answered, not at another evaluation of them
     speeds = {f"omega_{bar}": getattr(solution, f"omega_{bar}") for bar in MOVING_BARS if bar != at.bar}
     state = state._replace(moving=state.moving._replace(**speeds))
     with np.errstate(all="ignore"):
@@ -105,53 +168,10 @@ def _check_sums(question: Question) -> Iterator[Row]:
         for term in scene.effects:
             if term.loaded_pins:
                 term.act_known(actions, {name: getattr(solution, name) for name in PIN_FORCE.values()})
-    torque, drive = solution.torque, COUPLE.value
-    if solution.drive is not None:
-        torque, drive = np.zeros(len(solution)), LINE.value
-        with np.errstate(all="ignore"):
+        if solution.drive is not None:
             solution.drive.act(actions, solution.drive_force)
-    assert torque is not None
-    acting = actions.wrenches(Wrenches())
-    n, first_pin = len(solution), complex(np.ravel(state.foot(4))[0])
-    O4 = np.array([first_pin.real, first_pin.imag])
-    force = solution.F12 + solution.F14
-    force_terms = magnitude(solution.F12) + magnitude(solution.F14)
-    moment = torque + _compute_cross(O4, solution.F14)
-    moment_terms = np.abs(torque) + np.hypot(*O4) * magnitude(solution.F14)
-    # the moments of the forces inside, which cancel
-    moment_terms = moment_terms + _reach(solution.A) * magnitude(solution.F32)
-    moment_terms = moment_terms + _reach(solution.B) * magnitude(solution.F43)
-    first_pins = {2: np.zeros(2), 3: solution.A, 4: O4}
-    for number in MOVING_BARS:
-        bar = scene.linkage.bar(number)
-        force_on, couple = acting.on(number)
-        resultant = np.broadcast_to(force_on, n)
-        load = np.stack([resultant.real, resultant.imag], axis=1)
-        centre, acceleration = getattr(solution, f"G{number}"), getattr(solution, f"a_G{number}")
-        alpha = getattr(solution, f"alpha_{number}")
-        force = force + load - bar.mass * acceleration
-        force_terms = force_terms + magnitude(load) + bar.mass * magnitude(acceleration)
-        turned = couple + _compute_cross(first_pins[number], load)
-        swept = bar.mass * _compute_cross(centre, acceleration) + actions.bodies[number - 2].I * alpha
-        moment = moment + turned - swept
-        moment_terms = (
-            moment_terms
-            + (np.abs(couple) + _reach(first_pins[number]) * magnitude(load))
-            + bar.mass * _reach(centre) * magnitude(acceleration)
-            + actions.bodies[number - 2].I * np.abs(alpha)
-        )
-    # the forces of the bars that are not driven are solved apart, and the torque is that of virtual work
-    assert solution.drive_condition is not None
-    with np.errstate(divide="ignore", invalid="ignore"):
-        force_terms = force_terms / (find_lever(scene.linkage) * solution.drive_condition)
-        moment_terms = moment_terms / find_condition(drive, scene.linkage, solution)
-    where = solution.status_code == OK
-    # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
-    where &= ~question.reversing(IDENTITY.factor)
-    yield _check_power(question, drive, where)
-    forces, moments = divide(magnitude(force), force_terms), divide(np.abs(moment), moment_terms)
-    yield _make_row(question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, where)
-    yield _make_row(question, "moment_sum", "moments about O2, with the torque", moments, where)
+    O4 = complex(np.ravel(state.foot(4))[0])
+    return actions, np.array([O4.real, O4.imag])
 
 
 def _check_power(question: Question, drive: str, where: Mask) -> Row:
@@ -163,10 +183,6 @@ def _check_power(question: Question, drive: str, where: Mask) -> Row:
 
 def _compute_cross(u: Array, v: Array) -> Array:
     return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
-
-
-def _reach(point: Array) -> Array:
-    return np.asarray(np.hypot(point[..., 0], point[..., 1]))
 
 
 def check_status(question: Question) -> Iterator[Row]:
