@@ -38,6 +38,8 @@ class Outcome(NamedTuple):
     setting: str
     seconds: float
     script: str
+    folder: str
+    """Of its result files."""
 
 
 def read_reasons(files: Iterable[Path]) -> dict[str, str]:
@@ -121,14 +123,21 @@ class Benchmark:
             letters = REFUSED
         self.versions[engine.name] = version
         script = engine.adapter or shlex.join(engine.command)
-        self.outcomes.setdefault(engine.name, {})[name] = Outcome(letters, numbers, reason, setting, seconds, script)
+        self.outcomes.setdefault(engine.name, {})[name] = Outcome(
+            letters, numbers, reason, setting, seconds, script, engine.name
+        )
         quantities = [(*row, reason if row[2] != "A" else "") for row in numbers] or [("all", "", letters, reason)]
         for quantity, size, level, why in quantities:
             self.rows.append([name, engine.name, version, setting, quantity, size, level, f"{seconds:.3g}", why])
 
+    def _label(self, name: str) -> str:
+        """Name an engine with its version."""
+        version = self.versions[name]
+        return name if version in name else f"{name} {version}"
+
     def write(self) -> None:
         """Write the table and the page."""
-        cells = {f"{name} {self.versions[name]}".strip(): list(row.items()) for name, row in self.outcomes.items()}
+        cells = {self._label(name): list(row.items()) for name, row in self.outcomes.items()}
         requires = [", ".join(engine.requires) for engine in self.engines]
         write_text(self.out / "benchmark.csv", write_csv(COLUMNS, sorted(self.rows)))
         page = {"machine": name_machine(), "problems": self.problems, "cells": cells,

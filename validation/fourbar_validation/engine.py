@@ -53,8 +53,9 @@ def open_engine(entry: str) -> tuple[Callable[..., Any], dict[str, Any]]:
         "commands": list(getattr(engine, "commands", ("theta_2",))),
         "effects": [*ALL_BUT_CYLINDER, "cylinder"],
     }
+    library = witness.library.removeprefix("py")  # pydrake is of the distribution drake
     try:
-        hello["version"] = version(DISTRIBUTIONS.get(witness.library, "fourbar"))
+        hello["version"] = version(DISTRIBUTIONS.get(library, "fourbar"))
     except PackageNotFoundError:
         hello["version"] = ""
     return witness.engine, hello
@@ -103,6 +104,8 @@ def answer(engine: Any, question: dict[str, Any]) -> dict[str, Any]:
         return protocol.released_to_json(engine(*step).release(scene, np.array(question["times"])))
     scene, command = protocol.command_from_json(scene, question["command"])
     made = engine()
+    if not hasattr(made, "answer"):
+        return {"refusal": "it integrates released motions alone"}
     if refusal := explain_refusal(made, command):
         return {"refusal": refusal}
     reply = made.answer(scene, command)
