@@ -16,8 +16,10 @@ from fourbar_validation.engines.processes import run_to_end
 from fourbar_validation.engines.workers import apply_each
 from fourbar_validation.places import FORMULAS, PACKAGE
 
+CHUNK = 8
+"""Faults of one process, which loads the engines once."""
 SECONDS = 300
-"""A fault with which the harness takes longer than this ends the run as a failure would; it takes some ten."""
+"""Faults with which the harness takes longer than this end the run as a failure would; one takes some three."""
 Failing = dict[str, list[str]]
 """By test scene: the rows that fail."""
 
@@ -43,16 +45,25 @@ def explain_survival(entry: dict[str, Any], found: Failing | str) -> str | None:
     return None
 
 
+def try_in_turn(numbers: Sequence[int]) -> list[Failing | str]:
+    """Try faults in one process, which loads the engines once; if it ends early, each in a process of its own."""
+    together = try_faults(numbers)
+    if not isinstance(together, str):
+        return [*together]
+    apart = [try_faults([number]) for number in numbers]
+    return [rows if isinstance(rows, str) else rows[0] for rows in apart]
+
+
 def try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
     """Try every fault: the reason why it survives, or None; first the tree without a fault."""
-    entries = read_faults()
-    tried = apply_each(try_faults, [(), *((n,) for n in range(len(entries)))], workers, seconds=None)
-    rows = next(tried)
+    entries, rows = read_faults(), try_faults(())
     failing = rows if isinstance(rows, str) else [row for result in rows[0].values() for row in result]
     yield "no fault", f"the harness fails without one: {failing}" if failing else None
-    for entry, rows in zip(entries, tried, strict=True):
-        why = explain_survival(entry, rows if isinstance(rows, str) else rows[0])
-        yield entry["fault"], None if why and "harmless" in entry else why
+    chunks = [range(start, min(start + CHUNK, len(entries))) for start in range(0, len(entries), CHUNK)]
+    for chunk, found in zip(chunks, apply_each(try_in_turn, chunks, workers, seconds=None), strict=True):
+        for number, result in zip(chunk, found, strict=True):
+            why = explain_survival(entries[number], result)
+            yield entries[number]["fault"], None if why and "harmless" in entries[number] else why
 
 
 @click.command()

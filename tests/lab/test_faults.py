@@ -5,6 +5,7 @@ import pytest
 
 import fourbar_validation.run.question
 from fourbar.solution import Solution
+from fourbar_lab import faults
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_lab.faults import explain_survival, try_faults
 from fourbar_lab.injection import inject_fault, read_faults
@@ -78,3 +79,12 @@ def test_positions_outside_the_range_fail_the_run(monkeypatch: pytest.MonkeyPatc
     failing = {(row.engine, row.quantity) for row in judge("", scene, [w for w in WITNESSES if w.name in EXACT]).rows
                if not row.passed}  # fmt: skip
     assert {(engine, "assembled") for engine in EXACT} <= failing
+
+
+def test_a_fault_that_ends_the_process_costs_no_other_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    def tried(numbers: list[int]) -> list[dict[str, list[str]]] | str:
+        return "it ended" if 2 in numbers else [{"crank": [f"free-body F{n}: "]} for n in numbers]
+
+    monkeypatch.setattr(faults, "try_faults", tried)
+    assert faults.try_in_turn([0, 1]) == [{"crank": ["free-body F0: "]}, {"crank": ["free-body F1: "]}]
+    assert faults.try_in_turn([1, 2]) == [{"crank": ["free-body F1: "]}, "it ended"]
