@@ -89,12 +89,12 @@ def _reversed(self: LinearDrive, actions: Any, force: Any, act: Any = LinearDriv
 
 
 def _of_one_end(self: LinearDrive, actions: Any, force: Any) -> None:
-    push = force * self.line(actions.state, actions.rounded)[1]
+    push = force * self.line(actions.state)[1]
     actions.force(self.end.bar, push, self.end.in_bar * actions.state.direction(self.end.bar))
 
 
 def _of_the_wrong_bar(self: LinearDrive, actions: Any, force: Any) -> None:
-    push = force * self.line(actions.state, actions.rounded)[1]
+    push = force * self.line(actions.state)[1]
     actions.force(2, -push, self.start.in_bar * actions.state.direction(2))
     actions.force(3, push, self.end.in_bar * actions.state.direction(3))
 
@@ -120,5 +120,6 @@ def test_who_cannot_do_it_refuses_in_one_line_that_names_it() -> None:
     assert "the linear drive (drive.from, drive.to)" in BallArithmetic().answer(scene, fourbar.command(scene)).refusal
     outside = Asked("outside", Program(("none",)), Hello("outside"))
     assert (
-        outside.answer(scene, fourbar.command(scene)).refusal == "it does not name gravity, cylinder among its effects"
+        outside.answer(scene, fourbar.command(scene)).refusal
+        == "it does not name gravity, loads, cylinder among its effects"
     )
