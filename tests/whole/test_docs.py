@@ -123,7 +123,6 @@ def test_every_command_prints_what_is_shown(
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        ("README.md", 1),
         *((f"docs/{name}.md", 1) for name in ("theory-motion", "theory-forces", "guide-designer")),
         ("docs/guide-roboticist.md", 2),
     ],
@@ -135,10 +134,7 @@ def test_the_programs_print_what_is_shown(name: str, count: int) -> None:
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed):
             exec(compile(program, name, "exec"), {})
-        ours, theirs = (re.split(r"(?<=take )(.*)", text) for text in (printed.getvalue(), shown))
-        assert ours[::2] == theirs[::2]
-        # the error bar is itself rounding: it may differ a little from one machine to the next
-        assert [float(x) for x in ours[1::2]] == pytest.approx([float(x) for x in theirs[1::2]], rel=0.4, abs=0.0)
+        assert printed.getvalue() == shown
 
 
 def test_the_table_of_the_exercise_is_right(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -249,9 +245,10 @@ def test_the_index_lists_every_page_for_readers_and_for_the_site() -> None:
 
 
 def test_pages_keep_to_their_length() -> None:
-    for name, most in {"README.md": 500, **{f"docs/{page.name}": 800 for page in DOCS.glob("guide-*.md")}}.items():
+    for name, most in {"README.md": 450, **{f"docs/{page.name}": 800 for page in DOCS.glob("guide-*.md")}}.items():
         prose = re.sub(r"^```console\n.*?^```$", "", read(name), flags=re.MULTILINE | re.DOTALL)  # what is printed
         assert len(prose.split()) <= most, name
+    assert len(read("README.md").splitlines()) <= 70
     assert len(read("CHANGELOG.md").splitlines()) <= 60
 
 
