@@ -29,7 +29,7 @@ class LazyGroup(click.Group):
     def __init__(self, *, modules: Mapping[str, str], **settings: Any) -> None:
         super().__init__(**settings)
         self.modules = modules
-        """By the name of a command, in the order a newcomer needs them: its module and the command in it."""
+        """Module and function of each subcommand, by name, in the order a newcomer needs them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """List the commands in their order."""

@@ -37,7 +37,7 @@ BETWEEN = 180
 """Intervals of the sweep at which a run is read at least."""
 MOST_TRIALS = 24
 MOST_STEPS = 16_000
-"""Of one run: a fifth of a second. What needs more is not called reachable."""
+"""Most steps of one run, a fifth of a second. An error that needs more steps counts as not reachable."""
 LEAST_GAIN = 0.8
 """More steps that leave the error above this part of what it was have met a floor."""
 
@@ -54,11 +54,11 @@ class Attempt:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What serves, or how near the best came."""
+    """Settings that reach a required error, or the most accurate ones tried."""
 
     required: float
     best: Attempt
-    """The cheapest that serves; where nothing does, the most accurate."""
+    """Cheapest attempt that reaches the required error; the most accurate one if none does."""
     attempts: tuple[Attempt, ...]
     reached: bool
 

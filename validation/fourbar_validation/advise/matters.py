@@ -1,4 +1,4 @@
-"""Which of MuJoCo's settings matters for a scene, and why: each is changed alone, and the error that comes of it."""
+"""Find the MuJoCo settings that matter for a scene, and why, by changing one at a time and measuring the error."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -141,7 +141,7 @@ def _explain_timestep(setup: TrialSetup) -> str:
 
 
 def _find_yielding(scene: Scene, what: str) -> str:
-    """To what a soft closure yields, of this scene."""
+    """Describe what makes a soft closure yield in this scene."""
     loads, masses = compute_load_ratio(scene), compute_mass_ratio(scene.linkage)
     if masses > LIGHT:
         return f"{what} is soft at the lighter of coupler and output, whose inertia is {masses:.1e} times smaller"

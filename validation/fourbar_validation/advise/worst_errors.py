@@ -1,4 +1,4 @@
-"""How wrong an answer is: the torque and each pin force, each on its scale against the formulas."""
+"""Compute the worst errors of an answer: torque and each pin force against the formulas, each on its scale."""
 
 import math
 from collections.abc import Sequence
@@ -26,12 +26,12 @@ class WorstErrors(NamedTuple):
 
     @property
     def force(self) -> float:
-        """Of the worst pin force."""
+        """Return the error of the worst pin force."""
         return max(self[1:])
 
     @property
     def worst(self) -> float:
-        """What a required error is compared with."""
+        """Return the greatest error, which a required error is compared with."""
         return max(self)
 
 
@@ -40,7 +40,7 @@ NO_ANSWER = WorstErrors(*[math.inf] * len(QUANTITIES))
 
 
 def compute_errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> WorstErrors:
-    """Of an answer at the motion that its engine really made.
+    """Compute the errors of an answer at the motion that its engine really made.
 
     The torque on bar 3 or 4 has poles where that bar stands still: it is judged where the bar turns
     at more than a tenth of its greatest speed, as in the regression report.
@@ -62,6 +62,6 @@ def compute_errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> W
 
 
 def find_greatest(errors: Array | Sequence[float]) -> float:
-    """Of some errors; inf where one is no number, and where there is none."""
+    """Return the greatest of some errors; inf if one is NaN or the greatest is not finite, or if there are none."""
     value = float(np.max(errors, initial=-math.inf))
     return value if math.isfinite(value) else math.inf

@@ -1,4 +1,4 @@
-"""What a model differs in, the worst first: each entry is mended alone, and the error that goes is its share."""
+"""List what a model differs in, the worst first: each entry is mended alone, and the error that goes is its share."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from fourbar_validation.check.differences import Difference, Value
 from fourbar_validation.compare.rows import Row
 
 MATTERS = 0.005
-"""Of the error of a quantity; a smaller share is printed as none."""
+"""Smallest share of the error of a quantity that is printed; a smaller one is printed as none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,10 +18,10 @@ class Cause:
 
     difference: Difference
     share: float | None = None
-    """Of the error of `quantity` that goes with it; None: it was not mended."""
+    """Share of the error of `quantity` that goes when this entry is mended; None if it was not mended."""
     quantity: str = ""
     gain: float = 0.0
-    """By which that error falls, relative to the scale."""
+    """Amount by which that error falls, relative to the scale."""
 
     def percent(self) -> str:
         """Write the share with its quantity."""
@@ -40,7 +40,7 @@ class Cause:
         return [text for text in (f"in the file: {d.written}" if d.written else "", d.remark) if text]
 
     def cells(self) -> tuple[str, ...]:
-        """For a row of the page."""
+        """Return the cells of a row of the page."""
         d = self.difference
         key = f"{d.key} ({d.written})" if d.written else d.key
         return self.percent(), key, write_value(d.generated), write_value(d.theirs), d.remark

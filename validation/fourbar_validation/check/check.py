@@ -21,7 +21,7 @@ SHOWN = 3
 
 
 def write_extent(explanation: Explanation) -> str:
-    """How far a mistake explains what differs."""
+    """Write how far a mistake explains what differs."""
     if explanation.complete:
         return "explains everything that differs: " + ", ".join(explanation.quantities)
     parts = []

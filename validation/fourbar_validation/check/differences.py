@@ -1,4 +1,4 @@
-"""How a described MJCF differs from the one generated for the same scene, and what each difference does."""
+"""List how a described MJCF differs from the one generated for the same scene, and what each difference does."""
 
 import math
 import re
@@ -33,7 +33,7 @@ NEEDS = {
 }
 """A key, and what its effect hangs on: where their file has that switched off, the key is left out."""
 NEUTRAL: dict[str, Value] = {"damping": 0.0, "friction": 0.0, "stiffness": 0.0, "armature": 0.0, "range": "free"}
-"""What a pin without a hinge has of each: the pin at which the other file is cut. The rest of it is not compared."""
+"""Properties of a pin without a hinge, where the other file is cut. Its other properties are not compared."""
 WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 """Names in MJCF where they differ, and what a difference does; see there."""
 
@@ -106,7 +106,7 @@ def _describe_missing(key: str) -> Value | None:
 
 
 def _has_effect(key: str, theirs: Described) -> bool:
-    """Whether what the key says has an effect in their file; a name has none."""
+    """Return whether the entry of this key has an effect in their file; a name has none."""
     if ATTACHED.fullmatch(key) and key.endswith(".name"):
         return False
     for pattern, (switch, off) in NEEDS.items():

@@ -32,13 +32,13 @@ OTHER_UNITS = {
     "N": ("N", "kN", "mN", "lbf", "kgf"),
     "N m": ("N m", "N mm", "N cm", "kN m", "mN m", "lbf ft", "lbf in", "kgf m", "kgf cm", "kgf mm"),
 }
-"""What each SI unit is taken for; itself where another was announced."""
+"""Units that may be taken for each SI unit; the SI unit itself if the file announced another unit."""
 ENOUGH = 3
 """Numbers that a fitted one must explain: fewer are explained by chance."""
 CARRIED = 2.0
 """Times what is allowed: the fitted number carries the rounding of the numbers it was fitted to."""
 FACTORS = {0.5: "halved", 2.0: "doubled", 1e4: "in kg cm^2 taken for kg m^2", 1e-4: "10^4 too small"}
-"""Of a moment of inertia, and what was done."""
+"""Factors of a moment of inertia, and the mistake behind each."""
 PLAIN = 1e-2
 """Relative; a fitted number this near a plain one is tried as that."""
 GRID = 72
@@ -48,7 +48,7 @@ TRIED = 37
 NEWTON = 12
 """Steps of the fit; it is quadratic, and starts within 5 deg."""
 STEP = 1e-6
-"""Of the difference by which the fit finds its slope, rad."""
+"""Step of the finite difference from which the fit finds its slope, rad."""
 MOST_ROWS = 1000
 """Rows among which another order is looked for: every one is held against every other."""
 

@@ -37,7 +37,7 @@ AS_PRINTED = 4.0 * EPS
 
 @dataclass(frozen=True, slots=True)
 class Allowance:
-    """What a user allows, as numpy has it: atol + rtol |ours|, atol in the SI unit of each quantity."""
+    """Tolerance stated by a user, in NumPy's form: atol + rtol |ours|, with atol in the SI unit of each quantity."""
 
     rtol: float = 0.0
     atol: float = 0.0
@@ -58,22 +58,22 @@ class Discrepancy:
     difference: float
     """In the unit of the quantity, as `permitted`."""
     permitted: float | None
-    """By the tolerance that was stated, and by printed digits; None where none was stated."""
+    """Difference permitted by the stated tolerance and the printed digits; None if no tolerance was stated."""
     theta_2: float
 
     @property
     def judged(self) -> bool:
-        """Whether any digit is left by which it can be judged."""
+        """Return whether any digit is left by which it can be judged."""
         return self.allowed != math.inf
 
     @property
     def exact(self) -> bool:
-        """Whether it agrees to round-off and its printed digits."""
+        """Return whether it agrees to round-off and its printed digits."""
         return self.judged and self.error <= self.allowed
 
     @property
     def agrees(self) -> bool:
-        """Whether it is within what is allowed: the stated tolerance, where there is one."""
+        """Return whether it is within the allowed error or the stated tolerance, if there is one."""
         if self.permitted is None:
             return self.exact
         return self.exact or (self.judged and self.difference <= self.permitted)
@@ -148,7 +148,7 @@ class Judge:
         return np.asarray(self.tolerance.atol + self.tolerance.rtol * magnitude(ours) + self.table.rounding[key])
 
     def explained(self, key: str, predicted: Array, times: float = 1.0) -> bool:
-        """Whether all of a key is what `predicted` says, within `times` what is allowed."""
+        """Return whether all numbers of a key are as `predicted`, within `times` the allowed error."""
         where = self.where(key)
         error, allowed, apart = (values[where] for values in self.judged(key, predicted))
         within = error <= times * allowed
@@ -209,7 +209,7 @@ def make_command(scene: Scene, table: TheirTable) -> Command:
 
 
 def _moves_itself(scene: Scene, table: TheirTable) -> bool:
-    """Whether the table states the motion that its rows are judged at, and not the scene."""
+    """Return whether the table, and not the scene, states the motion that its rows are judged at."""
     return scene.motion.law is None and scene.motion.speed is None and "omega_2" in table.values
 
 
@@ -221,11 +221,11 @@ class Mistake:
     predict: Callable[[str, Solution], Array | None]
     """quantity, right solution -> what would have been printed; None where it changes nothing of it."""
     whole: bool = True
-    """Whether it was made in the calculation, and so shows in every quantity; a column's unit shows in its own."""
+    """True if it was made in the calculation and shows in every quantity; a column's unit shows in that column only."""
     times: float = 1.0
-    """Of what is allowed: a number that was fitted to rounded ones carries their rounding once more."""
+    """Factor on the allowed error: a number that was fitted to rounded ones carries their rounding once more."""
 
     def prediction(self, key: str, right: Solution) -> Array | None:
-        """For a key of the table."""
+        """Return the numbers that this mistake predicts for a key of the table; None if it predicts none."""
         predicted = self.predict(name_quantity(key), right)
         return magnitude(predicted) if predicted is not None and key.startswith("|") else predicted

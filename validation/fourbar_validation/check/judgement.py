@@ -30,22 +30,22 @@ class Judgement:
 
     @property
     def agreeing(self) -> int:
-        """How many numbers agree."""
+        """Return how many numbers agree."""
         return sum(finding.agrees for finding in self.findings)
 
     @property
     def exact(self) -> int:
-        """How many numbers agree to round-off and their printed digits."""
+        """Return how many numbers agree to round-off and their printed digits."""
         return sum(finding.exact for finding in self.findings)
 
     @property
     def not_judged(self) -> int:
-        """How many numbers have no digit left to judge by."""
+        """Return how many numbers have no digit left to judge by."""
         return sum(not finding.judged for finding in self.findings)
 
     @property
     def compared(self) -> int:
-        """How many numbers were judged."""
+        """Return how many numbers were judged."""
         return len(self.findings) - self.not_judged
 
     @property
@@ -54,7 +54,7 @@ class Judgement:
         return FAILED if self.differing or self.not_assembled or not self.compared else HOLDS
 
     def sentence(self) -> str:
-        """How many numbers agree, exactly and within the stated tolerance."""
+        """Write how many numbers agree, exactly and within the stated tolerance."""
         if not self.compared:
             agreed = "Nothing was compared"
         elif self.tolerance is None:
@@ -65,7 +65,7 @@ class Judgement:
         return agreed + (f"; no digit left to judge {self.not_judged} more by" if self.not_judged else "")
 
     def together(self) -> bool:
-        """Whether the explanations together account for every quantity that differs."""
+        """Return whether the explanations together account for every quantity that differs."""
         explained = {quantity for explanation in self.explanations for quantity in explanation.quantities}
         return explained >= {finding.quantity for finding in self.differing}
 

@@ -181,7 +181,7 @@ COLUMN_MISTAKES: tuple[tuple[str, Callable[[Array], Array], Callable[[str], bool
         lambda quantity: quantity.startswith("theta"),
     ),
 )
-"""What was done to a column, and to the columns of which quantities it can be done."""
+"""Mistakes in a column: name, change of the values, and the quantities whose columns can have it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +192,7 @@ class Explanation:
     quantities: tuple[str, ...]
     """The quantities that agree once it is assumed."""
     complete: bool
-    """Whether every quantity that differed now agrees."""
+    """True if every quantity that differed now agrees."""
     nearer: tuple[str, ...] = ()
     """Quantities that it explains for the most part: what remains is NEARER times smaller."""
 

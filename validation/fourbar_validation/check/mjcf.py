@@ -69,7 +69,7 @@ class ModelReport:
     """All that is reported of somebody's file."""
 
     causes: list[Cause]
-    """What differs, the worst first."""
+    """Differences, the worst first."""
     costs: list[CostOfModel]
     notes: list[str]
 

@@ -25,7 +25,7 @@ LEVELS = {"A": 1e-9, "B": 1e-6, "C": 1e-3}
 """Largest error of each level, of the largest value; D is worse. Error bars of the problem are allowed."""
 WORSE, MISSING = "D", "-"
 GROUPS = {"reactions": (*PIN_FORCES, "guide_force"), "torque": ("torque", "drive_force"), "frequency": ("frequency",)}
-"""What each letter stands for; every other quantity is of the motion."""
+"""Quantities of each group; every quantity that is not listed belongs to the motion."""
 SAFE = 8.0
 """Times the error bars of the formulas, which are estimates: against many digits an answer is up to 6.6 of them off."""
 LARGEST_FILE = 10**7
@@ -39,7 +39,7 @@ class Judged(NamedTuple):
     group: str
     level: str
     error: float
-    """Of the largest value; of an angle, rad. NaN where there is no answer."""
+    """Error relative to the largest value, for an angle in rad; NaN if there is no answer."""
     position: int
 
 

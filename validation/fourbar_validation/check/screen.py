@@ -23,8 +23,8 @@ OUTSIDE = ("file", "meshdir", "texturedir", "assetdir", "directory")
 
 COUNTS = ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "sdf_iterations", "sdf_initpoints")
 MOST_ITERATIONS = 1000
-"""Of each count in <option>, ten times the greatest of MuJoCo's defaults: it already steps while it compiles, and with
-a tolerance of 0 nothing else may stop a solver."""
+"""Upper limit of each count in <option>, ten times the greatest of MuJoCo's defaults: MuJoCo already steps while it
+compiles, and with a tolerance of 0 nothing else may stop a solver."""
 
 
 def read_mjcf(path: Path) -> str:

@@ -46,11 +46,11 @@ HEADING = re.compile(r"\|?(?P<name>\w+)\|?\s*(?:\[(?P<square>[^\]]*)\]|\((?P<rou
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What the numbers of a column are in."""
+    """Unit of the numbers of a column."""
 
     text: str
     factor: float
-    """To SI."""
+    """Factor to SI."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,14 +166,14 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def _is_unit_line(cells: list[str]) -> bool:
-    """Whether a line under the header states units: words alone."""
+    """Return whether a line under the header states units: no cell contains a number."""
     return not any(re.search("[0-9]", re.sub(r"[\^*][0-9]|[²³]", "", cell)) for cell in cells)
 
 
 def _read_columns(
     path: Path, headings: list[str], unit_line: list[str]
 ) -> tuple[dict[int, tuple[str, Unit]], dict[str, str]]:
-    """By its place in a row, each column's name and unit; and the headings that are left out, each with the reason."""
+    """Return each column's name and unit by its place in a row, and the headings left out, each with the reason."""
     columns: dict[int, tuple[str, Unit]] = {}
     left_out: dict[str, str] = {}
     for index, heading in enumerate(headings):

@@ -1,4 +1,4 @@
-"""What an engine answers: its own numbers at the motion it really made, or the reason why it does not answer."""
+"""Define an engine's answer: its own numbers at the motion it really made, or the reason why it does not answer."""
 
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -17,13 +17,13 @@ class Answer:
     """Quantities of one engine on one scene, under the names of `fourbar.Solution`, SI and radians."""
 
     engine: str
-    """For example "pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"."""
+    """Name of the engine, for example "pinocchio-inverse", "mujoco-inverse", "mujoco-simulated"."""
     setting: str
-    """What was dialled: "exact", or "RK4 628/rev"."""
+    """Setting of the engine: "exact", or for example "RK4 628/rev"."""
     at: Command | None = None
     """The motion this answer belongs to: the command itself, or what a simulation really did."""
     assembled: NDArray[np.bool_] | None = None
-    """Where the engine found the loop to close, by its own means, (n,)."""
+    """Positions where the engine found by its own means that the loop closes, (n,)."""
     quantities: dict[str, Array] = field(default_factory=dict)
     """(n,) or (n, 2) arrays; NaN where not assembled. A name that is missing was not answered."""
     refusal: str | None = None
@@ -31,18 +31,18 @@ class Answer:
     predicted: dict[str, Array] = field(default_factory=dict)
     """Errors that the engine must expect by its own residuals, (n,), in the unit of the quantity."""
     alarms: list[str] = field(default_factory=list)
-    """What the engine's watch on itself found wrong, in words; each fails the run."""
+    """Faults that the engine's monitoring of itself found, in words; each fails the run."""
     evidence: dict[str, float] = field(default_factory=dict)
-    """What the engine says of itself: closure gap (m), speed error, resets, residuals."""
+    """Figures that the engine reports of itself: closure gap (m), speed error, resets, residuals."""
     shared: str = ""
-    """What it takes from the formulas' side."""
+    """Inputs that the engine takes from the formulas' side."""
     own: str = ""
-    """What it found alone."""
+    """Results that the engine found alone."""
     seconds: float = 0.0
 
 
 class WitnessError(FourBarError):
-    """What a witness from outside broke down with, in words."""
+    """Failure of an engine from outside, in words."""
 
 
 class Engine(Protocol):
@@ -50,10 +50,10 @@ class Engine(Protocol):
 
     @property
     def name(self) -> str:
-        """As in the results."""
+        """Return the engine's name as it stands in the results."""
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Its answer; it is given the description and the command, never a result of the formulas."""
+        """Answer a scene, given the description and the command, never a result of the formulas."""
 
 
 def explain_refusal(engine: Engine, at: Command) -> str:

@@ -110,7 +110,7 @@ def read_column(path: Path, column: str) -> Iterator[str]:
 
 
 def count_rows(path: Path) -> int:
-    """How many rows a table of scenes has."""
+    """Return how many rows a table of scenes has."""
     return sum(len(cells) for (cells,) in _read_batches(path, ["scene"]))
 
 

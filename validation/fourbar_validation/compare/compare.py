@@ -54,11 +54,11 @@ Scales = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
 OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, COUPLE.error, LINE.error, "force_error", "power")
-"""What has judges of its own: the range in which dry friction holds, what it leaves, error bars, a product."""
+"""Quantities with checks of their own: the range in which dry friction holds, its residual, error bars, a product."""
 COMPARED = tuple(name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *OF_LINE))
 """Every quantity that an exact engine is held to: all that is printed of a position."""
 OF_THE_LINE = {"stroke": "sin_mu", "drive_line": "sin_mu", "stroke_speed": "v_B", LINE.value: COUPLE.value}
-"""Where the drive is linear, who is held to the other quantity, or answers this one, is held to it."""
+"""Quantities of a linear drive; each is compared if the quantity it maps to is compared or the engine answers it."""
 OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
@@ -68,7 +68,7 @@ still: a simulation is judged where the drive moves at more than this part of it
 CLOSURE = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
 NOWHERE = "no position at which it is demanded"
 NUMBERS = ("error", "allowed", "theta_2", "condition")
-"""Of a row."""
+"""Names of the numbers of a row."""
 
 
 @dataclass(slots=True)
@@ -82,22 +82,22 @@ class Comparison:
     """At `answer.at`."""
     tolerance: ErrorBound
     expected: Iterable[str]
-    """What the engine must answer."""
+    """Quantities that the engine must answer."""
     predicted: Predicted | None = None
-    """With it an error beyond the tolerance must be within DEGRADED times the error to be expected there."""
+    """Prediction of errors; with it an error beyond the tolerance must be within DEGRADED times the expected error."""
     reference: Solution | None = None
     """Another derivation at the same positions: the stricter of its conditions and sizes and the formulas' own decides
     what they may be wrong by; left out: the answer itself."""
     scales: Scales = field(default_factory=dict)
-    """Of `formulas` and `reference`, where another answer was held to them before."""
+    """Scales of `formulas` and `reference`, if an earlier answer was compared with them."""
     nearby: Nearby | None = None
-    """With it an error beyond the tolerance is taken again within the rounding of theta_2."""
+    """Evaluation near a position; with it an error beyond the tolerance is taken again within theta_2's rounding."""
     own: Solution | None = field(default=None, init=False)
     """The answer as a solution."""
     numbers: int = field(default=0, init=False)
     decided: int = field(default=0, init=False)
     again: dict[str, Array] | None = field(default=None, init=False)
-    """What `nearby` answered, once that was required."""
+    """Answer of `nearby`, once it was needed."""
 
     def rows(self) -> list[Row]:
         """Compare where the loop closes, each quantity, and what the engine says of itself."""
@@ -228,14 +228,14 @@ class Comparison:
 
 
 class _Finding(NamedTuple):
-    """What was found of one quantity at the position where it is worst."""
+    """Worst error of one quantity and the position where it occurs."""
 
     worst: int
     verdict: str
     reason: str
     allowed: float
     decided: int
-    """Positions of which a verdict is drawn."""
+    """Number of positions that have a verdict."""
 
 
 def _judge_errors(

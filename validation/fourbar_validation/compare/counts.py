@@ -1,4 +1,4 @@
-"""How many comparisons agree, are degraded, refuse or fail, and the one sentence that every form of a result states."""
+"""Count the comparisons by verdict, and write the one sentence that every form of a result states."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ WORDING = {
     REFUSES: ("refuses", "refuse"),
     UNDECIDED: ("undecided", "undecided"),
 }
-"""Of one comparison, and of several."""
+"""Words for each verdict: of one comparison, and of several."""
 
 
 class Counts:
@@ -63,7 +63,7 @@ class Counts:
 
     @property
     def nothing(self) -> bool:
-        """Whether nothing was compared, and nothing that was due is missing."""
+        """Return whether nothing was compared and no answer that was due is missing."""
         return not self._answered and not self[FAILS]
 
     @property

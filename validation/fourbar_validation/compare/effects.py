@@ -1,4 +1,4 @@
-"""How large the forces of each load and each effect are, couples divided by a bar's length, N: one row of a table each.
+"""Compute the size of the forces of each load and effect, couples divided by a bar's length, N: one table row each.
 
 A sum of forces that (nearly) vanishes is judged by these.
 """
@@ -24,7 +24,7 @@ def _find_shortest(linkage: FourBar) -> float:
 
 
 def _multiply_levers(linkage: FourBar, places: Iterable[tuple[int, float]]) -> float:
-    """Of forces at distances along bars: with their couples, as a multiple of the force."""
+    """Return the size of forces at distances along bars with their couples, as a multiple of the force."""
     return sum(1.0 + abs(distance) / linkage.bar(bar).length for bar, distance in places if bar != 1)
 
 
@@ -55,11 +55,14 @@ SIZE_OF: dict[str, Callable[[Any, FourBar, Solution], Array | float]] = {
     ),
     "load": lambda load, linkage, _: load.greatest_force(linkage),
 }
-"""By the key of an effect."""
+"""Size of the forces of an effect, by its key."""
 
 
 def find_size(effect: "Effect", linkage: FourBar, formulas: Solution) -> Array | float:
-    """Its forces, N, (n,) or one for all; FourBarError where it has no row: nothing is judged by another's scale."""
+    """Return the size of an effect's forces, N, (n,) or one for all positions.
+
+    An effect without a row raises FourBarError: nothing is judged by another effect's scale.
+    """
     if effect.key not in SIZE_OF:
         raise FourBarError(f"the effect {effect.key!r} has no size to judge forces by")
     return SIZE_OF[effect.key](effect, linkage, formulas)

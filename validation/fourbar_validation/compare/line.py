@@ -22,9 +22,9 @@ class DriveLine(NamedTuple):
     directions: dict[int, Complex]
     """e^{i theta} of bars 1 to 4."""
     arms: tuple[Complex, Complex]
-    """From the first pins of their bars to the ends, m."""
+    """Vectors from the first pins of the bars to the ends of the drive, m."""
     across: Complex
-    """From the one end to the other, m."""
+    """Vector from one end of the drive to the other, m."""
 
     @property
     def stroke(self) -> Array:
@@ -58,7 +58,7 @@ class DriveLine(NamedTuple):
 
     @property
     def most(self) -> float:
-        """What its ends could move at most, as `condition` counts, m."""
+        """Return the greatest possible movement of its ends, as `condition` counts it, m."""
         _, a, b, c = self.linkage.lengths
         reach = {1: (0.0, 0.0), 2: (0.0, 1.0), 3: (a, a / b), 4: (0.0, a / c)}
         return sum(reach[p.bar][0] + reach[p.bar][1] * abs(p.distance) for p in (self.drive.start, self.drive.end))

@@ -1,4 +1,4 @@
-"""Where dry friction reverses: the sense of rotation at a pin changes, and the pin forces jump.
+"""Find where dry friction reverses: the sense of rotation at a pin changes, and the pin forces jump.
 
 The driving torque bends there and does not jump: the power f |omega_j - omega_i| is continuous.
 """
@@ -18,7 +18,7 @@ from fourbar.solve import solve
 from fourbar_validation.compare.tolerance import EPS, Array, K
 
 HALVINGS = 60
-"""Of the interval between two positions: down to neighbouring doubles."""
+"""Number of times the interval between two positions is halved, down to neighbouring doubles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Reversal:
     """Index of the position before it."""
 
     def jump(self, quantity: str) -> float:
-        """By how much a force or the torque changes, N or N m."""
+        """Return by how much a force or the torque changes, N or N m."""
         return float(np.linalg.norm(getattr(self.after, quantity) - getattr(self.before, quantity)))
 
     def __str__(self) -> str:
@@ -68,9 +68,9 @@ def find_reversals(scene: Scene, at: Command, solution: Solution) -> list[Revers
 
 
 def mark_reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bool = False) -> NDArray[np.bool_]:
-    """Where a dry pin of a moving linkage slips by no more than this part of the two speeds over sin^2 mu, (n,).
+    """Mark where a dry pin of a moving linkage slips by at most this part of the two speeds over sin^2 mu, (n,).
 
-    There the sense of friction is anything's guess, and the forces on both sides of the jump are right. An engine
+    There the sense of friction is undecided, and the forces on both sides of the jump are right. An engine
     that runs through the motion `in_time` has no convention at rest either: 0 is as good as any couple up to the
     friction's.
     """

@@ -18,10 +18,10 @@ AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
     *("undecided", "refuses", "fails"),
 )
 VERDICTS = (AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS)
-"""From the best to the worst."""
+"""Verdicts from the best to the worst."""
 HELD = (AGREES, DEGRADED)
 COMPARED = (*HELD, FAILS)
-"""Of the others nothing was compared: no digit of the quantity is left to decide by, or the engine declared a limit."""
+"""Verdicts of comparisons that took place; otherwise no digit is left to decide by, or the engine declared a limit."""
 
 FORMULAS = "formulas"
 IDENTITIES = (
@@ -48,7 +48,7 @@ class Row:
     """Relative to the scale of the quantity (angles: rad); NaN where there is no answer."""
     allowed: float
     passed: bool = field(init=False)
-    """Whether it was compared and holds; the verdict decides."""
+    """True if it was compared and holds; the verdict decides."""
     verdict: str
     reason: str
     theta_2: float
@@ -100,12 +100,12 @@ class Row:
 
     @property
     def compared(self) -> bool:
-        """Whether anything was compared."""
+        """Return whether anything was compared."""
         return self.verdict in COMPARED
 
     @property
     def failed(self) -> bool:
-        """Whether it was compared and does not hold, or an answer that was due is missing."""
+        """Return whether it was compared and does not hold, or an answer that was due is missing."""
         return self.verdict == FAILS
 
 
@@ -146,7 +146,7 @@ def make_plain(text: str) -> str:
 
 
 FORMULA = ("=", "+", "-", "@")
-"""What a spreadsheet takes for the beginning of a formula, and calculates."""
+"""Characters that a spreadsheet takes for the beginning of a formula, which it calculates."""
 
 
 def write_cell_text(cell: str) -> str:

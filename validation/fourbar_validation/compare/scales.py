@@ -1,4 +1,4 @@
-"""How large a quantity is and how well conditioned: the scale of its error, by the formulas and by another derivation.
+"""Compute the scale of a quantity's error and its condition, by the formulas and by another derivation.
 
 The scale of a quantity is its largest magnitude over the well-conditioned positions; a position
 below that is judged relative to its own magnitude, or the forces that diverge near a limit would
@@ -129,7 +129,7 @@ TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
     "N m": _sum_torques,
     "W": _sum_powers,
 }
-"""By the unit of a quantity, the sum of the terms of its equation."""
+"""Sum of the terms of a quantity's equation, by the quantity's unit."""
 
 
 def _compute_drive_arms(scene: Scene) -> dict[int, float]:
@@ -157,11 +157,11 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
 
 
 SIZED_BY = ("omega_3", "alpha_3", "a_G2", "a_G3", "a_G4")
-"""What the size of a force is made of; a reference without them has none."""
+"""Quantities from which the size of a force is computed; a reference without them has none."""
 
 
 def has_angles(answer: Answer) -> bool:
-    """Whether an answer has the angles of all moving bars that are not given."""
+    """Return whether an answer has the angles of all moving bars that are not given."""
     theta_2 = () if answer.at is None or answer.at.commanded == "theta_2" else ("theta_2",)
     return answer.at is not None and {"theta_3", "theta_4", *theta_2} <= answer.quantities.keys()
 

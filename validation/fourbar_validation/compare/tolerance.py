@@ -1,4 +1,4 @@
-"""How far two numbers are apart, how far they may be, and why: four classes of tolerance, each a named object.
+"""Compute errors and allowed errors, with the reason for each: four classes of tolerance, each a named object.
 
 `condition` lies in (0, 1], 1 is best; an exact comparison is allowed K eps / condition. The motion
 condition is s = |sin(theta_4 - theta_3)|, the drive condition the sine between the two bars that
@@ -30,7 +30,7 @@ sqrt(2 * 50) = 10 of them as a random walk; 50 covers the tails of some 10^5 com
 ROUNDINGS = 8.0
 """A chain of some fifty roundings moves a result by sqrt(50) = 7 last digits, as a random walk."""
 NOTHING_TO_TELL = 1e-3
-"""Where eps/condition exceeds this, two correct programs may differ in the third digit: no verdict is drawn."""
+"""Greatest eps/condition with a verdict; beyond it two correct programs may differ in the third digit."""
 WELL_CONDITIONED = 0.1
 """Positions whose condition is at least this set the scale of a quantity."""
 DEGRADED = 10.0
@@ -39,16 +39,16 @@ DEGRADED = 10.0
 
 @dataclass(frozen=True, slots=True)
 class ErrorBound:
-    """What a comparison is allowed, with the reason that the report prints."""
+    """Allowed error of a comparison, with the reason that the report prints."""
 
     name: str
     reason: str
     factor: float
     """Error allowed at condition 1, relative to the scale."""
     conditioned: bool
-    """Whether it is divided by the condition."""
+    """True if the allowed error is divided by the condition."""
     in_time: bool = False
-    """Whether it is of an engine that runs through the motion in time, and has no convention at rest."""
+    """True for an engine that runs through the motion in time and has no convention at rest."""
 
     def allowed(self, condition: Array) -> Array:
         """Compute the relative error allowed at each position, (n,)."""
@@ -91,7 +91,7 @@ POWER = {
     **dict.fromkeys(("rad", "m", "1"), 1),
     **dict.fromkeys(("rad/s", "m/s", "rad/s^2", "m/s^2", "N", "N m", "W"), 2),
 }
-"""By unit: angles and positions lose digits as 1/s, everything that follows from them as 1/s^2."""
+"""Power of 1/s by unit: angles and positions lose digits as 1/s, everything that follows from them as 1/s^2."""
 OF_THE_INPUT = frozenset(("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2"))
 """Quantities that the input alone decides: they lose none."""
 TOUCHING_MARGIN = 32.0 * EPS
@@ -107,8 +107,8 @@ def hold_simulated(error: float, why: str) -> ErrorBound:
 
 
 OF_DIRECTION = frozenset(("drive_line", "stroke_speed", "drive_condition"))
-"""What, as every force, follows from the direction of a linear drive: the places of its ends are rounded as the lengths
-are, and their direction by that over the stroke."""
+"""Quantities that, like every force, follow from the direction of a linear drive: the places of its ends are rounded
+as the lengths are, and their direction by that over the stroke."""
 
 
 def find_lever(linkage: FourBar, bar: int = 2) -> float:

@@ -1,1 +1,1 @@
-"""What accuracy costs in time."""
+"""Measure what accuracy costs in time."""

@@ -39,16 +39,16 @@ class ErrorLaw:
     expected: float
     points: int
     jumps: tuple[str, ...] = ()
-    """Where the error jumps up as the steps get finer: no law then, whatever the other points fit."""
+    """Settings where the error jumps up as the steps get finer; no law holds then, whatever the other points fit."""
 
     @property
     def decided(self) -> bool:
-        """Whether enough points are left for a fit with an uncertainty, or a jump denies it."""
+        """Return whether enough points are left for a fit with an uncertainty, or a jump rules the law out."""
         return self.points >= FEWEST or bool(self.jumps)
 
     @property
     def holds(self) -> bool:
-        """Whether the exponent is the expected one throughout; False where it is not decided."""
+        """Return whether the exponent is the expected one throughout; False if it is not decided."""
         return self.decided and not self.jumps and abs(self.exponent - self.expected) <= max(2.0 * self.sigma, WITHIN)
 
     def __str__(self) -> str:
@@ -104,7 +104,7 @@ def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
 
 
 def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
-    """Where an error leaps up on a ladder from coarse to fine, once the motion is the scene's."""
+    """Return the points where an error jumps up as steps get finer, once the motion is the scene's."""
     result = []
     for i, point in enumerate(points[1:], 1):
         value, before = getattr(point, quantity), [getattr(each, quantity) for each in points[max(i - 2, 0) : i]]
@@ -165,7 +165,7 @@ def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> Erro
 
 
 def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
-    """Where a quantity jumps towards finer steps, and where it has passed its floor."""
+    """List warnings where a quantity jumps towards finer steps, and where it has passed its floor."""
     result = []
     for name, points in curves.items():
         ladder = _list_by_steps(

@@ -37,7 +37,7 @@ SOLVERS: dict[str, Look] = {
     "PGS": ("tolerance, PGS", "#d55e00", "s", (0, (4, 2))),
     "CG": ("tolerance, CG", "#009e73", "^", (0, (1, 1.5))),
 }
-"""By name in the legend."""
+"""Look of each solver, by name: its legend, colour, marker and line."""
 DEFAULT = "MuJoCo's defaults"
 """Label of the point that a new user gets."""
 LARGEST = 10.0
@@ -45,7 +45,7 @@ LARGEST = 10.0
 LOWEST = 1e-17
 """Bottom of the picture; fifty digits lie far below and are named at the edge."""
 NONE = 1e-18
-"""Where a tolerance of 0 is drawn."""
+"""Place on the logarithmic axis at which a tolerance of 0 is drawn."""
 NAMES = {"torque": "driving torque", "force": "worst pin force"}
 INK = "#333333"
 PALE = "#d9d9d9"

@@ -1,4 +1,4 @@
-"""What the study tries: one setting at a time around the recommended settings and around MuJoCo's defaults."""
+"""List what the study tries: one setting at a time around the recommended settings and around MuJoCo's defaults."""
 
 import math
 from collections.abc import Callable, Iterable

@@ -35,7 +35,7 @@ REQUIRED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
 VERSION = 6
-"""Of what is tried; parts of another one are made again."""
+"""Version of what is tried; parts made with another version are made again."""
 EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
 T = TypeVar("T")
 
@@ -51,7 +51,7 @@ class CostPoint:
     setting_value: float
     """The value of the curve's setting: steps per revolution, 1-d, tc in steps, tolerance, ..."""
     steps: int
-    """Of one run through the scene; positions, where nothing is stepped."""
+    """Number of steps of one run through the scene; of positions if nothing is stepped."""
     steps_per_revolution: float
     torque: float
     F12: float
@@ -65,7 +65,7 @@ class CostPoint:
     rk4_steps: float
     """seconds_per_revolution in steps of the recommended RK4 model."""
     scatter: float
-    """Of seconds_per_revolution: half of what the middle half of its timings spans, over their median."""
+    """Scatter of seconds_per_revolution: half the interquartile range of its timings over their median."""
     broken: str = ""
 
     @property

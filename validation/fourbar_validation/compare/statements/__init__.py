@@ -1,1 +1,1 @@
-"""What the formulas state of a linkage whatever its motion, held against the engines."""
+"""Compare what the formulas state of a linkage, independently of its motion, with the engines."""

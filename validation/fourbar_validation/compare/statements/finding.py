@@ -1,4 +1,4 @@
-"""What one statement comes to, and what an engine finds at the places where it is asked."""
+"""Define the result of checking one statement, and an engine's values at the places where it is asked."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,12 +18,12 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE, count_half_turns, 
 Place = tuple[float, int]
 """theta_2 (rad) and branch."""
 Seen = Mapping[Place, Mapping[str, float]]
-"""What an engine finds at some places."""
+"""Values that an engine finds at some places."""
 OF_BARS = [name for name in UNKNOWNS if name not in FORCES]
 
 
 class Finding(NamedTuple):
-    """How far a statement is from what the engine says (rad, or a number of wrong answers), and how far it may be."""
+    """Error of a statement against the engine (rad, or the number of wrong answers), and the allowed error."""
 
     error: float
     allowed: float

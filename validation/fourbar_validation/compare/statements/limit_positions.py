@@ -1,4 +1,4 @@
-"""Where each bar can stand: the loop closes within its range, not beyond its limits, and there it is at rest.
+"""Check the range of each bar: the loop closes inside it and not beyond its limits, and at a limit the bar is at rest.
 
 The loop is a sum of vectors, d u_1 = a u_2 + b u_3 - c u_4, and any moving bar may come first in it: an engine
 that turns bar 2 alone is given the linkage with bar k in that place. The distance that the other two bars have to
@@ -33,10 +33,10 @@ from fourbar_validation.compare.tolerance import (
 )
 
 BEYOND = 4.0 * TOUCHING_MARGIN
-"""Of the sum of the lengths: by this much the loop closes, or misses, past a limit where the engine is tried."""
+"""Part of the sum of the lengths by which the loop closes, or misses, past a limit where the engine is tried."""
 
 LENGTHS_ROUNDED = (EPS / 4.0, EPS)
-"""Of the perimeter: the lengths were rounded themselves, and between these two a change point may be stated or not."""
+"""Bounds of the gap, in parts of the perimeter, between which either answer holds for a change point: lengths round."""
 PAST = 1e-3
 """rad. This far on either side of a change point the speeds of the two motions differ visibly."""
 FAR = 0.1
@@ -44,7 +44,7 @@ FAR = 0.1
 
 
 def _compare_change_points(linkage: FourBar) -> Finding:
-    """By the exact sums of the lengths: which of the two positions with input and ground in line have all bars so."""
+    """Decide by exact sums of the lengths in which of the two positions with input and ground in line all bars are."""
     d, a, b, c = (Fraction(length) for length in linkage.lengths)
     missing = {0.0: abs(abs(d - a) - abs(b - c)), math.pi: abs(d + a - b - c)}
     stated, wrong, known = mobility.change_points(linkage), 0, 0
@@ -68,19 +68,19 @@ def compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
 
 
 class _Trial(NamedTuple):
-    """What an engine is tried with for one bar, and what the formulas state of it."""
+    """Scene and command that an engine is tried with for one bar, and what the formulas state of them."""
 
     scene: Scene
     """The linkage with the bar in the place of bar 2."""
     command: Command
     angles: Array
-    """Of the bar, rad."""
+    """Angles of the bar, rad."""
     inside: Mask
-    """Whether the loop closes there."""
+    """True where the loop closes."""
     decidable: Mask
-    """And it is not rounding that decides."""
+    """True where rounding does not decide whether the loop closes."""
     findings: tuple[Finding, ...]
-    """Of the statements among themselves."""
+    """Findings from comparing the statements with each other."""
 
 
 def _try_bar(linkage: FourBar, bar: int) -> _Trial:
@@ -121,21 +121,21 @@ def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
 
 
 def _mark_collinear(linkage: FourBar, bar: int) -> list[bool]:
-    """Of each limit of a bar, whether all bars are collinear there but for rounding."""
+    """Return for each limit of a bar whether all bars are collinear there, apart from rounding."""
     angles = np.array([limit.theta_2 for limit in mobility.limit_positions(linkage, bar)])
     return [bool(each) for each in np.abs(find_margin(linkage, angles)) <= TOUCHING_MARGIN]
 
 
 class Stated(NamedTuple):
-    """What the formulas state of the limits of a linkage: evaluated once, for all engines."""
+    """Statements of the formulas on the limits of a linkage, evaluated once for all engines."""
 
     linkage: FourBar
     trials: dict[int, _Trial]
-    """By moving bar."""
+    """Trials by moving bar."""
     inside: list[tuple[mobility.LimitPosition, float]]
     """Limits of bar 2, and the little that it turns from each: at the limit rounding decides if the loop closes."""
     collinear: dict[int, list[bool]]
-    """Of each limit of bars 3 and 4, whether all bars are collinear there but for rounding."""
+    """True for each limit of bars 3 and 4 at which all bars are collinear, apart from rounding."""
 
     @classmethod
     def of(cls, linkage: FourBar) -> "Stated":
@@ -164,7 +164,7 @@ def compare_ranges(stated: Stated, engine: Engine) -> Iterator[Finding]:
 
 
 def choose_places(stated: Stated) -> list[Place]:
-    """Where an engine is looked at for them."""
+    """Return the places where an engine is evaluated to check these statements."""
     inside = [(limit.theta_2 + step, branch) for limit, step in stated.inside for branch in (1, -1)]
     return inside + [(limit.theta_2, limit.branch) for bar in (3, 4) for limit in stated.dead_centres(bar)]
 
@@ -178,7 +178,7 @@ def compare_limit_positions(stated: Stated, seen: Seen) -> Iterator[Finding]:
 
 
 def _check_input(stated: Stated, seen: Seen) -> Iterator[Finding]:
-    """On both branches just inside each limit: bars 3 and 4 stand off their common line by the same angles."""
+    """Check just inside each limit that bars 3 and 4 are off their common line by the same angles on both branches."""
     linkage = stated.linkage
     d, a, *_ = linkage.lengths
     for limit, step in stated.inside:

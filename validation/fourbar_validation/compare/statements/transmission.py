@@ -1,4 +1,4 @@
-"""How well the linkage transmits: the angle between bars 3 and 4, its extremes, ratios of speed and of stroke times."""
+"""Check the transmission angle between bars 3 and 4, its extremes, and the ratios of speed and of stroke times."""
 
 import math
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ RADII = (0.2, 0.3)
 
 
 def choose_places(linkage: FourBar) -> list[Place]:
-    """Where an engine is looked at for it: at the extremes that are no limits, and in both strokes of bar 4."""
+    """Return the places where an engine is evaluated: the extremes that are no limits, and both strokes of bar 4."""
     strokes = _find_strokes(linkage)
     inner = [(theta_2, 1) for value, theta_2, collinear in _find_ends(linkage) if value != collinear]
     return inner + ([] if strokes is None else [(theta_2, -1) for theta_2 in strokes[1]])
