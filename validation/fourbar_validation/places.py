@@ -1,4 +1,4 @@
-"""Where things are: this package, the models, and the checkout that both lie in, where there is one."""
+"""Locate this package, the models, and the checkout that contains both, if there is one."""
 
 import os
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ CHECKOUT = None if (PACKAGE / "models" / "problems").is_dir() else PACKAGE.paren
 """The folder of pyproject.toml, models, tests and docs; None where the package is installed, with the models in it."""
 MODELS = PACKAGE / "models" if CHECKOUT is None else CHECKOUT / "models"
 PROGRAM = "fourbar-validation" if CHECKOUT is None else "python -m validation"
-"""How the harness is called here."""
+"""Command that starts the harness here."""
 
 
 def find_checkout(what: str) -> Path:

@@ -43,15 +43,15 @@ def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
 
 
 class BallLine(NamedTuple):
-    """Of the two points, where the linkage stands."""
+    """Line of the drive between its two points, at one position of the linkage."""
 
     stroke: Ball
     line: Complex
-    """From the one to the other, of length 1."""
+    """Unit vector from one point to the other."""
     arms: dict[int, Complex]
-    """Of the bars with an end: from the first pin."""
+    """Vectors from the first pin to the end, of the bars with an end."""
     sense: dict[int, int]
-    """In which it pushes them along the line."""
+    """Sign of the drive's push along the line on each of these bars."""
 
     def speed(self, foot: dict[int, Complex], omega: dict[int, Ball]) -> Ball:
         """ds/dt, of bars whose first pins move and which turn at speeds."""

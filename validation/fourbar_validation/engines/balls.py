@@ -21,7 +21,7 @@ from fourbar_validation.engines.description import PINS, find_centre, find_inert
 BITS = 320
 """Working precision; 50 digits are 167 bits, the rest is what the worst sample (a limit position at 1e-20) cancels."""
 OF_PIECE = ("table_start", "table_stop", "table_first", "table_last")
-"""Of a load's table: the angles and factors of the piece that a position is in."""
+"""Angles and factors of the piece of a load's table that a position is in."""
 STEP_BITS = 90
 """Sensitivities are difference quotients with a relative step of 2^-90: wrong by about 2^-90 / (distance to the
 nearest singular position), and the cancelled 90 bits are there to lose."""

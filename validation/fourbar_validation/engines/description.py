@@ -1,4 +1,4 @@
-"""What a scene's numbers mean, stated a second time: no engine takes it from the formulas' side.
+"""State a second time what a scene's numbers mean, so that no engine takes it from the formulas' side.
 
 Pins and the bars i, j that meet there; a bar's inertia and mass centre where they are left out; a field of gravity;
 a point of a bar; the bars as a tree that is open at pin B.
@@ -27,13 +27,13 @@ POINTS = {
     "B4": "end4",
     **{g: g for g in ("G2", "G3", "G4")},
 }
-"""By the name under which a point is answered, what `Part` calls it; A2 and B4 are the ends of bars 2 and 4."""
+"""Names of points in `Part`, by the name under which a point is answered; A2 and B4 are the ends of bars 2 and 4."""
 ON_BARS = {"A": "end2", "B": "end4", "G2": "G2", "G3": "G3", "G4": "G4"}
 """Points whose accelerations are answered, each as a point of a bar."""
 TELLS = 2.0**-53
 """A component of a direction below this is what the angle's own rounding leaves of zero."""
 SHARED = "the description, what is commanded and the branch"
-"""What an exact engine takes from the formulas' side, in a report."""
+"""Words of a report for what an exact engine takes from the formulas' side."""
 
 
 def find_inertia(bar: Bar) -> float:
@@ -86,7 +86,7 @@ class Part(NamedTuple):
     bearer: int
     """The bar that carries its first pin; 1: the ground."""
     first_pin: tuple[float, float]
-    """That pin in the bearer's axes, of the ground in world axes, m."""
+    """Place of that pin in the bearer's axes, for the ground in world axes, m."""
     mass: float
     inertia: float
     """About the mass centre, kg m^2."""

@@ -1,4 +1,4 @@
-"""What each load and each effect does on an engine's bars, from the engine's own numbers: one row of a table each.
+"""Apply each load and effect to an engine's bars, from the engine's own numbers: one row of a table each.
 
 No engine is named here, and nothing of the formulas' `act` is used: this is the second derivation.
 """
@@ -113,7 +113,7 @@ TERM_OF: dict[str, Callable[[Any, Loaded], None]] = {
     "flywheel": _apply_flywheel,
     "load": _load,
 }
-"""By the key of an effect: what it does at a state of the bars."""
+"""Function that applies an effect at a state of the bars, by the effect's key."""
 
 
 def list_acting(scene: Scene, bars: Loaded, own: Container[str] = ()) -> list[Act]:

@@ -27,7 +27,7 @@ LARGEST_FILE = 10**6
 """Bytes."""
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-engines"
 HELD = ("tolerance", "expected", "positions", "through_time", "predictor", "residuals", "nearby", "stated")
-"""What an adapter of ours is held to, in whatever environment."""
+"""Fields of an engine that an adapter of ours keeps in every environment."""
 DONE = "installed"
 """In the folder of an environment that is complete."""
 
@@ -42,7 +42,7 @@ class Entry:
     command: tuple[str, ...] = ()
     """Command line of a foreign program, which takes the adapter's place."""
     requires: tuple[str, ...] = ()
-    """What pip installs."""
+    """Requirements that pip installs."""
     python: str = ""
     """Another interpreter than this one."""
 

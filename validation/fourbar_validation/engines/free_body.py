@@ -50,9 +50,9 @@ FRICTION_STAGES = 16
 FRICTION_STEPS = 60
 """Newton's steps in a stage; where it converges it needs a tenth of them."""
 FRICTION_SETTLED = 8.0 * 2.0**-52
-"""Of the sum of the terms of a friction couple's equation: what is left of it is rounding."""
+"""Residual of a friction couple's equation that counts as rounding, in parts of the sum of its terms."""
 FRICTION_STARTS = 100
-"""From which other solutions are looked for, over six decades of couples."""
+"""Number of starts from which other solutions are sought, over six decades of couples."""
 APART = 1e-6
 """Relative; two solutions that differ by less are one."""
 

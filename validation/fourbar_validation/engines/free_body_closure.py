@@ -34,11 +34,11 @@ ROUNDING = 16.0 * 2.0**-52
 
 
 class Closed(NamedTuple):
-    """Where the loop closes, the two angles sought there (NaN elsewhere), and what gap is left, m."""
+    """Positions where the loop closes, the two angles sought there (NaN elsewhere), and the remaining gap, m."""
 
     assembled: NDArray[np.bool_]
     theta: Array
-    """(2, n), rad: of the two bars that are not commanded."""
+    """Angles of the two bars that are not commanded, rad, (2, n)."""
     gap: Array
 
 

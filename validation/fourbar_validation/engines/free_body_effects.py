@@ -1,4 +1,4 @@
-"""What each load and each effect does to the free bodies of a four-bar: a table from its kind to its wrench.
+"""Compute the wrench of each load and effect on the free bodies of a four-bar: a table from its kind to its wrench.
 
 Definitions as in docs/scene-file.md, from the numbers of the description alone. Vectors of the plane are
 complex numbers, x + i y.
@@ -18,7 +18,7 @@ from fourbar_validation.engines.description import PINS, find_centre
 from fourbar_validation.engines.free_body_closure import Complex, close, cross
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
-"""From rest a spring is wound; angles of some turns are known so far."""
+"""Half a turn less the rounding of an angle of several turns, rad: greatest winding of a spring from rest."""
 
 
 class BodyMotion(NamedTuple):
@@ -29,7 +29,7 @@ class BodyMotion(NamedTuple):
     unit: dict[int, Complex]
     """Directions e^{i theta}."""
     first_pin: dict[int, Complex]
-    """Where the first pin of each bar is (O2, O2, A, O4), m."""
+    """Place of the first pin of each bar (O2, O2, A, O4), m."""
     omega: dict[int, Array]
     alpha: dict[int, Array]
     beginning: dict[int, Array] | None = None
@@ -160,7 +160,7 @@ WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
     "springs": _apply_springs,
     "flywheel": _apply_flywheel,
 }
-"""By the name under which a scene file knows an effect."""
+"""Function that applies an effect, by the effect's name in a scene file."""
 
 
 def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:

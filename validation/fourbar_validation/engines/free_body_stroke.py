@@ -8,7 +8,7 @@ from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import place, resolve
 
 HALVINGS = 80
-"""Of half a turn: beyond the last digit of an angle."""
+"""Number of times half a turn is halved: beyond the last digit of an angle."""
 
 
 def measure_cylinder(scene: Scene) -> tuple[complex, complex]:

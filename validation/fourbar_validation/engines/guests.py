@@ -79,7 +79,7 @@ class Program:
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """What an engine says of itself, checked."""
+    """First message of an engine, which states what it answers, checked."""
 
     name: str
     answers: tuple[str, ...] = COMPARED
@@ -101,11 +101,11 @@ class Guest(Witness):
     """Hashes of what its answers come from."""
     version: str = ""
     number: int = 0
-    """Which one it is: each is drawn with a mark of its own, in whatever process."""
+    """Number of the engine, so that it is drawn with the same mark in every process."""
     seconds: float | None = None
     """Limit of time for each question."""
     releases: bool = False
-    """Whether it integrates released motions."""
+    """True if it integrates released motions."""
 
     def at_step(self, step: float) -> "Asked":
         """Return the engine that integrates with this step, s."""
@@ -276,7 +276,7 @@ class Asked:
         self.name, self._program, self._hello, self._trouble = name, program, hello, trouble
         self.commands = COMMANDS if trouble else hello.commands
         self.step: float | None = None
-        """Of a released motion, s."""
+        """Step of a released motion, s."""
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Return its answer; WitnessError says how it broke down."""
@@ -320,9 +320,9 @@ class Running:
     program: Program
     _process: "subprocess.Popen[bytes] | None" = None
     _number: int = 0
-    """Of the last question."""
+    """Number of the last question."""
     _errors: IO[bytes] | None = None
-    """What it writes to its standard error."""
+    """File that takes what the engine writes to its standard error."""
     _stopped: str = ""
     """Why it was stopped."""
     _lock: threading.Lock = field(default_factory=threading.Lock)

@@ -1,7 +1,7 @@
-"""What the engines cannot do, as data: the measured boundary and the reason.
+"""List as data what the engines cannot do: the measured boundary and the reason.
 
-Those of MuJoCo were measured with 4.0.0 and the default `Settings`; a test measures both sides of each again, so an
-engine that moves one is noticed.
+The limits of MuJoCo were measured with 4.0.0 and the default `Settings`; a test measures both sides of each again, so
+an engine that moves one is noticed.
 """
 
 import math

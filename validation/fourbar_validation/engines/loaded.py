@@ -20,7 +20,7 @@ PASSES = 1000
 STAGES, STEPS = 16, 30
 """Near a jam friction grows from none in so many stages, each by at most so many of Newton's steps."""
 NUDGE = 1e-6
-"""Of the greatest load: by how much each is changed for the slopes of a pass."""
+"""Change of each load for the slopes of a pass, in parts of the greatest load."""
 REPEATED = 2.0 * 2.0**-52
 """Change of a pin load, relative, that is rounding."""
 ROUNDED = 1e-11
@@ -28,7 +28,7 @@ ROUNDED = 1e-11
 DIVERGED = 1e100
 """Load, N, that only passes running away from each other reach."""
 Act = Callable[[], None]
-"""What acts on the bars, at their present motion."""
+"""Function that applies what acts on the bars at their present motion."""
 Values = dict[str, Array | float]
 
 
@@ -52,9 +52,9 @@ class EngineBars(Assembled, Protocol):
     """An engine holding the bars of a scene, which knows their mass centres (G2, G3, G4 among the points) and moves."""
 
     own: str
-    """What the engine finds alone, for the report."""
+    """Results that the engine finds alone, in words for the report."""
     alone: bool = False
-    """Whether it answers the torque that the bars without loads and effects take, too: `torque_inertia`."""
+    """True if it also answers the torque that the bars take without loads and effects: `torque_inertia`."""
     ground_angle: float
 
     def angle(self, bar: int) -> float:
@@ -81,19 +81,19 @@ class Loaded(EngineBars, Protocol):
     linear: "LinearDrive | None" = None
     """The drive, where it is along a line."""
     driving: str
-    """What is solved for of the drive."""
+    """Name of the drive's quantity that is solved for."""
     field: tuple[float, float] = (0.0, 0.0)
-    """Of gravity, m/s^2."""
+    """Field of gravity, m/s^2."""
     loaded: list[str]
     """Pins whose friction depends on their load."""
     pin_loads: dict[str, float]
     """Magnitudes of its own pin forces in the last pass, by pin, N; empty before the first."""
     wrenches: dict[int, list[float]]
-    """What acts on each moving bar, summed: a force at its first pin and a couple, (x, y, moment), N and N m."""
+    """Sum of what acts on each moving bar: a force at its first pin and a couple, (x, y, moment), N and N m."""
     terms: list[Act]
 
     def ready(self, scene: Scene, terms: list[Act]) -> None:
-        """To be called by an engine that has its bars, with what acts on them."""
+        """Prepare the evaluation; an engine calls this once it has its bars and what acts on them."""
         self.ground_angle, self.drive_bar, self.terms = scene.linkage.ground_angle, scene.drive_bar, terms
         self.linear, self.driving = scene.drive, name_driving(scene)
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]

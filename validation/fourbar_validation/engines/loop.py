@@ -28,13 +28,13 @@ NOT_ANSWERED = frozenset(
         *("v_A", "v_B", "v_G2", "v_G3", "v_G4"),
     )
 )
-"""What is commanded, follows from others that are answered, or is of the formulas alone."""
+"""Quantities that are commanded, follow from others that are answered, or exist in the formulas alone."""
 ROUNDING = 16.0 * 2.0**-52
 """Gap, relative to the sum of the lengths, that the roundings of a chain of three bars alone can leave."""
 Angles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
 CLOSING = {2: (3, 4), 3: (2, 4), 4: (3, 2)}
-"""By the commanded bar the two others, which close the loop: in this order the sine between them is the branch's, and
+"""The two bars that close the loop, by the commanded bar. In this order the sine between them is the branch's, and
 they stand on the diagonal between their free ends as bars 3 and 4 do from A to O4; bar 2 from A back to O2."""
 
 
@@ -135,7 +135,7 @@ class Exact:
 
     name: str
     build: Callable[[Scene], EngineBars]
-    """Its bars from the description; LimitError says why it cannot hold them."""
+    """Function that builds the engine's bars from the description; LimitError says why the engine cannot hold them."""
     commands: tuple[str, ...] = ("theta_2", "theta_3", "theta_4", "stroke")
 
     def answer(self, scene: Scene, command: Command) -> Answer:
@@ -172,7 +172,7 @@ class Exact:
 
 
 Read = Callable[[Angles, float, float], Values]
-"""Of the configuration in which the bars stand, speed and acceleration of the commanded bar: values by name."""
+"""Function from the bars' angles, and speed and acceleration of the commanded bar, to values by name."""
 
 
 def read_each(
@@ -207,15 +207,15 @@ def split_answer(out: dict[str, Array], branch: NDArray[np.int8]) -> tuple[Comma
 
 @dataclass(slots=True, eq=False)
 class Trial:
-    """What one run through a scene gave, with some settings."""
+    """Result of one run through a scene with some settings."""
 
     at: Command
-    """The motion that was really made."""
+    """Motion that was really made."""
     quantities: dict[str, Array] = field(default_factory=dict)
     """Torque (n,) and pin forces (n, 2), under the names of `fourbar.Solution`."""
     steps: int = 0
     steps_per_revolution: float = 0.0
-    """At the fastest speed of the run."""
+    """Steps per revolution at the fastest speed of the run."""
     stepping: float = 0.0
     """CPU seconds in steps."""
     reading: float = 0.0
@@ -223,7 +223,7 @@ class Trial:
     segments: tuple[tuple[slice, int], ...] = ()
     """The samples of each segment, and its steps: several samples are of one step where these are fewer."""
     broken: str = ""
-    """Where the engine lost the motion: what it reported of itself."""
+    """Report of the engine on itself, if it lost the motion."""
 
 
 class LimitDetector:

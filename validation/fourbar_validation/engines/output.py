@@ -1,4 +1,4 @@
-"""What engines print, through Python or not: kept for their rows, never passed to the terminal."""
+"""Capture what engines print, through Python or not: kept for their rows, never passed to the terminal."""
 
 import ctypes
 import os

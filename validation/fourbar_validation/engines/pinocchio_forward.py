@@ -20,8 +20,8 @@ from fourbar_validation.engines.tree import solve_closed, solve_multipliers
 
 NAME = "pinocchio-forward"
 TIME_CONSTANT_STEPS = 10.0
-"""Of Baumgarte's stabilisation of a free motion, in timesteps: with 30 the loop is lost at a change point from h = 5 ms
-on."""
+"""Time constant of Baumgarte's stabilisation of a free motion, in timesteps: with 30 the loop is lost at a change point
+from h = 5 ms on."""
 PROXIMAL = (1e-14, 1e-8, 10)
 """Accuracy, mu, iterations. With the default mu = 0 every acceleration is NaN: of the three rows of the closure only
 two are independent in the plane."""
@@ -90,7 +90,7 @@ class PinocchioForward:
         self.loop = ClosedTree(self.tree, time_constant_steps * self.h)
 
     def acceleration(self, q: Array, v: Array) -> Array:
-        """Of the closed loop under loads, effects and the flywheel's motor."""
+        """Return the acceleration of the closed loop under loads, effects and the flywheel's motor."""
         tree, tau = self.tree, self.armature * self.alpha
         if tree.terms:
             tree.place(q)  # type: ignore[arg-type]

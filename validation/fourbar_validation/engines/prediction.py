@@ -26,8 +26,8 @@ from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, Array, Mask, su
 from fourbar_validation.engines.description import find_centre, list_speeds
 
 FIRST_ORDER = 0.1
-"""Where the angles are uncertain by this part of the sine that everything divides by, first order predicts nothing:
-speeds and forces may come out as anything, the torque too, whose own first order can cancel."""
+"""Limit of first-order prediction. Angles uncertain by this part of the sine that everything divides by leave speeds,
+forces and the torque undetermined; the torque's own first order can cancel."""
 
 
 def predict_from_data(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
@@ -76,15 +76,15 @@ def predict_error(
 
 
 class Sensitivities(NamedTuple):
-    """How far each output moves at one position."""
+    """Change of each output at one position, by cause."""
 
     data: dict[str, float]
-    """|y| + sum w_i |dy/dx_i|; of the condition, its value."""
+    """Sensitivity to the data, |y| + sum w_i |dy/dx_i|; for the condition, its value."""
     loop: dict[str, float]
-    """By a loop that opens at its fastest bar's speed and acceleration times 1 m, and by couples on the bars of the
-    strongest pin force times 1 m."""
+    """Change by a loop that opens at its fastest bar's speed and acceleration times 1 m, and by couples on the bars of
+    the strongest pin force times 1 m."""
     carried: dict[str, float]
-    """By couples on the bars of the heaviest bar's inertial force at 1 m of the fastest bar, times 1 m."""
+    """Change by couples on the bars of the heaviest bar's inertial force at 1 m of the fastest bar, times 1 m."""
 
     def first_order(self, name: str, reach: float, *, carried: bool = False) -> float:
         """Predict the error of an output, vectors by their norm; infinite where it has none."""

@@ -11,7 +11,7 @@ from fourbar_validation.places import import_path
 
 
 class Ended(NamedTuple):
-    """How a process ended."""
+    """Output and exit of a process that ended."""
 
     out: str
     errors: str
@@ -21,7 +21,7 @@ class Ended(NamedTuple):
 
     @property
     def why(self) -> str:
-        """It failed, in one line; nothing where it did not."""
+        """Return in one line why the process failed; an empty string if it did not."""
         return self.last if self.failed else ""
 
 

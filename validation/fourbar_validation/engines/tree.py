@@ -35,12 +35,12 @@ class Tree(Loaded, Protocol):
     turns: dict[int, Array]
     """Derivatives of the bars' rotations by the coordinates, constant in the plane."""
     rows: Array
-    """Those of bars 2, 3, 4, (3, 3)."""
+    """Derivatives of the rotations of bars 2, 3, 4 as rows, (3, 3)."""
     v: Array
     a: Array
 
     def ready(self, scene: Scene, terms: list[Act]) -> None:
-        """To be called by an engine that has built its bars, with what acts on them."""
+        """Prepare the evaluation; an engine calls this once it has built its bars and what acts on them."""
         super().ready(scene, terms)
         self.alone = bool(scene.loads or scene.effects)
         self.place((0.0, 0.0, 0.0))

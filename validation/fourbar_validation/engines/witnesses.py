@@ -37,22 +37,22 @@ class Witness:
     tolerance: ErrorBound
     expected: tuple[str, ...] = COMPARED
     order: Order | None = None
-    """What measures its observed order, which is shown."""
+    """Function that measures its observed order, which is shown."""
     positions: tuple[str, ...] = ()
-    """What it is held to where the scene states positions only; nothing: it is then not started."""
+    """Quantities it must answer if the scene states positions only; if empty, it is not started for such a scene."""
     through_time: bool = False
-    """Whether it runs through the motion in time."""
+    """True if it runs through the motion in time."""
     generated: bool = False
-    """Whether it runs the generated MJCF, which is then compared as it is shipped too."""
+    """True if it runs the generated MJCF, which is then also compared as shipped."""
     predictor: Predictor | None = None
-    """What predicts, from the description, the errors to be expected beyond the tolerance."""
+    """Function that predicts, from the description, the errors to be expected beyond the tolerance."""
     residuals: bool = False
-    """Whether the engine's own residuals predict them."""
+    """True if the engine's own residuals predict the errors to be expected."""
     nearby: bool = False
-    """Whether it answers at the angle that `Command.remainder` completes, so that where an error is beyond the
+    """True if it answers at the angle that `Command.remainder` completes, so that where an error is beyond the
     tolerance it can answer again within the rounding of theta_2."""
     stated: bool = True
-    """Whether an exact engine is held to what the formulas state of the linkage too, whatever its motion."""
+    """True if an exact engine also checks what the formulas state of the linkage, independently of its motion."""
     code: str = ""
     """Hash of an adapter that the harness does not ship, so that no answer of another one is resumed."""
     library: str = ""
@@ -96,12 +96,12 @@ def _find_broken(library: str, error: BaseException) -> str:
 
 
 class Work(NamedTuple):
-    """What the time of an answer goes into."""
+    """Work that takes the time of an answer."""
 
     short: str
-    """For a legend."""
+    """Words for a legend."""
     full: str
-    """For a table."""
+    """Words for a table."""
 
 
 ONE_BY_ONE = (
@@ -133,7 +133,7 @@ WORK = {
         "each position by itself, in Python, in many digits with an error bound: pin forces and torque",
     ),
 }
-"""By witness: what is compared is not the same work."""
+"""Work of each engine, by its name: the times that are compared are not for the same work."""
 OF_A_POSITION = tuple(name for name in COMPARED if STAGE_OF[name] == "position")
 
 

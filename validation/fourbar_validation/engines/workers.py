@@ -67,7 +67,7 @@ class Worker(SpawnProcess):
 
 
 class WorkerContext(SpawnContext):
-    """What Pebble starts its processes by."""
+    """Context with which Pebble starts its processes."""
 
     Process = Worker
 
@@ -108,7 +108,7 @@ def _end_with(parent: int) -> None:
 
 
 class Workers(Protocol):
-    """What carries out tasks: processes of this machine, or the workers of a cluster."""
+    """Workers that carry out tasks: processes of this machine, or the workers of a cluster."""
 
     @property
     def in_flight(self) -> int:

@@ -19,9 +19,9 @@ class Erratum(NamedTuple):
     derivation: str
     effect: str
     reproduced: bool = True
-    """Whether making the error gives the printed digits."""
+    """True if making the error gives the printed digits."""
     transcription: bool = False
-    """Whether it may be a slip of the transcription that was read."""
+    """True if it may be a slip of the transcription that was read."""
 
 
 LISTED = tomllib.loads((Path(__file__).parent / "errata.toml").read_text(encoding="utf-8"))["erratum"]

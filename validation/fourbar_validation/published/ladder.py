@@ -19,7 +19,7 @@ HEAD = ("what its program did, one error after another", "right", "T4 [N cm]", "
 
 
 def list_ladder_rows() -> list[tuple[str, ...]]:
-    """From our answer to the two published ones, error by error, under HEAD; under a published one what is printed.
+    """List the rows from our answer to the two published ones, error by error, each of these with its printed figures.
 
     The first row is right: 309.309 N cm and (7.033, -2.121) N. The last two are what the manual and
     section 5.7 print: 308.804 N cm and (161.418, -156.506) N.

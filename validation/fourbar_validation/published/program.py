@@ -31,20 +31,20 @@ WIDTH = 2.54
 OMEGA_2 = 0.2244
 """rad/s."""
 THETA_1, THETA_2 = math.radians(225.0), math.radians(135.0)
-"""Of sections 4.12 and 5.7, the thesis's convention, rad."""
+"""Angles of sections 4.12 and 5.7 in the thesis's convention, rad."""
 CENTRE = {2: 76.5, 3: 27.5, 4: 10.0}
-"""From the bar's first pin to G, cm."""
+"""Distance from the bar's first pin to G, cm."""
 LOAD, LOAD_ARM, LOAD_ANGLE = 10.0, 5.0, math.radians(265.0)
 """Force along x on bar 2, N, and where it acts from G2, cm and rad."""
 COUPLE = -15.0
-"""On each of bars 2, 3, 4, N cm."""
+"""Couple on each of bars 2, 3, 4, N cm."""
 TO_N = 0.01
 """1 kg cm/s^2 in N, and 1 kg cm^2/s^2 in N cm."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramErrors:
-    """What the program did; all False is right."""
+    """Errors of the program; all False is right."""
 
     inertia_about_long_axis: bool = False
     mass_times_acceleration_unscaled: bool = False
@@ -122,7 +122,7 @@ class Kinematics:
         self.a_A = 100.0 * s.a_A[0]
         self.a_G = {bar: 100.0 * getattr(s, f"a_G{bar}")[0] for bar in MOVING_BARS}
         self.slip = 2.0 * CENTRE[3] * self.alpha[3] * math.sin(self.theta_3)
-        """What erratum 4 adds to the x component of A_G3/A: -(L w^2 cos - L alpha sin) for -(... + ...), eq 4.20."""
+        """Amount erratum 4 adds to the x component of A_G3/A: -(L w^2 cos - L alpha sin) for -(... + ...), eq 4.20."""
         self.arms = {  # from G; R14 points along B to O4, the thesis's theta_4
             "R12": split_components(-CENTRE[2], THETA_2),
             "R32": split_components(LENGTHS[1] - CENTRE[2], THETA_2),

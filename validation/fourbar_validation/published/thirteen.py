@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Vectors = dict[int, Array]
-"""For each bar 2, 3, 4 an array (n, 2)."""
+"""Vectors of each bar 2, 3, 4, an array (n, 2)."""
 
 
 class FreeBodies(NamedTuple):
-    """What the thirteen equations are made of."""
+    """Terms of the thirteen equations."""
 
     to_first: Vectors
-    """From the mass centre to the first pin (O2, A, O4), m."""
+    """Vectors from the mass centre to the first pin (O2, A, O4), m."""
     to_second: Vectors
-    """From the mass centre to the second pin (A, B, B), m."""
+    """Vectors from the mass centre to the second pin (A, B, B), m."""
     inertia_force: Vectors
     """m a_G minus the forces that act besides the pins', N."""
     inertia_moment: dict[int, Array]

@@ -1,1 +1,1 @@
-"""What changed since the accepted state: new, gone, better, worse, changed verdict, and what is only round-off."""
+"""Find what changed since the accepted state: new, gone, better, worse, changed verdict, and mere round-off."""

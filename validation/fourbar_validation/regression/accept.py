@@ -83,7 +83,7 @@ def _is_chosen(
     words: Callable[[str], Iterable[str]],
     renamed: Mapping[str, str] = MappingProxyType({}),
 ) -> Callable[[Row], bool]:
-    """Whether a row is of what the options name; InputError for a name that does not stand in its column.
+    """Return a test for rows that the options name; InputError for a name that does not stand in its column.
 
     `find_renamed`: of a scene with an old and a new name either means both.
     """

@@ -1,4 +1,4 @@
-"""What happened to one row from an old run to a new one."""
+"""Classify what happened to one row from an old run to a new one."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ NOTICEABLE = 1.25
 
 
 class Kind(Enum):
-    """What happened to a row; the value is the heading of the report."""
+    """Change of a row; the value is the heading in the report."""
 
     VERDICT_WORSE = "verdict got worse"
     WORSE = "worse"
@@ -51,16 +51,16 @@ class Change:
     old: Row | None
     new: Row | None
     round_off: float
-    """By how much the error may move without meaning, K eps/condition."""
+    """Change of the error that has no meaning, K eps/condition."""
 
     @property
     def regression(self) -> bool:
-        """Whether the run should fail for it."""
+        """Return whether the run should fail for it."""
         return self.kind in REGRESSIONS
 
     @property
     def severity(self) -> tuple[bool, float]:
-        """Whether it fails now, and how many times its error, or round-off, has grown."""
+        """Return whether it fails now, and by what factor its error, or round-off, has grown."""
         new = self.new
         if new is None or self.old is None:
             return new is not None and new.failed, 1.0

@@ -22,7 +22,7 @@ NAMED = 50
 """Scenes and engines listed by name that were not run or not compared; the others are counted."""
 T = TypeVar("T")
 ByScene = Iterable[tuple[str, Sequence[T]]]
-"""What is of one scene after the other, in ascending order of their names."""
+"""Items of one scene after the other, in ascending order of the scenes' names."""
 
 
 class Named:
@@ -99,17 +99,17 @@ class Differences:
 
     @property
     def changes(self) -> list[Change]:
-        """Those that are kept, by scene, engine, setting and quantity."""
+        """Return the changes that are kept, by scene, engine, setting and quantity."""
         return sorted((each for kind in Kind for each in self.of(kind)), key=lambda each: each.key)
 
     @property
     def rows(self) -> int:
-        """How many there are."""
+        """Return how many rows there are."""
         return self.kinds.total()
 
     @property
     def regressed(self) -> int:
-        """How many rows a run fails for."""
+        """Return how many rows a run fails for."""
         return sum(self.kinds[kind] for kind in REGRESSIONS)
 
     @property
@@ -124,12 +124,12 @@ class Differences:
 
     @property
     def compared(self) -> int:
-        """How many rows of the new run have their counterpart in the old one."""
+        """Return how many rows of the new run have a counterpart in the old one."""
         return self._compared.total
 
     @property
     def nothing(self) -> bool:
-        """Whether no comparison of the new run has its counterpart in the old one."""
+        """Return whether no comparison of the new run has a counterpart in the old one."""
         return self._compared.nothing
 
     @property

@@ -1,4 +1,4 @@
-"""Whose fault a regression is, and what was wrong: rows by engine and cause, scenes by who disagrees."""
+"""Locate a regression: rows by engine and cause, scenes by the engines that disagree."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -24,7 +24,7 @@ class Group:
     rows: int = 0
     scenes: int = 0
     of_scenes: int = 0
-    """Of the scenes in which the engine has rows."""
+    """Number of scenes in which the engine has rows."""
     quantities: Counter[str] = field(default_factory=Counter)
     worst: Change | None = None
 
@@ -69,7 +69,7 @@ class Fault:
             self._who[write_sentence(worse, exact), frozenset(worse)] += 1
 
     def groups(self, kinds: Iterable[Kind]) -> list[Group]:
-        """Those of some kinds, the worst first; each with the number of its engine's scenes."""
+        """Return the groups of some kinds, the worst first, each with the number of its engine's scenes."""
         wanted = set(kinds)
         result = [group for group in self._groups.values() if group.kind in wanted]
         for group in result:

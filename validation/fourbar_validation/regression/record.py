@@ -24,34 +24,34 @@ from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import find_kernels, list_versions, name_machine
 
 SHIPPED = Path(__file__).parent
-"""Where the accepted state of the models of this project is."""
+"""Folder of the accepted state of this project's models."""
 T = TypeVar("T")
 ACCEPTED = "accepted"
 TABLE, COLUMNS, ABOUT, TIMINGS = "results.csv", "results.parquet", "record.json", "timings.csv"
 TABLES = (TABLE, COLUMNS, TIMINGS)
 UNFINISHED = "run.json"
-"""What a run keeps in its folder until it is finished."""
+"""File that a run keeps in its folder until it is finished."""
 
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What a run was made with."""
+    """Versions, machine and settings with which a run was made."""
 
     versions: dict[str, str]
-    """Of what decides a number, the kernels that the CPU was given among them."""
+    """Versions of what decides a number, including the kernels chosen for the CPU."""
     machine: str
     settings: dict[str, str]
     """Engines, suite, and the factors of the tolerances."""
     scenes: dict[str, dict[str, str]] = field(default_factory=dict)
-    """What each scene asks, by its name; empty in older records and in suites too long for it."""
+    """Entries of each scene, by its name; empty in older records and in suites too long for it."""
     date: str = ""
     """UTC, ISO 8601; empty in older records."""
     commit: str = ""
-    """Of the checkout that the run was made in; empty where it is none."""
+    """Commit of the checkout that the run was made in; empty if there is none."""
 
     @property
     def engines(self) -> set[str] | None:
-        """Those that were run; None where nothing is known of it."""
+        """Return the engines that were run; None if the record does not say."""
         names = self.settings.get("engines")
         return None if names is None else set(filter(None, names.split(", ")))
 
@@ -74,7 +74,7 @@ def describe_run(
 
 
 def _find_commit() -> str:
-    """Of the folder of this harness, marked where it holds what is not committed; what CI says of itself first."""
+    """Return the commit of the harness's folder, marked if it has uncommitted changes; CI's statement goes first."""
     if stated := os.environ.get("GITHUB_SHA") or os.environ.get("CI_COMMIT_SHA"):
         return stated[:12]
     command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
@@ -134,12 +134,12 @@ class Recorded:
     about: About
     table: Path
     verified: bool = False
-    """Whether the tables are those that the record was written with; older records do not say."""
+    """True if the tables are those that the record was written with; older records do not say."""
     key: str = "RESULTS"
-    """What an error calls it: the argument or option that named it."""
+    """Name in an error message: the argument or option that named the record."""
 
     def rows(self) -> Iterator[Row]:
-        """Its rows in their order; InputError where the table is damaged."""
+        """Yield the rows in their order; InputError if the table is damaged."""
         yield from self._read(read_columns(self.table))
 
     def scenes(self, keep: Callable[[Row], bool] = lambda _: True) -> Iterator[tuple[str, list[Row]]]:

@@ -9,7 +9,7 @@ from fourbar_validation.report.junit import JunitCase, count_beyond, write_docum
 from fourbar_validation.report.templating import render, write_number
 
 SHOWN = tuple(kind for kind in Kind if kind not in (Kind.SAME, Kind.ROUND_OFF, Kind.NOT_RUN, *OTHER_QUESTION))
-"""By engine and cause; what was not run, or is another question, is named as a whole."""
+"""Kinds shown by engine and cause; rows that were not run, or ask another question, are named together."""
 AT_MOST = 50
 """Engines and causes listed in text and Markdown."""
 HEADINGS = (

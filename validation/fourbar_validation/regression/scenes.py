@@ -1,4 +1,4 @@
-"""What a scene states, as flat entries of its file in SI: two runs are compared where it is the same."""
+"""Flatten a scene's file into entries in SI: two runs are compared where these are the same."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -49,7 +49,7 @@ def _flatten(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
 
 @dataclass(frozen=True, slots=True)
 class SceneChange:
-    """What a scene states now, and what it stated."""
+    """Entries that a scene states now and stated before."""
 
     scene: str
     entries: tuple[tuple[str, str, str], ...]
@@ -57,7 +57,7 @@ class SceneChange:
 
     @property
     def positions_alone(self) -> bool:
-        """Whether the question is the same, at other positions."""
+        """Return whether the question is the same, at other positions."""
         return all(key.startswith(WHERE) for key, _, _ in self.entries)
 
     def __str__(self) -> str:

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 
 class Style(NamedTuple):
-    """How an engine is drawn: marks tell the engines apart in grey."""
+    """Colours and mark of an engine; marks tell the engines apart in grey."""
 
     colour: str
     dark: str
-    """The same on dark pages."""
+    """Colour on dark pages."""
     marker: str
     symbol: str
     """The mark as a character, for legends in text."""
@@ -37,9 +37,9 @@ STYLES = {
 _COLOURS = (("#7a6a00", "#d9c64a"), ("#7b4fc9", "#c3a6ff"), ("#9a5b00", "#f0b060"))
 _MARKS = (("P", "✚"), ("X", "✖"), ("*", "★"), ("p", "⬟"))
 OTHERS = tuple(Style(*_COLOURS[n % 3], *_MARKS[n % 4]) for n in range(12))
-"""Of engines that are not named above, one after the other."""
+"""Styles of engines that are not named above, one after the other."""
 NUMBERS: dict[str, int] = {}
-"""Which of them an engine has; as a run numbers its witnesses, else by who is drawn first."""
+"""Number of each engine's style among them, as a run numbers its engines, otherwise in the order of drawing."""
 INK, SOFT, GRID, BAND, ALLOWED, PAPER = "#1b1f24", "#57606a", "#d0d7dd", "#c3cad3", "#6e7781", "#fefefe"
 VARIABLES = {
     "#000000": ("--ink", "#e6edf3"),

@@ -34,7 +34,7 @@ PLOT_COLOURS = {
 }
 """Colours of `fourbar plot`, and the page's own that take their place."""
 MOTION_AND_FORCE = ("theta_4", "F32")
-"""Of a released linkage: its torque is rounding."""
+"""Quantities shown of a released linkage, whose torque is mere rounding."""
 SUBSCRIPT = str.maketrans("234", "₂₃₄")
 
 

@@ -34,7 +34,7 @@ class Cell(NamedTuple):
 
     @property
     def shown(self) -> str:
-        """What stands in its cell."""
+        """Return the text of its cell."""
         return {"refuses": "refuses", "undecided": "undecided"}.get(self.kind, write_share(self.used))
 
 
@@ -68,7 +68,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class SceneView:
-    """What the page shows of one scene."""
+    """Data of one scene that the page shows."""
 
     scene: Record
     cells: list[Cell]
@@ -83,7 +83,7 @@ class SceneView:
 
     @property
     def counts(self) -> Counts:
-        """Its comparisons by verdict."""
+        """Return its comparisons by verdict."""
         return Counts(cell.row for cell in self.cells)
 
 

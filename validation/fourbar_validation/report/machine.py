@@ -1,4 +1,4 @@
-"""Where a run was made, and with what: versions, machine, this code, and the build of each engine."""
+"""Describe where and with what a run was made: versions, machine, this code, and the build of each engine."""
 
 import ctypes
 import hashlib
@@ -14,7 +14,7 @@ from fourbar_validation.places import FORMULAS, PACKAGE
 PACKAGES = {"fourbar": "fourbar", "numpy": "numpy", "mujoco": "mujoco", "pinocchio": "pin", "scipy": "scipy"}
 """Name in the report and name of the distribution."""
 DISTRIBUTIONS = PACKAGES | {name: name for name in ("drake", "exudyn", "opensim")}
-"""With those that need not be there."""
+"""Distribution of each package, including those that need not be installed."""
 CODE = (".py", ".toml")
 """Endings of the files that numbers come from; templates and accepted states change none."""
 BUILT = (".so", ".pyd", ".dylib", ".py")

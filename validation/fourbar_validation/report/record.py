@@ -1,4 +1,4 @@
-"""What is known of one scene once it is judged: one record, whatever it is read for."""
+"""Record what is known of one scene once it is judged, for every form of the report."""
 
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -23,7 +23,7 @@ class Timing:
 
 @dataclass(slots=True)
 class Record:
-    """What is known of one scene: while it is judged all that its picture needs, then what is small and storable."""
+    """Record of one scene: while it is judged all that its picture needs, afterwards the small and storable part."""
 
     name: str
     scene: Scene | None = None
@@ -33,7 +33,7 @@ class Record:
     timings: list[Timing] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     reversals: list[str] = field(default_factory=list)
-    """Where dry friction reverses and the pin forces jump, in words."""
+    """Positions where dry friction reverses and the pin forces jump, in words."""
     independence: dict[str, tuple[str, str]] = field(default_factory=dict)
     """engine: (shared with the formulas, found alone)."""
     evidence: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -46,7 +46,7 @@ class Record:
     jumps: list[Reversal] = field(default_factory=list)
 
     def kept(self, figure: str | None = None) -> "Record":
-        """Without the scene, the solution and the answers."""
+        """Return a copy without the scene, the solution and the answers."""
         return replace(
             self,
             independence={answer.engine: (answer.shared, answer.own) for answer in self.answers if answer.own},
@@ -68,7 +68,7 @@ class Record:
 
     @classmethod
     def restore(cls, kept: dict[str, Any]) -> "Record":
-        """From what `kept_all` gave."""
+        """Return the record from the data that `kept_all` returned."""
         rows = [Row(*row) for row in kept["rows"]]
         timings = [Timing(**timing) for timing in kept["timings"]]
         independence = {engine: (shared, own) for engine, (shared, own) in kept["independence"].items()}

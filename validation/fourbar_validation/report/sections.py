@@ -50,7 +50,10 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
 
 
 def collect_hard_cases(rows: Iterable[Row], picture: str | None = None) -> Section:
-    """Of a run of the hard suite; `picture`: the inline SVG of `fourbar_validation.report.hard_picture`."""
+    """Collect the section on a run of the hard suite.
+
+    `picture` is the inline SVG of `fourbar_validation.report.hard_picture`.
+    """
     counts = {family.name: Counts() for family in FAMILIES}
     scenes: dict[str, set[str]] = {family.name: set() for family in FAMILIES}
     for row in rows:

@@ -1,4 +1,4 @@
-"""What every form of the report says, computed once from its scenes."""
+"""Compute once, from the scenes, what every form of the report says."""
 
 import math
 import re
@@ -76,7 +76,7 @@ class EngineCost:
     times_formulas: float
     microseconds_per_position: float
     work: str
-    """What it did for that."""
+    """Work that it did in that time."""
 
 
 OWN = "our own consistency"
@@ -118,7 +118,7 @@ class Summary:
         self.independence: dict[str, tuple[str, str]] = {}
         """engine: (shared with the formulas, found alone)."""
         self.tolerances: Sequence[ErrorBound] = (IDENTITY, EQUIVALENCE, SIMULATED)
-        """What the witnesses were held to."""
+        """Tolerances of the engines."""
         self.missing: Sequence[tuple[str, str]] = ()
         """(engine, why it could not run here)."""
         self._engines: dict[str, EngineLine] = {}
@@ -180,7 +180,7 @@ class Summary:
 
     @property
     def loosest(self) -> str:
-        """How many quantities nobody judges tighter than degraded as predicted, and the worst, in one sentence."""
+        """Say how many quantities no engine judges tighter than degraded as predicted, and name the worst."""
         if not self.loose:
             return ""
         worst = nlargest(LOOSEST_SHOWN, self._loosest, key=ALLOWANCE)
@@ -189,7 +189,7 @@ class Summary:
 
     @property
     def good(self) -> bool:
-        """Whether all that was to be compared was, and holds."""
+        """Return whether everything that was to be compared was compared, and holds."""
         return self.counts.status == HOLDS and not self.missing
 
     @property
@@ -202,7 +202,7 @@ class Summary:
 
     @property
     def worst(self) -> list[Worst]:
-        """By scene and engine; of more than WORST_SHOWN those that used most of their allowance, in that order."""
+        """Return the worst by scene and engine; of more than WORST_SHOWN those that used most, in that order."""
         if self.judged > WORST_SHOWN:
             return nlargest(WORST_SHOWN, self._worst, key=lambda w: w.used)
         return sorted(self._worst, key=lambda w: (w.row.scene, w.row.engine, w.row.setting))
@@ -217,7 +217,7 @@ class Summary:
 
     @property
     def costs(self) -> list[EngineCost]:
-        """What each engine took, by the kind of its setting."""
+        """Return the time each engine took, by the kind of its setting."""
         return [
             EngineCost(
                 engine,
@@ -242,7 +242,7 @@ class Summary:
 
     @property
     def pictured(self) -> list[Record]:
-        """Those of them that have pictures: all that fail, and of the others those that used most."""
+        """Return the scenes that have pictures: all that fail, then those that used most of their allowed error."""
         return self._find_most_used(PICTURED)
 
     def _find_most_used(self, most: int) -> list[Record]:
@@ -264,7 +264,7 @@ def compute_shares(rows: Sequence[Row]) -> list[float]:
 
 
 def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
-    """How many quantities were compared, and of each that every row calls degraded the row that allows least."""
+    """Count the quantities compared, and return the row that allows least of each that every row calls degraded."""
     by_quantity: dict[str, list[Row]] = {}
     for row in rows:
         if row.compared:

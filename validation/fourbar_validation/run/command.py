@@ -21,7 +21,7 @@ from fourbar_validation.scenes.random import DrawnType
 
 ALL_TYPES = ",".join(kind.value for kind in DrawnType)
 STAGES = {int: "judging", Collected: "collecting", Pictured: "drawing"}
-"""What the progress says."""
+"""Names of the stages in the progress line."""
 EXCLUDED = (
     ("--random", "scenes", "judges random linkages; leave out the scene files"),
     ("--suite", "scenes", "has its own scenes; leave out scene files and --random"),

@@ -86,7 +86,7 @@ def _check_sweep(question: Question) -> Row:
 
 
 def _make_row(question: Question, quantity: str, equation: str, error: Array, where: Mask) -> Row:
-    """By how much an equation is missed, in parts of its terms, where it is worst."""
+    """Make the row of an equation from its error, in parts of its terms, where it is worst."""
     condition = 1.0 / count_half_turns(question.scene.linkage.ground_angle, question.at.angle)
     reason = f"identity: {equation}" if where.any() else NOWHERE
     return question.row(quantity, error, IDENTITY.factor / condition, reason, where, condition)
@@ -254,7 +254,7 @@ def compare_status(
 
 
 def _mark_large(scene: Scene, reference: Solution) -> Mask:
-    """Where numbers are so large that the formulas may have to give up, (n,)."""
+    """Mark where numbers are so large that the formulas may have to give up, (n,)."""
     large = np.full(len(reference), max(scene.linkage.lengths) > LARGE or min(scene.linkage.lengths) < 1.0 / LARGE)
     for name in ("omega_2", "alpha_2", *STAGES, "F12", "F43"):
         values = getattr(reference, name)

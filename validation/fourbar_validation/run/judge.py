@@ -32,11 +32,11 @@ class Check(NamedTuple):
 
     rows: Callable[[Question], Iterable[Row]]
     shipped: bool = False
-    """Whether it is of something shipped besides `solve`: the engine of its rows, by its own name."""
+    """True if it checks something shipped besides `solve`: the engine of its rows, by its own name."""
     free: bool = False
-    """Whether it is of a free motion, the others of a prescribed one."""
+    """True if it checks a free motion, False for a prescribed one."""
     theta_2: str = ""
-    """What of it takes a command of theta_2, where another leaves it out."""
+    """Part of it that needs a command of theta_2, and is left out with another command."""
 
 
 CHECKS = (

@@ -1,4 +1,4 @@
-"""What is printed and no engine answers: error bars, the residual of friction, the law of the motion, long sweeps."""
+"""Check what is printed and no engine answers: error bars, the residual of friction, the motion's law, long sweeps."""
 
 from collections.abc import Iterator
 from dataclasses import replace

@@ -24,7 +24,7 @@ from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.report.record import Record, Timing
 
 FREE_BODY = next(witness for witness in WITNESSES if witness.name == FreeBody.name)
-"""By its answer every other one is checked: nothing is allowed on the word of the formulas alone."""
+"""The free-body solution supplies the condition numbers, so that no allowed error depends on the formulas it tests."""
 
 
 class NotAskedError(Exception):
@@ -39,18 +39,18 @@ class Question:
     scene: Scene
     at: Command
     witnesses: Sequence[Witness] = ()
-    """Those that are to answer."""
+    """Engines that are to answer."""
     order: bool = False
-    """Whether the observed order of what is simulated is wanted: two more simulations."""
+    """True if the observed order of what is simulated is wanted, which takes two more simulations."""
     output: dict[str, str] = field(default_factory=dict)
-    """What each engine printed."""
+    """Text that each engine printed."""
     left_out: list[str] = field(default_factory=list)
-    """What is not compared, and why."""
+    """Comparisons left out, each with the reason."""
     timings: list[Timing] = field(default_factory=list)
     jumps: list[Reversal] = field(default_factory=list)
-    """Where dry friction reverses and the pin forces jump."""
+    """Positions where dry friction reverses and the pin forces jump."""
     answered: dict[str, tuple[Answer, float]] = field(default_factory=dict)
-    """By witness: its answer and the seconds that it took."""
+    """Answer of each engine, by its name, and the seconds that it took."""
     scales: Scales = field(default_factory=dict)
     """Size and condition of each quantity that was compared."""
     started: dict[str, Engine] = field(default_factory=dict)
@@ -63,7 +63,7 @@ class Question:
 
     @cached_property
     def solution(self) -> Solution:
-        """What the formulas answer."""
+        """Return the answer of the formulas."""
         return self.solve()
 
     @cached_property

@@ -49,7 +49,7 @@ ENGINES = {
     "mujoco-forward": (_answer_mujoco, 1e-3, "mujoco"),
     "pinocchio-forward": (_answer_pinocchio, 2e-3, "pinocchio"),
 }
-"""What starts it with a step, longest step (s) and library of each engine that integrates by itself."""
+"""Engines that integrate by themselves: function that starts one with a step, longest step (s), and library."""
 LONGEST_STEP = 2e-3
 """s, of a guest."""
 FULL = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10, "stopped_at": 1e-9}

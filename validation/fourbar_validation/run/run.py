@@ -32,7 +32,8 @@ from fourbar_validation.scenes.suites import Files, Suite
 
 WORKERS = 2
 SAMPLE = 30
-"""What else is shipped takes as long to judge in a scene as thirty scenes: of 10 000 random ones it is a tenth more."""
+"""Scenes in which everything else that is shipped is judged. In a scene that takes as long as judging thirty scenes:
+a tenth more for 10 000 random ones."""
 CHUNK = {True: 1, False: 20}
 """Scenes per task: one where something is simulated or drawn (a second each), else twenty (a second together)."""
 MOST_PARTS = 10_000
@@ -49,21 +50,22 @@ class Pictured(int):
 
 
 OUTCOME = (TABLE, COLUMNS, ABOUT, "timings.csv", "report.md", "report.html", OUTPUT)
-"""What a run ends with: of an earlier one it goes first, so that none is taken for that of a run that ended early."""
+"""Files that a run ends with. A run first removes those of an earlier run, so that none passes for its own if it ends
+early."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """How a suite is run; but for the sample none of it changes a result."""
+    """Options of a run; only the sample changes a result."""
 
     workers: int = WORKERS
     """Processes of this machine."""
     scheduler: str | None = None
     """Address of a Dask scheduler, whose workers are used instead."""
     seconds: float | None = None
-    """After which a scene hangs."""
+    """Seconds after which a scene counts as hanging."""
     drawn: bool = True
-    """With pictures, of a long suite at the end, of the scenes that fail and those nearest to it."""
+    """True for pictures; a long suite has them at the end, of the scenes that fail or come nearest to failing."""
     sample: int = SAMPLE
     """Scenes, evenly chosen, of which what else is shipped is judged."""
 

@@ -1,4 +1,4 @@
-"""What a run is of: which scenes, of which types, by which witnesses."""
+"""Select what a run judges: scenes, their types, and engines."""
 
 from collections.abc import Sequence
 from pathlib import Path

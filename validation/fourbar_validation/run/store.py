@@ -31,7 +31,7 @@ class Store:
         self._identity = json.dumps(identity, indent=1, sort_keys=True) + "\n"
         self._run = hashlib.sha256(self._identity.encode()).hexdigest()
         self.notes: list[str] = []
-        """What of an earlier run is made again, and why."""
+        """Parts of an earlier run that are made again, each with the reason."""
 
     @contextmanager
     def held(self) -> Iterator["Store"]:

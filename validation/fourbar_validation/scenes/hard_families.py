@@ -208,7 +208,7 @@ class Family:
 
     name: str
     statement: str
-    """What must happen; printed with every scene of the family."""
+    """Statement of what must happen; printed with every scene of the family."""
     scenes: Callable[[], Scenes]
 
 

@@ -1,4 +1,4 @@
-"""Where the singular positions of a linkage lie, by the cosine rule on the collinear triangle."""
+"""Find the singular positions of a linkage by the cosine rule on the collinear triangle."""
 
 import math
 from dataclasses import replace

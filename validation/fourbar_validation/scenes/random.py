@@ -19,7 +19,7 @@ Draw = Callable[[np.random.Generator], float]
 
 
 def draw_uniform(low: float, high: float) -> Draw:
-    """Between two numbers."""
+    """Return a draw that is uniform between two numbers."""
     return lambda rng: float(rng.uniform(low, high))
 
 
@@ -44,20 +44,20 @@ ANY_SPEED = draw_decades(-1.0, 2.0)
 
 @dataclass(frozen=True, slots=True)
 class Ranges:
-    """What a random scene is drawn from."""
+    """Distributions from which a random scene is drawn."""
 
     mass: Draw
     """kg per metre of bar, or kg."""
     inertia: Draw
-    """About G, of mass times length squared."""
+    """Moment of inertia about G, in parts of mass times length squared."""
     centre: Draw
-    """Of the length."""
+    """Distance of the mass centre, in parts of the length."""
     centre_angle: Draw
     ground_angle: Draw = ANY_ANGLE
     load: Draw = ANY_PART
-    """Of a force, of the weight of all bars; of a moment, of that weight at the bar's length."""
+    """Load: a force in parts of the weight of all bars, a moment in parts of that weight at the bar's length."""
     arm: Draw = ANY_PART
-    """Where a load acts, from G, of the length."""
+    """Distance from G at which a load acts, in parts of the length."""
     without_force: float = 0.0
     """Share of the loads that are a moment alone."""
     speed: Draw = ANY_SPEED
@@ -71,11 +71,11 @@ class Ranges:
     sprung: float = 0.0
     """Share of the scenes that have a spring; likewise of a torsion spring, and of a flywheel."""
     by_length: bool = True
-    """Whether the mass is per metre."""
+    """True if the mass is per metre."""
 
 
 class DrawnType(Enum):
-    """What the input and output of a linkage do."""
+    """Type of a linkage by the motion of its input and output."""
 
     CRANK_ROCKER = "crank-rocker"
     DRAG_LINK = "drag-link"
@@ -90,7 +90,7 @@ SHORTEST = {
     DrawnType.DOUBLE_ROCKER: 2,
     DrawnType.ROCKER_CRANK: 3,
 }
-"""Which of (ground, input, coupler, output) is the shortest bar of a Grashof linkage of that type."""
+"""Index in (ground, input, coupler, output) of the shortest bar of a Grashof linkage of each type."""
 UNEVEN_TYPE = "uneven"
 """Named in place of types: see `draw_uneven_scene`."""
 POSITIONS = 37

@@ -1,4 +1,4 @@
-"""Which scenes a run judges: the named mechanisms of `models/`, the files given, or random linkages."""
+"""Collect the scenes that a run judges: the named mechanisms of `models/`, the files given, or random linkages."""
 
 import hashlib
 import math
@@ -19,9 +19,9 @@ from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
 MOST_POSITIONS = 100_000
-"""Of a scene in a run, where every engine solves each of them: 3 ms each, with all engines."""
+"""Most positions of a scene in a run, where every engine solves each of them: 3 ms each, with all engines."""
 MOST_SECONDS = 100.0
-"""Of a free motion in a run: the engines go through it in steps of 1 to 4 ms, a second in about a second."""
+"""Longest free motion in a run, s: the engines go through it in steps of 1 to 4 ms, a second in about a second."""
 AS_LONG_AS = 100
 """Positions that take as long as a second of free motion, generously."""
 

@@ -1,4 +1,4 @@
-"""What is attached to the bars of a compiled MJCF: actuators that are loads, tendons, limits."""
+"""Describe what is attached to the bars of a compiled MJCF: actuators that are loads, tendons, limits."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ Value = float | str | tuple[float, ...]
 Described = dict[str, Value]
 ACTUATOR_RANGES = ("actuator_forcerange", "actuator_ctrlrange", "actuator_actrange")
 DRIVE = {"actuator_damping": "drive damping", "actuator_dampingpoly": "drive damping of higher order"}
-"""Of an actuator on the crank, what remains when its gain and bias are taken off."""
+"""Fields of an actuator on the crank that remain when its gain and bias are taken off."""
 
 
 def read_row(model: mujoco.MjModel, field: str, row: int, key: str) -> Described:

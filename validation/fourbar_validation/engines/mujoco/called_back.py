@@ -1,4 +1,4 @@
-"""What MJCF cannot express, supplied to MuJoCo at each stage of a step: loads over theta_2, the acceleration of a law.
+"""Supply MuJoCo at each stage of a step with what MJCF cannot express: loads over theta_2, the acceleration of a law.
 
 Both come from the description alone, at MuJoCo's own angle and time; nothing of the formulas is passed.
 """

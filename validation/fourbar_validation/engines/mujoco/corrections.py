@@ -188,4 +188,4 @@ EDITS: Mapping[str, Edit] = {
     "option": _correct_option,
     "contacts": _correct_contacts,
 }
-"""By the first word of a key; actuators and tendons cannot be made of nothing in a compiled model."""
+"""Corrections by the first word of a key; actuators and tendons cannot be added to a compiled model."""

@@ -1,4 +1,4 @@
-"""What a compiled MJCF says of a four-bar, under names that two models can be compared by."""
+"""Describe the four-bar of a compiled MJCF under names by which two models can be compared."""
 
 import math
 from typing import Any

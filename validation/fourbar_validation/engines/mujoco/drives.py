@@ -16,7 +16,7 @@ WHEEL = 1e8
 POSITION_GAIN, VELOCITY_GAIN = 1e6, 1e4
 """kp of the stiff servo, per (inertia omega^2), and kv of servo and velocity actuator, per (inertia omega)."""
 GENTLE_GAIN = 1.0
-"""Of position and of speed, that an explicit integrator can follow: the drive droops."""
+"""Gain of position and of speed that an explicit integrator can follow; the drive droops."""
 
 
 class Softened(ClosedLoop):
@@ -82,7 +82,7 @@ class Actuated(Driven):
 Servo = partial(Actuated, position=POSITION_GAIN, velocity=VELOCITY_GAIN)
 GentleServo = partial(Actuated, position=GENTLE_GAIN, velocity=GENTLE_GAIN)
 VelocityActuator = partial(Actuated, position=0.0, velocity=VELOCITY_GAIN)
-"""It droops, so the motion that happened is what is compared."""
+"""Drive that holds the speed. It droops, so the motion that happened is compared."""
 GentleVelocityActuator = partial(Actuated, position=0.0, velocity=GENTLE_GAIN)
 
 
@@ -122,7 +122,7 @@ class WheelEquality(Driven):
 
 
 StiffWheelEquality = partial(WheelEquality, softness=1e-8)
-"""Its softness edited down as far as the closure's is by the pads."""
+"""Drive by a wheel equality whose softness is edited down as far as the pads do it for the closure."""
 
 
 def remove_attributes(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str:

@@ -1,4 +1,4 @@
-"""Which body of somebody's MJCF is which bar, where nobody says: what hangs together as a four-bar, and its lengths."""
+"""Guess which body of a MJCF is which bar, if not stated, from bodies connected as a four-bar, and its lengths."""
 
 import math
 from collections.abc import Mapping, Sequence

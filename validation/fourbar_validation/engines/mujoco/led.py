@@ -34,7 +34,7 @@ steps of a window, which are those of the fastest throughout; here they are 40 0
 
 
 class Lead:
-    """What is commanded in place of the input, and how the input then moves at each position."""
+    """Command of another bar or of the stroke, and how the input then moves at each position."""
 
     def __init__(self, scene: Scene, command: Command) -> None:
         motion = scene.motion
@@ -43,7 +43,7 @@ class Lead:
         still = replace(take_full_size(scene), motion=Motion(0.0, 1.0))
         self.loop = loop = ClosedLoop(write_mjcf(still, replace(RECIPE, timestep=1e-3), keyframe=False))
         self.bar = None if command.stroke is not None else command.bar
-        """None: the stroke."""
+        """Number of the commanded bar; None if the stroke is commanded."""
         if command.stroke is not None:
             command = find_angle(command, motion, *loop.cylinder(command.bar))
         self.command, self.values = command, command.angle if command.stroke is None else command.stroke

@@ -19,7 +19,7 @@ PIN = {
     "dof_solref": "solreffriction",
     "dof_solimp": "solimpfriction",
 }
-"""Of a hinge, as they stand: field of MjModel, attribute in MJCF."""
+"""Hinge properties as pairs (field of MjModel, attribute in MJCF)."""
 TENDON = {
     "tendon_stiffness": "stiffness",
     "tendon_stiffnesspoly": "stiffness of higher order",
@@ -56,7 +56,7 @@ RANGES = {
 }
 """Each with the field that says whether it holds."""
 COUNTED = {"nflex": "flexes", "nplugin": "plugins"}
-"""What the generated file never has: one of them is a difference, whatever it is made of."""
+"""Elements that the generated file never has: any of them is a difference."""
 
 _KEYS = {"jnt": "pins", "dof": "pins", "tendon": "tendons", "actuator": "actuators"}
 _DIRECT = {**PIN, **TENDON, **ACTUATOR, **{field: name for field, (_, name) in RANGES.items()}}
@@ -156,7 +156,7 @@ CANNOT_ACT = {
         ("actuator_gain*", "actuator_ctrlspec", "actuator_delay", "actuator_history"), "no control is given"
     ),
 }
-"""What moves no bar and bears on no pin, and why."""
+"""Fields that move no bar and bear on no pin, each with the reason."""
 
 FLAGS = {
     **dict.fromkeys(("GRAVITY", "SPRING", "DAMPER", "PASSIVE", "FRICTIONLOSS", "LIMIT"), "counts in the values"),

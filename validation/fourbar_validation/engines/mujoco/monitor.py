@@ -1,4 +1,4 @@
-"""What a simulation can say of its own error: the loop's residuals, the power balance, and what both do to the answer.
+"""Monitor a simulation's own error: the loop's residuals, the power balance, and what both do to the answer.
 
 A small closure gap proves little: an explicit step with a closure stiffer than it can follow holds
 the gap at micrometres while accelerations and forces are anything. At every sample this asks
@@ -26,7 +26,7 @@ from fourbar_validation.engines.tree import solve_multipliers
 
 @dataclass(frozen=True, slots=True)
 class ResidualLimit:
-    """What a residual may be, and why."""
+    """Greatest allowed value of a residual, and the reason."""
 
     value: float
     reason: str
@@ -52,7 +52,7 @@ OF_THE_DATA = {
     "closure_gap": ResidualLimit(1e-5, "of the sum of the lengths: the loop is open"),
     "speed_error": ResidualLimit(1e-4, "of the greatest speed: the crank does not turn as commanded"),
 }
-"""What the data of the simulation tell without a second look."""
+"""Limits of the residuals that the data of the simulation state directly."""
 
 
 def list_alarms(evidence: dict[str, float], size: float) -> list[str]:
@@ -76,16 +76,16 @@ class _Motion:
     gap: Array
     """B on bar 3 minus B on bar 4, (2,), m."""
     slip: Array
-    """Its rate, m/s."""
+    """Rate of the gap, m/s."""
     jerk: Array
-    """Its second derivative, m/s^2."""
+    """Second derivative of the gap, m/s^2."""
     a_B: Array
     jacobian: Array
     """Derivative of the gap by the joint angles, (2, 3)."""
     drive: Array
     """Derivative of the driven bar's rotation, or of the cylinder's stroke, by the joint angles, (3,)."""
     needed: Array
-    """What the motion asks for in each joint beyond loads and effects, (3,), N m."""
+    """Torque that the motion needs in each joint beyond loads and effects, (3,), N m."""
     answer: dict[str, Array]
     """theta, omega, alpha of bars 3 and 4, and what inverse dynamics makes of the motion."""
 

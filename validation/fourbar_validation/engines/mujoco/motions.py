@@ -25,7 +25,7 @@ class Steady:
     """
 
     bar: int | None = 2
-    """Whose motion it is; None: the stroke's."""
+    """Number of the bar that moves so; None for the stroke."""
 
     def __init__(self, theta_2: Array, segment: Sequence[int], omega: float, alpha: float) -> None:
         self.theta_2 = theta_2

@@ -16,8 +16,8 @@ from fourbar_validation.engines.mujoco.runner import Stepper
 
 NAME = "mujoco-forward"
 TIME_CONSTANT_STEPS = 2.0
-"""Of the loop's closure, in timesteps. Through change points the closure takes energy out: 1e-6 of it in ten seconds at
-1 ms with 2, three hundred times as much with 10."""
+"""Time constant of the loop's closure, in timesteps. Through change points the closure takes energy out: 1e-6 of it in
+ten seconds at 1 ms with 2, three hundred times as much with 10."""
 FRICTION = (mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF, mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON)
 
 
@@ -62,7 +62,7 @@ class MujocoForward:
 
 
 class _Work:
-    """What loads, damping and dry friction do to the bars, by MuJoCo's own powers at the ends of each step, J."""
+    """Work of loads, damping and dry friction on the bars, by MuJoCo's own powers at the ends of each step, J."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float) -> None:
         self.model, self.data, self.timestep, self.done = model, data, timestep, 0.0

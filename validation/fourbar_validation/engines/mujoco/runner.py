@@ -39,7 +39,7 @@ class Stepper:
 
     @property
     def time(self) -> float:
-        """What the model's own time must be, s."""
+        """Return what the model's own time must be, s."""
         return self.done * self.timestep
 
     def lost(self) -> bool:

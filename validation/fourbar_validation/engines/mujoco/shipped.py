@@ -22,7 +22,7 @@ is 1e-4 and less MuJoCo is not run."""
 STEPS = 200
 """A servo of two steps' time constant has brought the input to its speed to e^-100 by then."""
 SPEED = 100.0 * SIMULATED.factor
-"""Of the speed: what loads and the closure make of it in as many steps, ten times what was measured."""
+"""Allowed error of the speed, from loads and the closure in as many steps; ten times what was measured."""
 
 
 def compare_shipped(name: str, scene: Scene, at: Command) -> Row | None:

@@ -41,11 +41,11 @@ SHARED = (
 )
 OWN = "assembly, velocities at the start, the motion through time, accelerations, drive torque, pin forces"
 FINE = np.radians(2.0)
-"""Between positions further apart than this the loop is tried for closure."""
+"""Greatest step between positions at which the loop is tried for closure, rad."""
 COLLINEAR = 1e-9
 """Part of the sum of the lengths, and of half a turn: below what the time step itself can resolve."""
 OF_TENDON = ("stroke", "stroke_speed")
-"""What MuJoCo has of a cylinder."""
+"""Quantities of a cylinder that MuJoCo has."""
 RESIDUALS = ("closure_gap_m", "speed_error", "time_went_back", "bad_states", "solver_iterations", "steps")
 
 

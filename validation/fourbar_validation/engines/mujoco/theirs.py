@@ -50,7 +50,7 @@ MOST_KEYFRAMES = 100_000
 
 @dataclass(slots=True)
 class Examined:
-    """What was found of one file."""
+    """Results of examining one file."""
 
     described: Described
     called: dict[str, str]

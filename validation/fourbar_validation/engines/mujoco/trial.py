@@ -33,7 +33,7 @@ SHORTEST = 3.0
 LONGEST = 400.0
 """Beyond it nothing is gained above 1e-12, and the loop is no longer held together over a revolution."""
 ORDER = 4.0
-"""Of RK4; the first guess of the next number of steps, not what decides."""
+"""Order of RK4, for the first guess of the next number of steps; it decides nothing."""
 FIRST_STEPS, FIRST_ERROR = 60.0, 1e-5
 """Steps per revolution from which the search begins, by the order, for other errors."""
 FEWEST_STEPS = 6.0
@@ -41,7 +41,7 @@ FEWEST_STEPS = 6.0
 FLYWHEEL = 1e5
 """Lighter than the recipe's: the torque, armature times acceleration, is rounded in proportion to it."""
 Build = Callable[[str, float], ClosedLoop]
-"""From the MJCF text and the speed to keep (rad/s) to the loop that is stepped."""
+"""Function from the MJCF text and the speed to keep (rad/s) to the loop that is stepped."""
 
 
 def guess(error: float) -> tuple[float, float]:

@@ -1,1 +1,1 @@
-"""What is shipped besides `solve` by NumPy: judged through its public calls, by other means than its own."""
+"""Judge what is shipped besides `solve` by NumPy, through its public calls and by other means than its own."""

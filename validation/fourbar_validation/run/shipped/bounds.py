@@ -16,15 +16,15 @@ from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import ask_free_bodies, make_row, move_numbers
 
 GIVEN = 1e-4
-"""Of a length: the tolerance that the run gives it."""
+"""Tolerance that the run gives a length, in parts of it."""
 INSIDE = 1.0 - 1e-12
-"""Of a tolerance: the corners that are tried are not beyond it, whatever is rounded."""
+"""Part of a tolerance at which corners are tried, so that no rounding puts one beyond it."""
 MOST = 3
 """Tolerances at whose corners linkages are tried; of more the first."""
 POSITIONS = 361
-"""Of the interval; a smooth curve falls off by 1e-4 of its size from its peak to the next of them."""
+"""Positions in the interval; a smooth curve falls off by 1e-4 of its size from its peak to the next position."""
 LEAST_CONDITION = 0.05
-"""Where the interval comes nearer to a singular position than this, the boxes become too many for a run."""
+"""Least condition in the interval; nearer to a singular position the boxes become too many for a run."""
 BOUNDS = ErrorBound(
     "proven bounds",
     "1e-8 of the largest value: ten times what the enclosure promises, and what rounding costs the free bodies at "

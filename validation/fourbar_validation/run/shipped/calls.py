@@ -26,9 +26,9 @@ from fourbar_validation.run.shipped.variants import (
 )
 
 MEMBERS = 5
-"""As many as positions: a square study, whose axes nothing but its numbers tells apart."""
+"""Members of the study, as many as positions: a square study, whose axes only its numbers tell apart."""
 APART = 1e-2
-"""By what part its numbers differ from member to member, of angles in rad."""
+"""Difference of its numbers from member to member, relative, for angles in rad."""
 CORNERS = (0.07, 2.3, 4.1, 0.07 + 2.0 * np.pi)
 """rad from the first position; where the table of a load that the run adds is bent."""
 

@@ -37,16 +37,16 @@ class FileBody(NamedTuple):
 
 
 class Contents(NamedTuple):
-    """What a file says of a linkage."""
+    """Statements of a file on a linkage."""
 
     bodies: dict[str, FileBody]
     pins: dict[str, complex]
-    """In the world; NaN where the two bars of a pin do not meet."""
+    """Places of the pins in the world; NaN if the two bars of a pin do not meet."""
     turns: list[dict[str, float]]
     """Every statement of the angles of all bars, rad: of the bodies, of the joints, in words."""
     gravity: complex
     damping: dict[str, float]
-    """By pin, as the next."""
+    """Damping by pin, as the next field."""
     friction: dict[str, float]
 
 

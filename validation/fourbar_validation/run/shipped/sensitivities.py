@@ -26,7 +26,7 @@ from fourbar_validation.run.shipped.variants import (
 )
 
 STEP = 1e-4
-"""Of each number, of an angle in rad: what the fourth order leaves out and what rounding adds are then alike."""
+"""Relative step of each number, for an angle in rad: truncation at fourth order and rounding are then about equal."""
 SMALL = 1e-8
 """Step of the first order that tolerances are held to: rounding adds 1e-7, and what bends a curve nothing."""
 CONVERGED = 1e-5
@@ -39,9 +39,9 @@ DIFFERENCES = ErrorBound(
     1e-7,
     conditioned=False,
 )
-"""What the derivatives along one direction in which every number changes are held to."""
+"""Tolerance of the derivatives along one direction in which every number changes."""
 SAMPLES, DRAWN = 1024, 20_000
-"""Of the tolerances; and of the sum of the first order by which percentiles are judged."""
+"""Number of samples of the tolerances, and of the first-order sum by which percentiles are judged."""
 SPREAD = ErrorBound(
     "spread",
     "3 % of a deviation or of a worst case, of a percentile 30 % of one: 1024 quasi-random samples against cubature "
@@ -50,14 +50,14 @@ SPREAD = ErrorBound(
     conditioned=False,
 )
 NEARLY_STRAIGHT, STRAIGHT = 0.1, 1e-4
-"""Where cubature and first order differ by a smaller part, three points are enough for a deviation, and percentiles
-are those of the first order: what bends a curve by q skews it by q and widens it by q^2."""
+"""Relative differences of cubature and first order. Below the first, three points are enough for a deviation; below the
+second, percentiles are those of the first order: what bends a curve by q skews it by q and widens it by q^2."""
 SLIGHT = 1e-3
-"""Of the greatest worst case of a quantity: below, the differences and rounding are as large as what they give."""
+"""Part of the greatest worst case of a quantity, below which differences and rounding are as large as their result."""
 MOST = 3
 """Tolerances of a scene that are judged together: three points each."""
 GIVEN = 1e-4
-"""Of the shortest bar: the tolerance that the run gives it."""
+"""Tolerance that the run gives the lengths, in parts of the shortest bar."""
 NODES = {False: (0.6**0.5, 5.0 / 18.0), True: (3.0**0.5, 1.0 / 6.0)}
 """Outer nodes, in parts of the width, and weights of Gauss's three points of an even and of a normal distribution."""
 
@@ -112,12 +112,12 @@ def tolerances(question: Question) -> list[Row]:
 
 
 class Expected(NamedTuple):
-    """What the tolerances do to a part of a quantity at n positions."""
+    """Effect of the tolerances on a part of a quantity at n positions."""
 
     deviation: Array
-    """By cubature of the linkages themselves."""
+    """Standard deviation, by cubature over the linkages themselves."""
     skew: Array
-    """How far that moves the mean from the nominal value."""
+    """Distance of the cubature's mean from the nominal value."""
     first_order: Array
     worst: Array
     low: Array
@@ -167,7 +167,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
 
 
 def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
-    """By what part the figures of a spread are off, (n,)."""
+    """Compute by what part the figures of a spread are off, (n,)."""
     bent = divide(np.abs(expected.deviation - expected.first_order), expected.deviation)
     bent = np.maximum(bent, divide(expected.skew, expected.deviation) ** 2)
     every, near, straight = bent >= 0.0, bent <= NEARLY_STRAIGHT, bent <= STRAIGHT

@@ -1,4 +1,4 @@
-"""What the checks of something shipped share: scenes with other numbers, and the rows of a comparison."""
+"""Provide what the checks of shipped code share: scenes with other numbers, and the rows of a comparison."""
 
 import json
 import math
@@ -31,7 +31,7 @@ SAMPLE = 5
 FROM_A_CORNER = 0.02
 """rad; so near to a point of a load's table, where its slope jumps, no differences are formed."""
 NOT_AT_REST = 1e-3
-"""Of the speeds over sin^2 mu; where a dry pin slips less, small changes of a number may reverse it."""
+"""Part of the speeds over sin^2 mu; if a dry pin slips less, small changes of a number may reverse it."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
