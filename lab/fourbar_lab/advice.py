@@ -1,4 +1,4 @@
-"""How good the advice is, on linkages that it has never seen: met, and how near the cheapest of a search."""
+"""Judge the advice on linkages it has never seen: whether it is met, and how near it is to a search's cheapest."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -108,7 +108,7 @@ class AdviceCase:
     cost: float
     """RK4 steps per run of the advice."""
     cheapest: float
-    """Of the exhaustive search; NaN where it found nothing."""
+    """Cheapest of the exhaustive search; NaN if it found nothing."""
 
     @property
     def met(self) -> bool:

@@ -48,7 +48,7 @@ Array = NDArray[np.float64]
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 WITH_LIMITS = FourBar(0.3, Bar(0.25, 0.2), Bar(0.1, 0.5), Bar(0.22, 0.4))
-"""Its input swings between limit positions: each of its positions has to be looked at."""
+"""Linkage whose input swings between limit positions, so that each of its positions has to be examined."""
 THIRTEEN_BATCH = 20_000
 """Positions per batch of the 13x13 system: larger batches are slower per position (27 MB of matrices each)."""
 OVER_POSITIONS = "all unknowns of a position, over the number of positions (1e6 at once at most)"
@@ -114,11 +114,11 @@ LIMITS = {
     ),
     "import fourbar / import numpy": SpeedLimit("<=", 1.0, "it loads numpy alone, and less than that of its own"),
 }
-"""By the name of the row."""
+"""Limits by the name of the row."""
 
 
 class Measured(NamedTuple):
-    """What one run found."""
+    """Results of one run."""
 
     rows: dict[str, float]
     over_positions: Times

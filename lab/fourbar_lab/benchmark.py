@@ -28,7 +28,7 @@ COLUMNS = ("problem", "engine", "version", "setting", "quantity", "error", "leve
 
 
 class Outcome(NamedTuple):
-    """What came of one problem and one engine."""
+    """Result of one engine on one problem."""
 
     letters: str
     """Reactions and torque; of a released motion reactions and motion."""
@@ -39,7 +39,7 @@ class Outcome(NamedTuple):
     seconds: float
     script: str
     folder: str
-    """Of its result files."""
+    """Folder of its result files."""
 
 
 def read_reasons(files: Iterable[Path]) -> dict[str, str]:
@@ -60,7 +60,7 @@ class Benchmark:
         self.engines, self.reasons, self.out = list(engines), reasons, out
         self.problems = {name: read_problem(PROBLEMS / f"{name}.json") for name in problems}
         self.outcomes: dict[str, dict[str, Outcome]] = {}
-        """By engine and problem."""
+        """Outcomes by engine and problem."""
         self.versions: dict[str, str] = {}
         self.rows: list[list[Any]] = []
 

@@ -50,7 +50,7 @@ LINKAGE = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
 
 
 class Peers(NamedTuple):
-    """What there is, and why the others are not."""
+    """Libraries that can be run here, and the reasons why the others were not run."""
 
     here: dict[str, Loop]
     not_run: dict[str, str]

@@ -50,18 +50,18 @@ EFFECTS |= {
     for key, kind in kinds.list_kinds().items()
     if key not in EFFECTS
 }
-"""By name, each by itself on the same linkage; one that is not listed acts as its example of a scene file says."""
+"""Effects by name, each alone on the same linkage; one that is not listed acts as in its example of a scene file."""
 SIMULATION = "mujoco-simulated"
 NO_COUNTERPART = {(SIMULATION, name) for name in (*NO_MJCF, "load over theta_2")}
 DEFAULT_FLAGS = "none, MuJoCo's default flags"
 LEFT_ON = "none, {} left on"
 """One flag of MuJoCo as it is by default, the others as the generated MJCF has them."""
 POSITIONS = 1000
-"""Of the formulas in one unit of work: they take arrays."""
+"""Positions of the formulas in one unit of work, as they take arrays."""
 ROUNDS = 31
 """Pairs of runs, first one ahead and then the other."""
 AMOUNTS = {"formulas": 40, SIMULATION: 1000, "mujoco-inverse": 100, "pinocchio-inverse": 100}
-"""Of one run: 10 to 20 ms, long against the clock's resolution and short against what disturbs it."""
+"""Units of work of one run: 10 to 20 ms, long against the clock's resolution and short against what disturbs it."""
 ABOUT = (
     "Processor time of a position, of a step of the simulation (RK4), in us without effects; with an effect relative "
     "to that: the median of the ratios of neighbouring runs and their middle half."
@@ -126,7 +126,7 @@ class EffectCost(NamedTuple):
     engine: str
     effect: str
     seconds: float
-    """Of the bare scene, per position or step."""
+    """Seconds for the bare scene, per position or step."""
     low: float
     median: float
     high: float

@@ -221,7 +221,8 @@ FAULT_SCENES: dict[str, Scene] = {
     ),
     "simulated, quickening": Scene(CRANK, Motion(Sweep(0.1, 3.0, 8), 10.0, 20.0), 4, effects=(Flywheel(0.003, 4),)),
 }
-"""By the name under which an entry of faults.toml tries its fault; those called "shipped" judge what else is."""
+"""Scenes by the name under which an entry of faults.toml tries its fault; scenes called "shipped" judge what else is
+shipped."""
 CAPABILITIES = read_default_suite()
 for index in range(len(CAPABILITIES)):
     if (name := CAPABILITIES.name(index)) in CAPABILITIES.not_drawn:

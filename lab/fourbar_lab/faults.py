@@ -21,7 +21,7 @@ CHUNK = 8
 SECONDS = 300
 """Faults with which the harness takes longer than this end the run as a failure would; one takes some three."""
 Failing = dict[str, list[str]]
-"""By test scene: the rows that fail."""
+"""Rows that fail, by test scene."""
 
 
 def try_faults(numbers: Sequence[int]) -> list[Failing] | str:

@@ -61,12 +61,12 @@ RANGES = {
         speed=draw_chance(0.95, SIZES[True]),
     ),
 }
-"""What the scenes are drawn from: ordinary, adversarial."""
+"""Distributions from which the scenes are drawn: ordinary, adversarial."""
 KEPT = Path("results/counterexamples") if CHECKOUT is None else CHECKOUT / "tests" / "counterexamples"
 DIGITS = (1, 2, 3, 6, 10)
 ROUNDS = 4
 NUMBER = re.compile(r'(?<=")-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?= )')
-"""Of a quantity, before its unit."""
+"""Pattern of the number of a quantity, before its unit."""
 NEEDED = ("[motion]", "theta_2", "omega_2")
 """A scene without them has no torque, and fails for another reason."""
 LAB = Path(__file__).parent
@@ -76,7 +76,7 @@ CHUNK, CHUNK_OF_PROOFS = 200, 10
 """Scenes per task: some seconds, which is what an interruption costs."""
 SHOWN = 20
 LOST = "worker:"
-"""How the discrepancy of a scene begins that killed its worker, or never came back."""
+"""Beginning of the discrepancy of a scene that killed its worker, or never came back."""
 
 
 def draw_fuzz_scene(seed: int, index: int) -> Scene:

@@ -22,7 +22,7 @@ PIECES = (
     *("true", "[[loads]]", "[effects]", '"""', "'''", "1979-05-27", "__import__('os')", "../../etc/passwd"),
     *("<script>alert(1)</script>", "</mujoco>", "${x}", "{{x}}", "%s%n", "steps = 99999999999999999999"),
 )
-"""What is put into files: the syntax itself, numbers at the edge, and text that other formats would run."""
+"""Text that is put into files: the syntax itself, numbers at the edge, and text that other formats would run."""
 
 
 def mutate_files(seed: int, indices: Sequence[int], originals: Sequence[str]) -> Iterator[tuple[int, str]]:

@@ -41,7 +41,7 @@ PAIRS = (
     *((ast.And, ast.Or), (ast.Is, ast.IsNot), (ast.In, ast.NotIn), (ast.USub, ast.UAdd), (ast.BitAnd, ast.BitOr)),
 )
 OTHER: dict[type, type] = {a: b for a, b in PAIRS} | {b: a for a, b in PAIRS} | {ast.Pow: ast.Mult}
-"""What replaces an operator."""
+"""Replacement of each operator."""
 CHANGES = 1e-9
 SECONDS = 20
 """A mutant that computes longer than this hangs: the run would be stopped, which is a failure too."""

@@ -23,11 +23,11 @@ from fourbar.studies.keys import is_left_out, list_entries, read_place, replace_
 from fourbar.studies.study import vary
 
 QUANTITIES = {2: ("torque", "|F12|"), 3: ("torque", "|F43|"), 4: ("torque", "transmission")}
-"""By the bar of the drive: each costs a proof of its own."""
+"""Quantities by the bar of the drive; each costs a proof of its own."""
 DRAWN, BEST, AROUND, ROUNDS, NARROWED = 1000, 8, 25, 12, 0.3
 """Points to begin with; those climbed from; points around each; rounds, each within a part of the reach before."""
 WITHIN = 1.0 - 1e-12
-"""Of a tolerance: no number rounds to one beyond it."""
+"""Part of a tolerance that is used, so that no number rounds to one beyond it."""
 
 
 def draw_scene(seed: int, index: int) -> Scene:

@@ -31,7 +31,7 @@ from fourbar_validation.engines.description import PINS
 LIBRARIES = ("jax", "torch")
 QUANTITIES = tuple(name for name in STAGE_OF if name not in NEVER)
 Slopes = dict[str, dict[str, tuple[Any, float]]]
-"""By output and key: a derivative as a ball, and sum |x_j ds/dx_j|."""
+"""Derivatives by output and key: each as a ball, with sum |x_j ds/dx_j|."""
 
 
 def load_library(library: str) -> tuple[Any, Any]:
@@ -214,6 +214,6 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
 
 
 def _is_held(scene: Scene, values: Values) -> bool:
-    """Whether dry friction holds a pin at rest, so that torque and pin forces have no derivative."""
+    """Return whether dry friction holds a pin at rest, so that torque and pin forces have no derivative."""
     dry = [PINS[pin] for term in scene.effects if isinstance(term, Friction) for pin, f in term.torques if f]
     return any(not abs(values.get(f"omega_{j}", 0) - values.get(f"omega_{i}", 0)) > 0 for i, j in dry)

@@ -1,4 +1,4 @@
-"""What samples showed: the largest errors over what is allowed, and whether error bars hold.
+"""Count what samples showed: the largest errors over what is allowed, and whether error bars hold.
 
 The error allowed is 8 eps (|y| + sum |x_i dy/dx_i|) with y the value (1 rad for angles) and x_i the stored inputs:
 what a change of the inputs in their last digits does to y, and nothing more.
@@ -13,22 +13,22 @@ from fourbar_validation.compare.tolerance import find_used
 
 EPS = 2.0**-52
 FACTOR = 8.0
-"""Of eps, as the contract states it."""
+"""Factor on eps in the allowed error, as the contract states it."""
 TOO_SMALL, TOO_LARGE = 10.0, 100.0
 """An error bar may be this much smaller (never) and this much larger (in one of USELESS samples) than the error."""
 USELESS = 0.01
 CHANCE = 1e-6
-"""That so many samples or more are counted where the share is USELESS: rarer is no chance. Of 60 samples one is."""
+"""Least probability, with a share of USELESS, of so many samples or more by chance. One of 60 samples is."""
 HALF_A_DIGIT = 2.0**-53
-"""Of a result: an error below that is chance, for no double need be nearer to the truth. A bar is held to be too
-large against no less."""
+"""Half a digit of a result: a smaller error is chance, for no double need be nearer to the truth. A bar is called too
+large only against at least this error."""
 UNTOLD = 0.125
-"""Of |sin mu|: what may be wrong with it where doubles do not tell whether the loop closes."""
+"""Part of |sin mu| that may be wrong with it if doubles do not tell whether the loop closes."""
 
 
 @dataclass(slots=True)
 class Tally:
-    """What a number of samples of one family showed."""
+    """Results of a number of samples of one family."""
 
     samples: int = 0
     not_assembled: int = 0
@@ -63,7 +63,7 @@ class Tally:
         self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
 
     def holds(self) -> bool:
-        """Whether anything was compared, and error and error bars are as promised."""
+        """Return whether anything was compared, and error and error bars are as promised."""
         bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
         useful = all(is_by_chance(count, self.samples) for count in self.too_large.values())
         errors = bool(self.worst) and all(ratio <= 1.0 for ratio, _ in self.worst.values())
@@ -71,7 +71,7 @@ class Tally:
 
 
 def is_by_chance(count: int, samples: int) -> bool:
-    """Whether a share of USELESS explains that so many samples or more are counted (binomial)."""
+    """Return whether a share of USELESS explains that so many samples or more are counted (binomial)."""
     from scipy.stats import binom
 
     return bool(binom.sf(count - 1, samples, USELESS) >= CHANCE)
@@ -93,7 +93,7 @@ def compute_ratio(name: str, ours: float, value: Any, sensitivity: float) -> tup
 
 
 def is_untold(sine: Any, sensitivity: float) -> bool:
-    """Whether so few digits of sin mu are told that a library without many digits may say that there is no value."""
+    """Return whether so few digits of sin mu are known that a library without many digits may give no value."""
     return compute_allowed(size := abs(float(sine.mid())), sensitivity) > UNTOLD * size
 
 

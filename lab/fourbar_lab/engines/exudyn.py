@@ -41,7 +41,7 @@ SIZE = 9
 B_ROWS, OTHER_ROWS = [4, 5], [0, 1, 2, 3, 6, 7]
 """The rows of pin B and of the others among the constraints, which stand in the order of `JOINTS`, the drive last."""
 JOINTS = {"O2": (1, 2), "A": (3, 2), "B": (4, 3), "O4": (1, 4)}
-"""Of each pin the force is that on the second bar: F12, F32, F43, F14."""
+"""Bars of each pin; the pin's force is that on the second bar: F12, F32, F43, F14."""
 
 
 class ExudynBars(Loaded):

@@ -89,4 +89,4 @@ ELEMENT_OF: dict[str, Callable[[Any, Bodies], None]] = {
     "torsion": _add_torsion,
     "springs": _add_springs,
 }
-"""By the key of an effect."""
+"""Function that adds the elements of an effect, by the effect's key."""

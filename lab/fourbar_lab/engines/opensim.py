@@ -31,7 +31,7 @@ from fourbar_validation.engines.loaded import Loaded, Values
 from fourbar_validation.engines.loop import Exact
 
 ZERO = (0.0, 0.0, 0.0)
-"""Nothing along three axes."""
+"""Zero vector."""
 PER_COORDINATE = {2: np.array([1.0, 0.0, 0.0]), 3: np.array([0.0, 1.0, 1.0]), 4: np.array([0.0, 1.0, 0.0])}
 """Derivative of each bar's direction by the coordinates."""
 PASSES = 50
@@ -99,7 +99,7 @@ class OpenSimBars(Loaded):
         self.pin_a.setIsEnforced(self.state, True)
         self.matter = model.getMatterSubsystem()
         self.least_conditioned = 1.0
-        """Of the matrix G M^-1 G^T of its multipliers, over the positions moved so far: least over greatest value."""
+        """Least ratio of singular values of the multipliers' matrix G M^-1 G^T, over the positions moved so far."""
 
     def refusal(self) -> str:
         """Tell where constraints may have been dropped."""

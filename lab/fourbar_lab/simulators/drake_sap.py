@@ -23,7 +23,7 @@ CHANGED = (
 SETTINGS = {"ball constraint at B": "drake"}
 if hasattr(MultibodyPlant, "SetEnableLoopTopology"):  # from Drake 1.57 on, marked as internal
     SETTINGS["four joints, SetEnableLoopTopology"] = "gazebo"
-"""For whom the SDF is written: Gazebo's has the fourth joint."""
+"""Simulator for which the SDF is written, by setting; Gazebo's SDF has the fourth joint."""
 
 
 def through(scene: Scene, steps: int, setting: str) -> Readings:

@@ -29,15 +29,15 @@ SIMULATORS = {
     "drake_sap": ("Drake, SAP", "pydrake"),
     "exudyn_simulated": ("Exudyn", "exudyn"),
 }
-"""By module: name, and what must be importable."""
+"""Name of each simulator and the package that must be importable, by module."""
 NOT_EXAMINED = {
     "Drake, CENIC": "its convex integrator with error control is not read here",
     "Newton, other solvers": "Featherstone, XPBD, VBD and the rest are not read here",
     "DART": "dartpy 6.20 gives the joints' wrenches and no force of the closing constraint; not read here",
 }
-"""What could be examined and is not."""
+"""Simulators that could be examined and are not, each with the reason."""
 LOOK = "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or sys.exit(1)"
-"""For an interpreter: fails where a module is not installed."""
+"""Program for a Python interpreter that fails if a module is not installed."""
 TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
 
 
@@ -52,11 +52,11 @@ class Line:
     errors: dict[str, float]
     """Greatest of the readings, by the greatest value in a turn; a quantity that cannot be read is left out."""
     gap: float
-    """By the longest bar."""
+    """Gap of the loop, relative to the longest bar."""
     cost: float | None
     """Seconds of the processor for one simulated second."""
     order: float | None = None
-    """Of the torque's error, from the number of steps before to this one."""
+    """Order of the torque's error, from the previous number of steps to this one."""
     apart: str = ""
     """Why it does not stand with the others: what the setting is not meant for."""
 
@@ -68,14 +68,14 @@ class Line:
 
 @dataclass(slots=True)
 class Differentiated:
-    """What a simulator that can be differentiated says of the driving torque at a state."""
+    """Driving torque at a state and its derivatives, by a simulator that can be differentiated."""
 
     simulator: str
     version: str
     how: str
-    """Or why not."""
+    """Method of differentiation, or the reason why there is none."""
     errors: dict[str, float | None] = field(default_factory=dict)
-    """Of the torque, and of its derivative by each number, by our own; None: it says 0."""
+    """Errors of the torque and of its derivative by each number, relative to ours; None if the simulator says 0."""
 
 
 @dataclass(slots=True)
@@ -85,9 +85,9 @@ class Examination:
     lines: list[Line] = field(default_factory=list)
     changed: dict[str, str] = field(default_factory=dict)
     devices: dict[str, str] = field(default_factory=dict)
-    """What each ran on."""
+    """Device that each simulator ran on."""
     made_for: dict[str, str] = field(default_factory=dict)
-    """Of simulators that are made for something else than what is asked here."""
+    """Purpose of each simulator that is made for something else than what is asked here."""
     left_out: dict[str, str] = field(default_factory=dict)
     slopes: list[Differentiated] = field(default_factory=list)
 

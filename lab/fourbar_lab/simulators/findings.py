@@ -17,14 +17,14 @@ from fourbar_validation.places import CHECKOUT
 
 FOLDER = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
 FIELDS = ("Engine", "With", "Expected", "Found", "Since", "Until", "Reported")
-"""Of a script's docstring, after its first sentence; Engine: the name for pip, in brackets what is imported."""
+"""Fields of a script's docstring, after its first sentence; Engine: the name for pip, in brackets what is imported."""
 MENDED = "mended"
-"""What a script says at its end, with exit status 1, where the finding no longer holds."""
+"""Word that a script prints at its end, with exit status 1, if the finding no longer holds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """What a script of docs/findings says of itself."""
+    """Docstring of a script of docs/findings, in parts."""
 
     script: Path
     sentence: str

@@ -31,7 +31,7 @@ SETTINGS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "default_armature=None": ({"default_armature": None}, {}),
     "its defaults": ({}, {}),
 }
-"""What is given to the MJCF morph and to the rigid solver's options."""
+"""Arguments of the MJCF morph and of the rigid solver's options, by setting."""
 genesis.init(backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu, precision="64", logging_level="error")
 
 

@@ -1,4 +1,4 @@
-"""What a simulator that can be differentiated says of the driving torque at a state: its derivatives by three numbers.
+"""Differentiate the driving torque at a state by three numbers, with a simulator that can be differentiated.
 
 Assembling the loop and compiling a model are no part of what it differentiates: how its state and the numbers of its
 model change with a number of the scene is taken from two scenes to either side, each assembled by MuJoCo.
@@ -19,7 +19,7 @@ from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 STEPS = 156
 """In a turn; the quarter of them is run through."""
 DIFFERENCE = 1e-6
-"""To either side, SI: of differences of doubles ten digits are left."""
+"""Step to either side, SI: differences of doubles keep ten digits."""
 
 
 class ClosedState(NamedTuple):

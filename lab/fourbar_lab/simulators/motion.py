@@ -1,4 +1,4 @@
-"""What a simulator answers: numbers of a turn that it ran through, or of states that it was given."""
+"""Read what a simulator answers: numbers of a turn that it ran through, or of states that it was given."""
 
 import math
 import tempfile
@@ -25,7 +25,7 @@ SAMPLES = 12
 
 
 class Instant(NamedTuple):
-    """What a simulator lets read at one instant, SI units."""
+    """Numbers that can be read from a simulator at one instant, SI units."""
 
     theta: Sequence[Any]
     """theta_2, theta_3, theta_4, of the simulator itself, rad."""
@@ -33,7 +33,7 @@ class Instant(NamedTuple):
     alpha_2: float
     torque: float | None
     forces: dict[str, Any]
-    """Of the pins that it lets read, N."""
+    """Forces of the pins that can be read, N."""
 
 
 @dataclass(slots=True)
@@ -42,7 +42,7 @@ class Readings:
 
     setting: str
     steps: int | None = None
-    """In a turn; None: of single states."""
+    """Steps in a turn; None for single states."""
     theta: list[tuple[float, float, float]] = field(default_factory=list)
     omega_2: list[float] = field(default_factory=list)
     alpha_2: list[float] = field(default_factory=list)
@@ -51,7 +51,7 @@ class Readings:
     gap: float = 0.0
     """The greatest distance of B on bar 3 from B on bar 4, m."""
     seconds: float = 0.0
-    """Of the processor's clock, for the steps alone."""
+    """Processor time of the steps alone, s."""
 
     def read(self, scene: Scene, now: Instant) -> None:
         """Add a reading."""

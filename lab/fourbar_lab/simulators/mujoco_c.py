@@ -19,7 +19,7 @@ STEPS = (157, 314, 628, 1256)
 CHANGED = "nothing; the softness of its default constraints is deliberate, and documented"
 SETTINGS = {"generated file": "mujoco", "its defaults": None}
 BY_DEFAULT = {"option": ("integrator", "solver", "tolerance", "iterations"), "equality/connect": ("solref", "solimp")}
-"""What is left to MuJoCo under the latter."""
+"""Attributes that "its defaults" leaves to MuJoCo."""
 
 
 def text(scene: Scene, steps: int, simulator: str | None) -> str:

@@ -15,15 +15,15 @@ from fourbar_validation.engines.mujoco.closed_loop import open_model
 
 VERSION = mjw.__version__ if hasattr(mjw, "__version__") else ""
 DEVICE = str(warp.get_preferred_device().name)
-"""Its arrays lie on a GPU where there is one."""
+"""Device of its arrays: a GPU if there is one."""
 STEPS = (78, 157)
 MADE_FOR = "many worlds at once on a GPU"
 CHANGED = "a light flywheel and no pads (--for warp): single precision; midphase may not be switched off"
 SETTINGS = {"forward twice": (2, 1), "forward once": (1, 1)}
-"""How often a state is evaluated, and how many worlds are simulated; the last is read."""
+"""Number of evaluations of a state and of simulated worlds, by setting; the last world is read."""
 BATCHES = (64, 4096)
 NUMBERS = ("body_mass", "body_inertia", "body_ipos", "site_pos", "dof_armature")
-"""Of a model that change with a bar's length or mass, or with theta_2."""
+"""Fields of a model that change with a bar's length or mass, or with theta_2."""
 if warp.get_preferred_device().is_cuda:
     SETTINGS |= {f"forward twice, {worlds} worlds": (2, worlds) for worlds in BATCHES}
 else:

@@ -26,7 +26,7 @@ SETTINGS: dict[str, dict[str, float]] = {
     "its defaults": {},
     "PADMM to 1e-9 in 2000 iterations": {"max_iterations": 2000, **dict.fromkeys(TOLERANCES, 1e-9)},
 }
-"""What of the PADMM solver's settings (200 iterations, 1e-6 by default) is given."""
+"""Settings given to the PADMM solver (200 iterations, 1e-6 by default)."""
 PARENTS = {"O2": None, "A": 0, "O4": None, "B": 2}
 """The body on which each joint's axes are fixed, in the order of the joints; None: the ground."""
 
@@ -79,6 +79,6 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
 
 
 def directions(state: newton.State) -> Array:
-    """Of bars 2, 3, 4, rad."""
+    """Return the directions of bars 2, 3, 4, rad."""
     poses = state.body_q.numpy().astype(float)
     return np.asarray(2.0 * np.arctan2(poses[:, 5], poses[:, 6]))

@@ -26,9 +26,9 @@ PROXIMAL = 1e-10
 """Added to the diagonal of the Delassus matrix, as in Pinocchio's example: one of its three rows depends on the rest.
 """
 ACCURATE = 1e-10
-"""What the impulse solvers are asked for in place of 1e-6 of the example, absolute and relative."""
+"""Accuracy asked of the impulse solvers in place of the example's 1e-6, absolute and relative."""
 LIGHT = replace(RECIPE, flywheel=1e5)
-"""For accelerations that are differences of speeds: of a heavier flywheel's they keep no digits."""
+"""Recipe for accelerations that are differences of speeds: with a heavier flywheel these keep no digits."""
 
 
 class LoopConstrained(ClosedTree):

@@ -20,7 +20,7 @@ from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.rows import say_error
 
 CLOSED = 1e-15
-"""Of the rod's length: a gap that Newton's method is done with."""
+"""Gap at which Newton's method ends, in parts of the rod's length."""
 STEPS = 50
 ANSWERS = ("theta_3", "stroke", "torque", "F12", "F32", "F43", "guide_force")
 
@@ -34,7 +34,7 @@ class SliderBar(NamedTuple):
 
 
 class CutLoop(Protocol):
-    """What an engine does with the tree, whose joints turn the crank and the rod and move the slider."""
+    """Interface of an engine to the tree, whose joints turn the crank and the rod and move the slider."""
 
     def set(self, q: Array, v: Array) -> None:
         """Set joint positions and speeds."""

@@ -14,7 +14,7 @@ from typing import TextIO
 import fourbar
 
 FURTHER = ("APART", "MADE_FOR", "NOT_RUN")
-"""What a simulator's module may say of settings that stand apart, of its purpose, and of what did not run."""
+"""Names that a simulator's module may define: settings that stand apart, its purpose, and what did not run."""
 
 
 def main(module: str, file: str, answers: TextIO) -> None:
