@@ -112,12 +112,12 @@ class AdviceCase:
 
     @property
     def met(self) -> bool:
-        """Within the required error, or rightly called unreachable."""
+        """Return whether it is within the required error, or rightly called unreachable."""
         return self.error <= self.asked if self.reached else math.isnan(self.cheapest)
 
     @property
     def cheap(self) -> bool:
-        """Within CHEAP times the cheapest; rightly unreachable counts."""
+        """Return whether it is within CHEAP times the cheapest; rightly unreachable counts."""
         if not self.reached:
             return self.met
         return not self.cost > CHEAP * self.cheapest

@@ -100,7 +100,7 @@ def _draw(rng: np.random.Generator, hard: bool) -> Scene:
 
 
 def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
-    """(ground, input, coupler, output), some of them equal, in extreme ratios, or near s + l = p + q."""
+    """Draw (ground, input, coupler, output), some of them equal, in extreme ratios, or near s + l = p + q."""
     choice = rng.random() if hard else 1.0
     x = rng.uniform(0.1, 1.0, 4)
     if choice < 0.1:
@@ -124,7 +124,7 @@ def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:
 
 
 def _draw_angles(rng: np.random.Generator, hard: bool, lengths: tuple[float, ...]) -> Any:
-    """theta_2 - theta_1: anywhere, or near a limit position, a change point, or many turns away."""
+    """Draw theta_2 - theta_1: anywhere, or near a limit position, a change point, or many turns away."""
     psi = rng.uniform(-3.2, 3.2, POSITIONS)
     if not hard:
         return psi

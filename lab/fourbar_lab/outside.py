@@ -83,7 +83,7 @@ def _draw_nearly_meeting(rng: np.random.Generator, scene: Scene, at: Solution) -
 
 
 def list_findings(scene: Scene) -> list[str]:
-    """Each value found outside what is proven, in one line; nothing where nothing is proven."""
+    """List each value found outside what is proven, in one line; nothing where nothing is proven."""
     try:
         proven = extremes(scene, QUANTITIES[scene.drive_bar])
         return [line for name in proven.least for sign in (1, -1) for line in _list_outside(scene, proven, name, sign)]

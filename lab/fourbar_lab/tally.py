@@ -98,5 +98,5 @@ def is_untold(sine: Any, sensitivity: float) -> bool:
 
 
 def compute_allowed(size: float, sensitivity: float) -> float:
-    """8 eps (|y| + sum |x_i dy/dx_i|)."""
+    """Return 8 eps (|y| + sum |x_i dy/dx_i|)."""
     return FACTOR * EPS * (size + sensitivity)

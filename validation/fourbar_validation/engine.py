@@ -33,7 +33,7 @@ OURS = frozenset(sys.modules)
 
 
 class NotFoundError(Exception):
-    """There is no such engine."""
+    """Error raised if there is no such engine."""
 
 
 def open_engine(entry: str) -> tuple[Callable[..., Any], dict[str, Any]]:

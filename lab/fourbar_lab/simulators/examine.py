@@ -62,7 +62,7 @@ class Line:
 
     @property
     def worst(self) -> float:
-        """The greatest of the errors, NaN where one is."""
+        """Return the greatest of the errors, NaN where one is."""
         return float(np.max(list(self.errors.values())))
 
 
@@ -80,7 +80,7 @@ class Differentiated:
 
 @dataclass(slots=True)
 class Examination:
-    """All that the page shows."""
+    """Data that the page shows."""
 
     lines: list[Line] = field(default_factory=list)
     changed: dict[str, str] = field(default_factory=dict)

@@ -17,7 +17,7 @@ from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 
 STEPS = 156
-"""In a turn; the quarter of them is run through."""
+"""Steps in a turn; a quarter of them is run through."""
 DIFFERENCE = 1e-6
 """Step to either side, SI: differences of doubles keep ten digits."""
 

@@ -69,7 +69,7 @@ class Advice:
 
     @property
     def reason(self) -> str:
-        """One line for the reader."""
+        """Write the attempt in one line for the reader."""
         s, e = self.best.settings, self.best.errors
         result = f"torque {e.torque:.1e}, worst pin force {e.force:.1e}"
         setting = (

@@ -77,7 +77,7 @@ def compute_errors_between(scene: Scene, trial: Trial, samples: slice, steps: in
 
 
 def measure_influences(scene: Scene, setup: TrialSetup, settings: Settings) -> list[SettingInfluence]:
-    """Every setting changed alone, the one that matters most first."""
+    """List every setting changed alone, the one that matters most first."""
     before = judge_trial(scene, setup.try_out(settings)).worst
     result = []
     for name, changed, other, why in _describe_changes(scene, settings):

@@ -54,7 +54,7 @@ MOST_ROWS = 1000
 
 
 def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
-    """Every mistake whose number the table gives, the simplest first."""
+    """List every mistake whose number the table gives, the simplest first."""
     yield from _find_ratios(judge, differing)
     yield from _try_exchanged(differing)
     yield from _try_order(judge)
@@ -200,7 +200,7 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     rows = np.unique(np.linspace(0, len(judge.at.theta_2) - 1, TRIED).round().astype(int))
 
     def residuals(offsets: Array, rows: NDArray[np.int_]) -> Array:
-        """One line for each offset."""
+        """Write one line for each offset."""
         at, m = judge.at, len(offsets)
         many: dict[str, Any] = {
             name: np.tile(values[rows], m)

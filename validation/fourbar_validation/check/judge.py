@@ -48,7 +48,7 @@ class Discrepancy:
     """One quantity at one position of the user's table, in SI."""
 
     line: int
-    """In the user's file."""
+    """Line in the user's file."""
     quantity: str
     theirs: tuple[float, ...]
     ours: tuple[float, ...]
@@ -56,7 +56,7 @@ class Discrepancy:
     """Relative to the scale of the quantity (angles: rad)."""
     allowed: float
     difference: float
-    """In the unit of the quantity, as `permitted`."""
+    """Difference in the unit of the quantity, as `permitted`."""
     permitted: float | None
     """Difference permitted by the stated tolerance and the printed digits; None if no tolerance was stated."""
     theta_2: float
@@ -158,7 +158,7 @@ class Judge:
         return bool(where.any() and np.all(within))
 
     def findings(self) -> list[Discrepancy]:
-        """Every number that the table states where the formulas have one."""
+        """List every number that the table states where the formulas have one."""
         result = []
         for key, theirs in self.table.values.items():
             ours, label = self.ours(key), self.table.label(key)

@@ -25,7 +25,7 @@ class Judgement:
 
     @property
     def differing(self) -> list[Discrepancy]:
-        """The findings that do not agree, though there are digits to judge by."""
+        """Return the findings that do not agree, though there are digits to judge by."""
         return [finding for finding in self.findings if finding.judged and not finding.agrees]
 
     @property
@@ -84,7 +84,7 @@ def judge_table(scene: Scene, table: TheirTable, tolerance: Allowance | None = N
 
 
 def write_json(judgement: Judgement, table: TheirTable) -> str:
-    """One object in SI: the counts, every number that differs with theirs and ours, and what explains it."""
+    """Return one object in SI: the counts, every number that differs with theirs and ours, and what explains it."""
     tolerance = judgement.tolerance
     result = {
         "schema": 1,
@@ -107,7 +107,7 @@ def write_json(judgement: Judgement, table: TheirTable) -> str:
 
 
 def write_junit(judgement: Judgement, name: str) -> str:
-    """One case per quantity: a failure where any of its numbers differs, skipped where none could be judged."""
+    """Return one case per quantity: a failure if any of its numbers differs, skipped if none could be judged."""
     return write_document(judgement.sentence(), _list_cases(judgement, name))
 
 

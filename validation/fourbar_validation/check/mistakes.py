@@ -26,7 +26,7 @@ NEARER = 10.0
 
 
 def list_hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
-    """Every mistake that can be made on this scene, the simplest first."""
+    """List every mistake that can be made on this scene, the simplest first."""
     for text, change, of in COLUMN_MISTAKES:
         yield Mistake(
             text,

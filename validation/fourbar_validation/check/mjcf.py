@@ -58,7 +58,7 @@ class CostOfModel:
         return f"{self.row.engine} {self.row.setting}"
 
     def cells(self) -> tuple[str, ...]:
-        """Under HEADINGS; a row without an error says why."""
+        """Return the rows under HEADINGS; a row without an error says why."""
         row = self.row
         verdict = row.verdict if not math.isnan(row.error) else f"{row.verdict}: {row.reason}"
         return row.quantity, write_number(row.error), write_number(self.generated), write_number(row.allowed), verdict
@@ -66,7 +66,7 @@ class CostOfModel:
 
 @dataclass(frozen=True, slots=True)
 class ModelReport:
-    """All that is reported of somebody's file."""
+    """Report on a user's file."""
 
     causes: list[Cause]
     """Differences, the worst first."""
@@ -79,7 +79,7 @@ class ModelReport:
 
     @property
     def counts(self) -> Counts:
-        """The comparisons of their file by verdict."""
+        """Return the comparisons of their file by verdict."""
         return Counts(cost.row for cost in self.costs)
 
 

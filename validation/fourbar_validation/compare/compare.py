@@ -79,7 +79,7 @@ class Comparison:
     scene: Scene
     answer: Answer
     formulas: Solution
-    """At `answer.at`."""
+    """Solution of the formulas at `answer.at`."""
     tolerance: ErrorBound
     expected: Iterable[str]
     """Quantities that the engine must answer."""

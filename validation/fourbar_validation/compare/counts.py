@@ -53,7 +53,7 @@ class Counts:
 
     @property
     def total(self) -> int:
-        """All rows."""
+        """Return the number of all rows."""
         return self._of.total()
 
     @property
@@ -73,7 +73,7 @@ class Counts:
 
     @property
     def word(self) -> str:
-        """The verdict in a cell of a table."""
+        """Return the verdict for a cell of a table."""
         return f"{self[FAILS]} fail" if self[FAILS] else "nothing compared" if self.nothing else "holds"
 
     def sentence(self) -> str:

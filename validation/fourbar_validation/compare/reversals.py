@@ -45,7 +45,7 @@ class Reversal:
 
 
 def find_reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
-    """Every reversal between two positions of a sweep, in their order.
+    """Find every reversal between two positions of a sweep, in their order.
 
     A position at which the pin is at rest lies within its reversal and ends no stretch.
     """
@@ -107,7 +107,7 @@ def break_curve(
 
 
 def compute_slip(solution: Solution, pin: str) -> Array:
-    """omega_j - omega_i of the bars that meet at a pin, rad/s, (n,)."""
+    """Return omega_j - omega_i of the bars that meet at a pin, rad/s, (n,)."""
     one, other = (_compute_speeds(solution)[bar] for bar in PINS[pin])
     return np.asarray(other - one)
 

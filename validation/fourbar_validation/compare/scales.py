@@ -213,7 +213,7 @@ def _add_line(linkage: FourBar, drive: LinearDrive, theta: dict[int, Array], ref
 
 
 def _add_velocities(linkage: FourBar, theta: dict[int, Array], reference: Solution) -> None:
-    """Add those of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
+    """Add the speeds of A, B and the mass centres, from the answer's own angles and speeds, m/s."""
 
     def swung(bar: int, distance: float, angle: float) -> Array:
         speed, direction = distance * getattr(reference, f"omega_{bar}"), theta[bar] + angle

@@ -178,7 +178,7 @@ def mark_touching(linkage: FourBar, theta: Array, bar: int = 2) -> Mask:
 
 
 def magnitude(values: Array) -> Array:
-    """Absolute value of a scalar, Euclidean norm of a vector, (n,)."""
+    """Return the absolute value of a scalar, the Euclidean norm of a vector, (n,)."""
     return np.asarray(np.hypot(values[:, 0], values[:, 1]) if values.ndim == 2 else np.abs(values))
 
 
@@ -209,7 +209,7 @@ def replace_zero_size(size: Array) -> Array:
 
 
 def find_used(error: Array | float, allowed: Array | float) -> Array:
-    """error/allowed: how much of its allowance an error uses; infinite where it is no number, 0 where it is 0."""
+    """Return error/allowed: the part of the allowed error that is used; infinite for NaN, 0 for an error of 0."""
     error, allowed = np.asarray(error, dtype=float), np.asarray(allowed, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         share = np.where(error == 0.0, 0.0, error / allowed)

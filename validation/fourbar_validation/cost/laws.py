@@ -60,7 +60,7 @@ class ErrorLaw:
 
 
 def write_laws(found: Sequence[ErrorLaw]) -> list[str]:
-    """Each law in one line, quantity by quantity."""
+    """Write each law in one line, quantity by quantity."""
     shown = []
     for name in dict.fromkeys(law.name for law in found):
         each = [law for law in found if law.name == name]
@@ -115,7 +115,7 @@ def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
 
 
 def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
-    """Every law that the study was laid out for, of each quantity, as far as its curves are there."""
+    """Fit every law that the study was laid out for, of each quantity, as far as its curves exist."""
     result = []
     one_state = [point for point in curves.get("one state", ()) if point.setting_value > 0.0]
     ladders = [

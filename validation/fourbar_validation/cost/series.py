@@ -11,7 +11,7 @@ from fourbar_validation.engines.mujoco.trial import FLYWHEEL, Build
 
 STEPS = (20, 40, 80, 160, 320, 640, 1280, 2560)
 MORE_STEPS = (*STEPS, 5120, 10240)
-"""Per revolution; a first-order integrator needs more."""
+"""Steps per revolution; a first-order integrator needs more."""
 MIDDLE = 640
 """Steps per revolution where a setting other than the timestep changes."""
 IMPEDANCES = (0.9, 0.97, 0.99, 0.997, 0.999, 0.9997, 0.9999)
@@ -26,7 +26,7 @@ DEFAULT_TIMESTEP = 0.002
 PART_OF_TURN = 0.25
 """Time constant, as a part of a revolution, that stays what it is while the timestep changes."""
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete", "RK4")
-"""All that MuJoCo 4.0 has."""
+"""Integrators, all that MuJoCo 4.0 has."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +155,7 @@ def _vary_tolerance() -> list[Curve]:
 
 
 def _vary_drives() -> list[Curve]:
-    """Each drive with the integrator that carries it."""
+    """List each drive with the integrator that carries it."""
     at = replace(BEST, flywheel=1.0)
     fast = replace(at, integrator="implicitfast", time_constant_steps=3.0)
     result = [trace_steps(f"flywheel {f:g}, RK4", replace(BEST, flywheel=f)) for f in (1e2, 1e4, 1e6, 1e8)]

@@ -70,12 +70,12 @@ class CostPoint:
 
     @property
     def force(self) -> float:
-        """The error of the worst pin force."""
+        """Return the error of the worst pin force."""
         return max(self.F12, self.F32, self.F43, self.F14)
 
     @property
     def worst(self) -> float:
-        """The largest of the errors."""
+        """Return the largest of the errors."""
         return max(self.torque, self.force)
 
 

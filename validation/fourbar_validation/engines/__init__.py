@@ -1,1 +1,1 @@
-"""One adapter per engine; each engine is imported in its own place here and nowhere else."""
+"""Adapt each engine in a module of its own; an engine is imported here and nowhere else."""

@@ -54,7 +54,7 @@ class BallLine(NamedTuple):
     """Sign of the drive's push along the line on each of these bars."""
 
     def speed(self, foot: dict[int, Complex], omega: dict[int, Ball]) -> Ball:
-        """ds/dt, of bars whose first pins move and which turn at speeds."""
+        """Return ds/dt from the speeds of the bars' first pins and the bars' angular speeds."""
         ends = (sense * (foot[k] + acb(0, omega[k]) * self.arms[k]) for k, sense in self.sense.items())
         return dot(self.line, sum(ends, acb(0)))
 

@@ -16,10 +16,10 @@ def polar(r: Ball, angle: Ball) -> Complex:
 
 
 def wedge(u: Complex, v: Complex) -> Ball:
-    """u_x v_y - u_y v_x."""
+    """Return u_x v_y - u_y v_x."""
     return (u.conjugate() * v).imag
 
 
 def dot(u: Complex, v: Complex) -> Ball:
-    """u_x v_x + u_y v_y."""
+    """Return u_x v_x + u_y v_y."""
     return (u.conjugate() * v).real

@@ -72,7 +72,7 @@ def make_balls(scene: Scene, angle: float, **motion: float) -> Values:
 
 
 def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
-    """e^{i theta_2}, e^{i theta_3}, e^{i theta_4}; None where the loop does not close.
+    """Return e^{i theta_2}, e^{i theta_3}, e^{i theta_4}; None if the loop does not close.
 
     With D = d e^{i theta_1} - a e^{i theta_2}, |D - b w| = c is b conj(D) w^2 - K w + b D = 0, K = D^2 + b^2 - c^2.
     Where bar 3 is commanded D = d e^{i theta_1} - b e^{i theta_3} is what bars 2 and 4 span, where bar 4 is it is

@@ -37,7 +37,7 @@ SHARED = "the description, what is commanded and the branch"
 
 
 def find_inertia(bar: Bar) -> float:
-    """About the mass centre, kg m^2: as stated, or that of a uniform slender bar, m L^2/12."""
+    """Return the moment of inertia about G, kg m^2: as stated, or that of a uniform slender bar, m L^2/12."""
     return bar.inertia if bar.inertia is not None else bar.mass * bar.length**2 / 12.0
 
 
@@ -74,7 +74,7 @@ def rotate_by(rotation: Sequence[Sequence[float]], x: float, y: float) -> tuple[
 
 
 def find_field(gravity: Gravity) -> tuple[float, float]:
-    """(g_x, g_y), m/s^2; the angle counts from +x, counter-clockwise."""
+    """Return (g_x, g_y), m/s^2; the angle counts from +x, counter-clockwise."""
     x, y = math.cos(gravity.angle), math.sin(gravity.angle)
     return gravity.magnitude * (x if abs(x) > TELLS else 0.0), gravity.magnitude * (y if abs(y) > TELLS else 0.0)
 
@@ -96,7 +96,7 @@ class Part(NamedTuple):
 
     @property
     def centre(self) -> tuple[float, float]:
-        """The mass centre, m."""
+        """Return the mass centre, m."""
         return self.points[f"G{self.bar}"]
 
 
@@ -120,7 +120,7 @@ def place(point: Any, ground_angle: float) -> tuple[float, float]:
 
 
 def list_speeds(at: Command) -> tuple[Array, Array]:
-    """omega_2 and alpha_2 of each position, or those of the commanded bar, (n,); a speed that is not stated is 0."""
+    """Return speed and acceleration of the commanded bar at each position, (n,); a speed that is not stated is 0."""
     omega, alpha = (
         np.broadcast_to(np.asarray(0.0 if x is None else x, float), at.angle.shape) for x in (at.speed, at.acceleration)
     )

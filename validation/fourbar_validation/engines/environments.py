@@ -29,7 +29,7 @@ CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "four
 HELD = ("tolerance", "expected", "positions", "through_time", "predictor", "residuals", "nearby", "stated")
 """Fields of an engine that an adapter of ours keeps in every environment."""
 DONE = "installed"
-"""In the folder of an environment that is complete."""
+"""File in the folder of an environment that is complete."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""The scene in 320-bit ball arithmetic as a witness: the loop as a quadratic, all thirteen equations, no shortcuts."""
+"""Solve the scene in 320-bit ball arithmetic as an engine: the loop as a quadratic, all thirteen equations."""
 
 import math
 from typing import Any

@@ -85,7 +85,7 @@ def _compute_angle_between(e: Array, near: float, far: float) -> Array:
 def _solve_newton(
     diagonal: Complex, b: float, c: float, branch: NDArray[np.int8], theta: Array, closed: float
 ) -> tuple[Array, Array]:
-    """theta_3, theta_4 (2, n) and the gap left (n,), NaN where it does not come down to `closed`.
+    """Return theta_3, theta_4 (2, n) and the gap left (n,), NaN where it does not come down to `closed`.
 
     The Jacobian's determinant is b c sin(theta_4 - theta_3), whose sign is the branch's. A step is
     halved until the gap falls and that sign is kept; so it ends where no smaller gap is to be had.
@@ -127,5 +127,5 @@ def _solve_newton(
 
 
 def cross(u: Any, v: Any) -> Any:
-    """u_x v_y - u_y v_x."""
+    """Return u_x v_y - u_y v_x."""
     return (np.conj(u) * v).imag

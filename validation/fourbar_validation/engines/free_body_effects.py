@@ -40,11 +40,11 @@ class BodyMotion(NamedTuple):
         return self.unit[bar] * make_vector(find_centre(self.linkage.bar(bar)))
 
     def swing(self, bar: int, arm: Complex) -> Complex:
-        """Acceleration of the end of an arm of a bar about its first pin, m/s^2."""
+        """Return the acceleration of the end of an arm of a bar about its first pin, m/s^2."""
         return (1j * self.alpha[bar] - self.omega[bar] ** 2) * arm
 
     def slip(self, pin: str) -> Array:
-        """omega_j - omega_i of the bars that meet at a pin, rad/s."""
+        """Return omega_j - omega_i of the bars that meet at a pin, rad/s."""
         i, j = PINS[pin]
         return self.omega[j] - self.omega[i]
 
@@ -96,7 +96,7 @@ FOLLOWED = np.radians(2.0)
 
 
 def make_vector(pair: Any) -> complex:
-    """(distance, angle) as a vector."""
+    """Return (distance, angle) as a vector."""
     length, angle = pair
     return complex(length * np.cos(angle), length * np.sin(angle))
 

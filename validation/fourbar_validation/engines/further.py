@@ -13,7 +13,7 @@ LAB, GROUP = "fourbar-lab", "fourbar.engines"
 
 
 def load_further() -> tuple[Witness, ...]:
-    """Load the witnesses that the lab registers; none where it is not installed."""
+    """Load the engines that the lab registers; none if it is not installed."""
     try:
         registered: Iterable[EntryPoint] = distribution(LAB).entry_points.select(group=GROUP)
     except PackageNotFoundError:  # the environment of one engine has the lab of a checkout on its path alone

@@ -95,7 +95,7 @@ class Hello:
 
 @dataclass(frozen=True, slots=True)
 class Guest(Witness):
-    """A witness outside."""
+    """Engine in a process outside."""
 
     code: str = ""
     """Hashes of what its answers come from."""

@@ -1,4 +1,4 @@
-"""The hard cases as a suite of a run, and the witnesses with their predictions."""
+"""Provide the hard cases as a suite of a run, and the engines with their predictions."""
 
 from dataclasses import replace
 from functools import cache
@@ -14,7 +14,7 @@ BALLS = Witness("ball-arithmetic", BallArithmetic, FULL_ACCURACY, nearby=True, l
 
 
 def hold_fully(witness: Witness) -> Witness:
-    """Hold the witness to full accuracy, or else to the error predicted for each position."""
+    """Hold the engine to full accuracy, or else to the error predicted for each position."""
     if witness.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
         return witness
     return replace(witness, tolerance=FULL_ACCURACY, predictor=witness.predictor or predict_from_data)

@@ -47,7 +47,7 @@ class ClosedTree:
         self.proximal = pin.ProximalSettings(*PROXIMAL)
 
     def start(self, theta_2: float, branch: int, omega_2: float) -> tuple[Array, Array] | None:
-        """Assembled, at the speeds that keep the loop closed; None where it does not close."""
+        """Assemble at the speeds that keep the loop closed; None if it does not close."""
         q = Assembler(self.tree).find(theta_2, branch)
         return None if q is None else (np.array(q), solve_closed(self.tree.jacobian(), omega_2))
 

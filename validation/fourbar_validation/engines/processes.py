@@ -1,4 +1,4 @@
-"""Other programs, run to their end."""
+"""Run other programs to their end."""
 
 import os
 import subprocess

@@ -94,7 +94,7 @@ class Tree(Loaded, Protocol):
         self.set_motion(v, a)
 
     def drift(self, v: Array) -> Array:
-        """Acceleration of the gap at speeds v where a = 0, (2,), m/s^2."""
+        """Return the acceleration of the gap at speeds v where a = 0, (2,), m/s^2."""
         self.moving(v, np.zeros(3))
         return self.acceleration("end3") - self.acceleration("end4")
 

@@ -1,4 +1,4 @@
-"""The witnesses (independent solvers): what starts each, what it needs, and what it is held to."""
+"""Register the engines (independent solvers): what starts each, what it needs, and how it is judged."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -205,7 +205,7 @@ def make_prediction(witness: Witness, scene: Scene, at: Command, answer: Answer)
 
 
 def make_nearby(witness: Witness, scene: Scene, at: Command, formulas: Solution) -> Nearby | None:
-    """Give what answers within the rounding of the theta_2 that are stated, where the witness does.
+    """Give what answers within the rounding of the theta_2 that are stated, if the engine does.
 
     Near a limit position the last digits of theta_2 decide sin(theta_4 - theta_3), and with it every other number:
     once they are chosen such that this sine is that of the formulas, all the others have their digits.

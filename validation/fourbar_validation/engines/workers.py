@@ -62,7 +62,7 @@ class Worker(SpawnProcess):
 
     @property
     def exitcode(self) -> int | None:
-        """The exit code; None also for 0."""
+        """Return the exit code; None also for 0."""
         return super().exitcode or None
 
 

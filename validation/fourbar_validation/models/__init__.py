@@ -1,1 +1,1 @@
-"""In a wheel the scenes of models/, which a checkout has at its top."""
+"""Contain, in a wheel, the scenes of models/, which a checkout has at its top."""

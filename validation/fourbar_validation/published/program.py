@@ -69,7 +69,7 @@ def split_components(r: float, angle: float) -> tuple[float, float]:
 
 
 def to_ours(theta: float) -> float:
-    """theta_1 or theta_4 of the thesis (its polygon sums to zero) in our convention, and back, rad."""
+    """Convert theta_1 or theta_4 of the thesis (its polygon sums to zero) to our convention, or back, rad."""
     return math.remainder(theta + math.pi, 2.0 * math.pi)
 
 

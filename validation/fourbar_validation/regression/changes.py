@@ -180,7 +180,7 @@ def compare_runs(
 
 
 def _rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
-    """Each scene of the old run by the name that the new one gives it; nothing is held where none has another."""
+    """Return the old run's scenes under the new run's names; nothing is held in memory if none differs."""
     if not names:
         return scenes
     return sorted(((names.get(name, name), some) for name, some in scenes), key=lambda each: each[0])
@@ -193,7 +193,7 @@ def group_by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
 
 
 def _merge_scenes(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
-    """Each scene that either run has, with what both have of it; InputError where the scenes are not in order."""
+    """Yield each scene that either run has, with what both have of it; InputError where the scenes are not in order."""
     both = merge(_require_order("OLD", old), _require_order("NEW", new), key=lambda each: each[0])
     for scene, some in groupby(both, key=lambda each: each[0]):
         rows = {run: each for _, run, each in some}

@@ -79,7 +79,7 @@ class Fault:
 
     @property
     def sentences(self) -> list[str]:
-        """Who disagrees, and in how many of their scenes; the most frequent first."""
+        """List who disagrees, and in how many of their scenes; the most frequent first."""
         counts: Counter[str] = Counter()
         of: Counter[str] = Counter()
         for (text, engines), n in self._who.items():
@@ -105,7 +105,7 @@ def find_cause(of: Change) -> str:
 
 
 def write_sentence(worse: set[str], exact: set[str]) -> str:
-    """Who is at fault in a scene where the rows of `worse` regressed; `exact` are the engines held to round-off."""
+    """Say who is at fault in a scene where the rows of `worse` regressed; `exact` are the engines held to round-off."""
     engines = worse - {FORMULAS}
     if len(exact) > 1 and engines >= exact:
         if FORMULAS in worse:

@@ -22,7 +22,7 @@ ROWS = 5
 
 
 def write_verdict(found: Differences) -> str:
-    """One line: how many regressions among how many rows, what else moved, and the counts of the new run."""
+    """Write one line: how many regressions among how many rows, what else moved, and the counts of the new run."""
     counts = [f"{found.kinds[kind]} {kind.value}" for kind in Kind if found.kinds[kind]]
     many = found.regressed
     head = f"{many} regression{'s' if many > 1 else ''}" if many else "No regression"
@@ -34,7 +34,7 @@ def write_verdict(found: Differences) -> str:
 
 
 def write_line(change: Change) -> str:
-    """One change in one line of text."""
+    """Write one change in one line of text."""
     name = " / ".join(part for part in change.key if part)
     if change.old is None:
         assert change.new is not None

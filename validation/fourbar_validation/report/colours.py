@@ -20,7 +20,7 @@ class Style(NamedTuple):
 
     @property
     def line(self) -> dict[str, Any]:
-        """A curve with its marks, as matplotlib takes it."""
+        """Return the style of a curve with its marks, as matplotlib takes it."""
         return {"color": self.colour, "marker": self.marker, "markersize": 3.5, "linewidth": 1.0}
 
 

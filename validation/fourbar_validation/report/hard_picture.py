@@ -62,7 +62,7 @@ def list_approaches() -> list[Approach]:
 
 
 def list_errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array] | None:
-    """(theta_2, error relative to the value itself) of one engine, or None where it refuses."""
+    """Return (theta_2, error relative to the value itself) of one engine, or None where it refuses."""
     where = command(scene)
     if witness.through_time:
         psi = np.abs(where.theta_2 - where.theta_2[0]) - abs(where.theta_2[-1] - where.theta_2[0])
@@ -123,7 +123,7 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
 
 
 def _find_singular(approach: Approach) -> float:
-    """theta_2 of the singular position: the positions lie at the distances from it."""
+    """Return theta_2 of the singular position: the positions lie at the distances from it."""
     theta_2 = command(approach.scene).theta_2
     side = math.copysign(1.0, float(theta_2[0] - theta_2[-1]))
     return float(theta_2[0]) - side * float(approach.distances[0])

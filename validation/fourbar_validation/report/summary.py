@@ -84,7 +84,7 @@ OWN_ENGINES = (FORMULAS, *SHIPPED)
 """Engines whose rows compare what is ours with what is ours: identities, and what else is shipped."""
 SCENES_SHOWN = 200
 PICTURED = 24
-"""Scenes with pictures, where fewer fail: to draw one takes ten times as long as to judge it by an exact engine."""
+"""Scenes with pictures, if fewer fail: drawing one takes ten times as long as judging it by an exact engine."""
 WORST_SHOWN = 80
 LOOSEST_SHOWN = 5
 ORDERS_SHOWN = 20
@@ -107,7 +107,7 @@ class Summary:
         self.counts = Counts()
         self.versions, self.machine = list_versions(), name_machine()
         self.failures: list[Row] = []
-        """At most FAILURES_KEPT of them."""
+        """Failures, at most FAILURES_KEPT of them."""
         self.pairs = self.loose = 0
         """Quantities of a scene that were compared, and those of them that no row judges tighter than degraded."""
         self._loosest: list[Row] = []
@@ -194,7 +194,7 @@ class Summary:
 
     @property
     def engines(self) -> list[EngineLine]:
-        """Every independent engine by name, then our own consistency."""
+        """Return every independent engine by name, then our own consistency."""
         versions = {name.lower(): version for name, version in self.versions.items()}
         for line in self._engines.values():
             line.version = versions.get(line.name.partition("-")[0], "")
@@ -209,7 +209,7 @@ class Summary:
 
     @property
     def refusals(self) -> list[tuple[str, str, int]]:
-        """(engine, reason, number of scenes): declared limits that were met.
+        """Return (engine, reason, number of scenes) of declared limits that were met.
 
         Reasons that differ by their numbers alone are one, with the numbers of the first scene.
         """
@@ -237,7 +237,7 @@ class Summary:
 
     @property
     def shown(self) -> list[Record]:
-        """The scenes shown one by one, by name, at most SCENES_SHOWN: those that fail, then those that used most."""
+        """Return the scenes shown, by name, at most SCENES_SHOWN: those that fail, then those that used most."""
         return sorted(self._find_most_used(SCENES_SHOWN), key=lambda scene: scene.name)
 
     @property

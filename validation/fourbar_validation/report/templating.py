@@ -50,7 +50,7 @@ def write_cell(text: object) -> str:
 
 
 def write_share(value: float) -> str:
-    """error/allowed in two digits."""
+    """Write error/allowed in two digits."""
     if math.isinf(value):
         return "∞"
     return "0" if value == 0.0 else "<0.01" if value < 0.01 else f"{value:.2f}" if value < 10.0 else f"{value:.1e}"

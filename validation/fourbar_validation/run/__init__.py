@@ -1,1 +1,1 @@
-"""The run: every witness on every scene, in parallel, resumable."""
+"""Run every engine on every scene, in parallel, resumable."""

@@ -56,9 +56,9 @@ CHECKS = (
     *(Check(rows, shipped=True) for rows in (study, sensitivity, internal_forces, extremes, tolerances, equilibria)),
     *(Check(rows, shipped=True, theta_2=f"{rows.__name__}: the file opens at theta_2") for rows in (sdf, usd)),
 )
-"""All that is checked of a scene; one that raises costs its own rows."""
+"""All checks of a scene. An exception in a check fails its own rows only."""
 OUTPUT = "output.txt"
-"""In the folder of a run: what the engines printed."""
+"""File in the folder of a run with what the engines printed."""
 
 
 def judge_for_report(
@@ -116,7 +116,7 @@ def judge(
 
 
 def ask(name: str, scene: Scene, witnesses: Sequence[Witness]) -> Question:
-    """Put a scene to the witnesses that it needs, each position once; say what is left out."""
+    """Put a scene to the engines that it needs, each position once; say what is left out."""
     at = command(scene)
     if scene.motion.free is not None:
         return Question(name, scene, at, witnesses)
@@ -131,7 +131,7 @@ def ask(name: str, scene: Scene, witnesses: Sequence[Witness]) -> Question:
 
 
 def _choose_called_for(witnesses: Iterable[Witness], at: Command, left_out: list[str]) -> Iterator[Witness]:
-    """Choose the witnesses that the question needs; the others are left out before their engine is imported."""
+    """Choose the engines that the question needs; the others are left out before they are imported."""
     for witness in witnesses:
         reason = None
         if at.speed is None:

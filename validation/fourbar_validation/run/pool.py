@@ -21,7 +21,7 @@ SECONDS_PER_POSITION = 0.03
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One scene for a worker: its place in a suite, its witnesses, whether it is drawn, and judged as shipped too."""
+    """One scene for a worker: its place in a suite, its engines, whether it is drawn, and judged as shipped too."""
 
     suite: Suite
     scene: int

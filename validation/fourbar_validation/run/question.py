@@ -68,7 +68,7 @@ class Question:
 
     @cached_property
     def free_body(self) -> Answer | None:
-        """The answer of the free bodies, or None where they break down: a row of their own fails."""
+        """Return the answer of the free bodies, or None if they break down: a row of their own fails."""
         try:
             with np.errstate(all="ignore"):
                 return self.answer(FREE_BODY)
@@ -85,13 +85,13 @@ class Question:
             return None
 
     def engine(self, witness: Witness) -> Engine:
-        """Start the engine of a witness, once."""
+        """Start an engine, once."""
         if witness.name not in self.started:
             self.started[witness.name] = witness.engine()
         return self.started[witness.name]
 
     def answer(self, witness: Witness) -> Answer:
-        """Ask a witness, once."""
+        """Ask an engine, once."""
         if witness.name not in self.answered:
             with keep_printed(self.output, witness.name):
                 engine, begin = self.engine(witness), time.perf_counter()

@@ -26,7 +26,7 @@ LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
 
 
 def adjust_witnesses(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
-    """Lay out whatever runs through time for `error`, which it is held to; exact witnesses stay exact."""
+    """Lay out whatever runs through time for `error`, its allowed error; exact engines stay exact."""
     tolerance = hold_simulated(error, "steps and softness are laid out for it")
     own: dict[str, Any] = {"engine": partial(Dialled, error), "tolerance": tolerance, "order": None}
     return tuple(replace(each, **own) if each.through_time else each for each in witnesses)

@@ -22,7 +22,7 @@ def select_scenes(
     guests: Sequence[str] = (),
     seconds: float | None = None,
 ) -> tuple[Suite, tuple[Witness, ...]]:
-    """Select the scenes, and the witnesses with what they are held to there.
+    """Select the scenes, and the engines with their tolerances there.
 
     `guests`: those of the command line, with the time in which each must answer, s.
     """
@@ -44,7 +44,7 @@ def choose_witnesses(
     folders: Sequence[Path] = (),
     seconds: float | None = None,
 ) -> tuple[Witness, ...]:
-    """Choose the witnesses named in a comma-separated list, and the guests, which are named by being given.
+    """Choose the engines named in a comma-separated list, and the guests, which are named by being given.
 
     Where there is no list, all but those that need not be installed. A name that is no witness's is sought in the
     engines.toml of these folders and of the package; `seconds`: in which such an engine must answer.

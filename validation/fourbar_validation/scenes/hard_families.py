@@ -154,7 +154,7 @@ def scale_sizes(*, exponents: range = range(-6, 7, 2)) -> Scenes:
 
 
 def scale_speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
-    """omega_2 from 1e-6 to 1e6 rad/s, in both senses."""
+    """Vary omega_2 from 1e-6 to 1e6 rad/s, in both senses."""
     base = sweep_turn(dress(PLAIN))
     for k in exponents:
         for sign, name in ((1.0, "+"), (-1.0, "-")):

@@ -74,7 +74,7 @@ def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
 
 
 def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
-    """(psi, branch) where bars 2, 3 are collinear, so omega_4 = 0: O2, B, O4 form a triangle with O2 B = |a +- b|."""
+    """Find (psi, branch) where bars 2, 3 are collinear, so omega_4 = 0: triangle O2, B, O4 with O2 B = |a +- b|."""
     d, a, b, c = lengths
     result = []
     for along in (a + b, a - b):
@@ -85,7 +85,7 @@ def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
 
 
 def find_parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
-    """(psi, branch) where bars 2, 4 are parallel, so omega_3 = 0: (a - c) e^{i psi} + b e^{i psi_3} = d, or a + c."""
+    """Find (psi, branch) where bars 2, 4 are parallel, omega_3 = 0: (a - c) e^{i psi} + b e^{i psi_3} = d, or a + c."""
     d, a, b, c = lengths
     result = []
     for joined, side in ((a - c, 1.0), (a + c, -1.0)):

@@ -99,7 +99,7 @@ CLEARANCE = 0.02
 
 
 def draw_lengths(rng: np.random.Generator, kind: DrawnType) -> tuple[float, float, float, float]:
-    """(ground, input, coupler, output) of the given type, longest bar 1, away from change points."""
+    """Draw (ground, input, coupler, output) of the given type, longest bar 1, away from change points."""
     while True:
         lengths = np.sort(rng.uniform(0.1, 1.0, 4))
         lengths[3] = 1.0
@@ -181,7 +181,7 @@ def _draw_springs(rng: np.random.Generator, linkage: FourBar, weight: float, ran
 
 
 def draw_uneven_lengths(rng: np.random.Generator, crank: Draw, coupler: Draw) -> tuple[Sequence[float], float]:
-    """(ground, input, coupler, output), m, and an angle theta_2 - theta_1 at which they close, rad.
+    """Draw (ground, input, coupler, output), m, and an angle theta_2 - theta_1 at which they close, rad.
 
     `crank` and `coupler`: of the ground, and of the diagonal from A to O4 at that angle.
     """

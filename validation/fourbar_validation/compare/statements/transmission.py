@@ -103,7 +103,7 @@ def _compare_over(scene: Scene, answer: Answer, predicted: Predicted | None) -> 
 
 
 def _find_collinear(linkage: FourBar) -> list[float]:
-    """theta_2 where bars 3 and 4 are collinear on either branch."""
+    """Return theta_2 where bars 3 and 4 are collinear on either branch."""
     limits = mobility.limit_positions(linkage)
     return [*(limit.theta_2 for limit in limits), *mobility.change_points(linkage)]
 

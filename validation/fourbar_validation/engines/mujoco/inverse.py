@@ -100,7 +100,7 @@ class MujocoTree(Tree):
         return np.asarray((self._jac @ self.a + self._dot @ self.v)[:2])
 
     def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
-        """mj_inverse, less what loads and effects do on the coordinates."""
+        """Return the result of mj_inverse less what loads and effects do on the coordinates."""
         self.model.opt.gravity[:] = (*field, 0.0)
         self.data.xfrc_applied[:] = 0.0
         mujoco.mj_inverse(self.model, self.data)
@@ -111,7 +111,7 @@ class MujocoTree(Tree):
         return np.asarray(self.data.qfrc_inverse - applied)
 
     def carried(self) -> dict[int, Array]:
-        """cfrc_int, the force of the parent on each body."""
+        """Return cfrc_int, the force of the parent on each body."""
         for bar, (x, y, moment) in self.wrenches.items():
             body = self.body[bar]
             to_x, to_y = (self.data.xipos[body] - self.data.xpos[body])[:2]  # xfrc_applied acts at the mass centre

@@ -54,7 +54,7 @@ RANGES = {
     "actuator_ctrlrange": ("actuator_ctrllimited", "ctrlrange"),
     "actuator_actrange": ("actuator_actlimited", "actrange"),
 }
-"""Each with the field that says whether it holds."""
+"""Fields, each with the field that says whether it holds."""
 COUNTED = {"nflex": "flexes", "nplugin": "plugins"}
 """Elements that the generated file never has: any of them is a difference."""
 

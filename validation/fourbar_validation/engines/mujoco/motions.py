@@ -40,7 +40,7 @@ class Steady:
         return self.run.timestep(settings, at_least=self.width) if self.width else 1e-3
 
     def seconds(self, index: int) -> float:
-        """When it passes a position, from the start of the segment: by the angle."""
+        """Return the time at which it passes a position, by the angle from the start of the segment."""
         return self.run.time(float(self.theta_2[index]))
 
     def speed(self, turned: float, seconds: float) -> float:

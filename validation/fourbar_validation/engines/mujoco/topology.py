@@ -191,7 +191,7 @@ class Topology:
 
     @property
     def ground_angle(self) -> float:
-        """theta_1, rad."""
+        """Return theta_1, rad."""
         return self._line[1]
 
     def rest_angle(self, pin: str) -> float:
@@ -234,7 +234,7 @@ class Topology:
         return np.asarray(q)
 
     def angles(self, data: mujoco.MjData) -> Array:
-        """(theta_2, theta_3 - theta_2, theta_4) of a state."""
+        """Return (theta_2, theta_3 - theta_2, theta_4) of a state."""
         moved = np.empty(3)
         for joint in self.hinge.values():
             address = self.model.jnt_qposadr[joint]
