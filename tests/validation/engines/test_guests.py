@@ -23,6 +23,7 @@ from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests
 from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.report.summary import Summary
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.run.selection import select_scenes
@@ -296,6 +297,23 @@ def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
     if sys.platform == "linux":
         time.sleep(2.0)
         assert not list_processes(f"MARK_OF_TEST={tmp_path}")
+
+
+def test_a_report_shows_the_versions_that_guests_state(tmp_path: Path) -> None:
+    stated = {"numpy-like": "", "own": "2.1", "own 3.0": "3.0"}
+    hello = '["gravity"]}'
+    entries = [
+        write_program(tmp_path, name, (hello, f'["gravity"], "version": "{version}"}}'))
+        for name, version in stated.items()
+    ]
+    save(SCENE, tmp_path / "scene.toml")
+    suite = read_scene_files([tmp_path / "scene.toml"])
+    steps = run(suite, tmp_path / "out", guests.read_guests(entries, ()), RunOptions(drawn=False))
+    *_, summary = steps
+    assert isinstance(summary, Summary)
+    shown = {line.name: line.version for line in summary.engines if line.name in stated}
+    assert shown == {"numpy-like": "", "own": "2.1", "own 3.0": ""}
+    assert "| own 2.1 |" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
 
 
 NEAR = """

@@ -3,7 +3,7 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import nlargest
 from operator import attrgetter
@@ -119,6 +119,8 @@ class Summary:
         """engine: (shared with the formulas, found alone)."""
         self.tolerances: Sequence[ErrorBound] = (IDENTITY, EQUIVALENCE, SIMULATED)
         """Tolerances of the engines."""
+        self.stated: Mapping[str, str] = {}
+        """Version that each guest states of itself, nothing where it states none."""
         self.missing: Sequence[tuple[str, str]] = ()
         """(engine, why it could not run here)."""
         self._engines: dict[str, EngineLine] = {}
@@ -197,7 +199,8 @@ class Summary:
         """Return every independent engine by name, then our own consistency."""
         versions = {name.lower(): version for name, version in self.versions.items()}
         for line in self._engines.values():
-            line.version = versions.get(line.name.partition("-")[0], "")
+            version = self.stated.get(line.name, versions.get(line.name.partition("-")[0], ""))
+            line.version = "" if line.name.endswith(f" {version}") else version
         return sorted(self._engines.values(), key=lambda line: (line.name == OWN, line.name))
 
     @property

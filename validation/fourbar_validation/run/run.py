@@ -12,7 +12,7 @@ from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.columns import Columns, read_columns
 from fourbar_validation.compare.rows import FAILS, FORMULAS, Row, make_plain, write_csv
 from fourbar_validation.compare.tolerance import IDENTITY
-from fourbar_validation.engines.guests import list_numbers
+from fourbar_validation.engines.guests import Guest, list_numbers
 from fourbar_validation.engines.hard_suite import Hard
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.regression.record import ABOUT, COLUMNS, TABLE, describe_run, write_about
@@ -114,6 +114,7 @@ def run(
         summary = Summary()
         summary.tolerances = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
         summary.missing = missing
+        summary.stated = {guest.name: guest.version for guest in witnesses if isinstance(guest, Guest)}
         with Columns(out) as columns, draft_file(out / OUTPUT) as output, draft_file(out / "timings.csv") as times:
             times.write(write_csv(TIMINGS, []))
             for number, scenes in enumerate(chunks):
