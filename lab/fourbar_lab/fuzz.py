@@ -151,7 +151,7 @@ def shrink_scene(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
     lines = dump(scene).splitlines()
     for _ in range(ROUNDS):
         before = lines
-        for number in reversed(range(len(lines))):  # what a change takes away lies behind
+        for number in reversed(range(len(lines))):  # lines that a change removes lie behind
             for simpler in _list_simpler(lines, number):
                 try:
                     other = loads("\n".join(simpler))
@@ -229,7 +229,7 @@ def _check_engines(question: Question) -> list[str]:
         answer = witness.engine().answer(scene, at)
         predicted = make_prediction(witness, scene, at, answer)
         rows += Comparison("", scene, answer, solution, witness.tolerance, witness.expected, predicted).rows()
-        if witness.name == "pinocchio-inverse" and answer.refusal is None:  # of two exact engines the quicker one
+        if witness.name == "pinocchio-inverse" and answer.refusal is None:  # the quicker of two exact engines
             rows += check_statements("", scene, witness.engine(), answer, predicted=predicted)
     # half of the scenes are drawn where doubles have few digits: that they are undecided is no fault
     failed = [row for row in rows if row.verdict == FAILS and row.quantity != "undecided"]

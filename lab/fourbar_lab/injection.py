@@ -101,7 +101,7 @@ def main() -> None:
         print(json.dumps(list_failing([])))
     for number in map(int, sys.argv[1:]):
         for name in [name for name in sys.modules if name.partition(".")[0] in (*PACKAGES, "fourbar_lab")]:
-            del sys.modules[name]  # of the fault before; the engines' libraries stay
+            del sys.modules[name]  # modules of the previous fault; the engines' libraries stay
         entry = read_faults()[number]
         finder = FaultFinder(entry)
         sys.meta_path.insert(0, finder)

@@ -75,7 +75,7 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
             own, rate = np.ravel(found[name])[index], sensitivity[component]
             if internal and name in PIN_FORCES:  # a component that the drive has no part in is left of larger ones
                 rate = max(sensitivity[other] for other, _ in list_components(name))
-            if library != "numpy":  # whose lengths are no constants: no bar rests or stays parallel exactly
+            if library != "numpy":  # lengths are no constants there: no bar rests or stays parallel exactly
                 rate += max(compute_allowed(0.0, sensitivity[other]) for other, _ in list_components(name))
             part, errors[component] = compute_ratio(name, own, values[component], rate)
             tally.note(component, part, sample)

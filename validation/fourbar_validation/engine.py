@@ -143,7 +143,7 @@ if __name__ == "__main__":
     with os.fdopen(os.dup(0), "rb") as questions, os.fdopen(os.dup(1), "wb") as replies:
         with open(os.devnull, "rb") as nothing:
             os.dup2(nothing.fileno(), 0)
-        os.dup2(2, 1)  # what an engine prints is no answer
+        os.dup2(2, 1)  # an engine's prints are no answer
         try:
             serve(" ".join(sys.argv[1:]), questions, replies)
         except NotFoundError as error:

@@ -121,7 +121,7 @@ class ExudynBars(Loaded):
         return np.array(self.solver.GetSystemResidual())[SIZE:]
 
     def _read_constraint_jacobian(self) -> Array:
-        self.solver.SetSystemJacobian(np.zeros((2 * SIZE, 2 * SIZE)))  # what is computed is added
+        self.solver.SetSystemJacobian(np.zeros((2 * SIZE, 2 * SIZE)))  # the computed values are added to it
         self.solver.ComputeJacobianAE(
             self.mbs, scalarFactor_ODE2=1.0, scalarFactor_ODE2_t=0.0, scalarFactor_ODE1=0.0, velocityLevel=False
         )

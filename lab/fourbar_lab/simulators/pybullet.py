@@ -79,7 +79,7 @@ def through(scene: Scene, steps: int, setting: str) -> Readings:
             after, q, speed = bullet.getJointState(body, 0), [state[0] for state in before], before[0][1]
             force = [-part for part in bullet.getConstraintState(ball)[:2]]  # it speaks of the force on the child
             theta = (q[0], q[0] + q[1], q[2])
-            wrenches = [bullet.getJointState(body, joint)[2] for joint in range(3)]  # of the parent, in the link's axes
+            wrenches = [bullet.getJointState(body, joint)[2] for joint in range(3)]  # by the parent, in the link's axes
             F12, F23, F14 = (rotate(angle, *wrench[:2]) for angle, wrench in zip(theta, wrenches, strict=True))
             pins = {"F12": F12, "F32": (-F23[0], -F23[1]), "F43": force, "F14": F14}
             return Instant(theta, speed, (after[1] - speed) / timestep, after[3], pins)

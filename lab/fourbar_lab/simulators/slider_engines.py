@@ -127,7 +127,7 @@ def serve(
 
 if __name__ == "__main__":
     with os.fdopen(os.dup(1), "wb") as stdout:
-        os.dup2(2, 1)  # what an engine prints is no answer
+        os.dup2(2, 1)  # an engine's prints are no answer
         module = import_module(f"fourbar_lab.simulators.slider_{sys.argv[1]}")
         loop = getattr(module, f"{sys.argv[1].capitalize()}Slider")
         hello = {"engine": sys.argv[1], "version": module.VERSION, "answers": list(ANSWERS),

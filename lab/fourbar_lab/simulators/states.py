@@ -44,7 +44,7 @@ def answer(module: Any, setting: str, question: dict[str, Any]) -> dict[str, Any
 
 if __name__ == "__main__":
     with os.fdopen(os.dup(1), "wb") as stdout:
-        os.dup2(2, 1)  # what a simulator prints is no answer
+        os.dup2(2, 1)  # a simulator's prints are no answer
         module = import_module(f"fourbar_lab.simulators.{sys.argv[1]}")
         hello = {"engine": sys.argv[1], "version": module.VERSION, "answers": list(ANSWERS), "effects": ["gravity"]}
         serve(hello, partial(answer, module, sys.argv[2]), sys.stdin.buffer, stdout)

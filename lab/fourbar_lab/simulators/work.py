@@ -36,5 +36,5 @@ def main(module: str, file: str, answers: TextIO) -> None:
 
 if __name__ == "__main__":
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as stdout:
-        os.dup2(2, 1)  # what a simulator prints is no answer
+        os.dup2(2, 1)  # a simulator's prints are no answer
         main(sys.argv[1], sys.argv[2], stdout)

@@ -173,7 +173,7 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
                 )
                 if f == plain and all(judge.explained(key, judge.ours(key, wrong)) for key in keys):
                     break
-        except FourBarError:  # what the factor makes of this scene is none
+        except FourBarError:  # the factor leaves no valid scene
             continue
 
 

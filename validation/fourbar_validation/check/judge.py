@@ -125,12 +125,12 @@ class Judge:
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
         """(error, allowed, apart) of the table where `ours` is taken for the right numbers, each (n,)."""
         quantity, size = name_quantity(key), self.size(key)
-        scale = replace_zero_size(size)  # what all its terms leave 0
+        scale = replace_zero_size(size)  # quantities whose terms are all 0
         theirs = self.table.values[key]
         theirs = np.where(np.isnan(theirs), ours, theirs)  # a component that their table does not have
         apart = compute_difference(quantity, ours, theirs)
         condition = find_condition(quantity, self.scene.linkage, self.right)
-        # what a mistake would have printed is rounded at its own size, however much larger
+        # the number a mistake would have printed is rounded at its own size, however much larger
         there = self.ours(key)
         larger: Array | float = 1.0
         if ours is not there and not quantity.startswith("theta"):

@@ -45,7 +45,7 @@ def list_hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
     for text, changed, where in _list_other_problems(scene, at):
         try:
             wrong = solve(changed, "position" if where.omega_2 is None else "force", at=where)
-        except FourBarError:  # what the mistake makes of this scene is none
+        except FourBarError:  # the mistake leaves no valid scene
             continue
         yield Mistake(text, lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None))  # type: ignore[misc]
 

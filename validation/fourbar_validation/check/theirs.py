@@ -181,7 +181,7 @@ def _read_columns(
         name = result["name"] + (result["letter"] or "") if result else heading.strip()
         quantity = name[:-2] if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS else name
         if not name and index >= len(headings) - 1:
-            continue  # what a spreadsheet leaves at the end of a line
+            continue  # an empty cell that a spreadsheet leaves at the end of a line
         if result is None or quantity in NOT_JUDGED or quantity not in UNITS:
             left_out[heading.strip() or f"column {index + 1}"] = NOT_JUDGED.get(quantity, "not a known column")
             continue

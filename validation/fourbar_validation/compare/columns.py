@@ -43,7 +43,7 @@ class Columns:
         self._schema = pa.schema([(field.name, kinds[field.type]) for field in fields(Row)])  # type: ignore[index]
         self._text, self._columns = (self.out / f".results.{kind}.part" for kind in ("csv", "parquet"))
         with self._files:
-            self._files.enter_context(name_file(self.out / "results.csv"))  # what fails on closing is named too
+            self._files.enter_context(name_file(self.out / "results.csv"))  # a failure on closing is named too
             self._csv = self._files.enter_context(self._text.open("w", encoding="utf-8", newline=""))
             self._files.enter_context(name_file(self.out / "results.parquet"))
             self._parquet = self._files.enter_context(pq.ParquetWriter(self._columns, self._schema))

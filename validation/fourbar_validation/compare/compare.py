@@ -175,7 +175,7 @@ class Comparison:
         where &= ~jumping
         note = f"; not judged: {withheld}" if withheld else ""
         if jumping.any():
-            count = int(np.count_nonzero(jumping))  # of either side of a reversal the forces are right
+            count = int(np.count_nonzero(jumping))  # the forces of either side of a reversal are right
             self.decided += count
             note += f"; {count} positions at which dry friction reverses not judged"
         if not where.any():
@@ -290,7 +290,7 @@ def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
         stated = (formulas.status_code == JAMMED) & np.isfinite(magnitude(ours))
         return np.asarray(stated | (formulas.status_code == OK))
     beyond = (formulas.status_code == OVERFLOW) & np.isnan(magnitude(ours))
-    jammed = (formulas.status_code == JAMMED) & (quantity == "drive_condition")  # which holds how near that is
+    jammed = (formulas.status_code == JAMMED) & (quantity == "drive_condition")  # drive_condition says how near that is
     return np.asarray((formulas.status_code != SINGULAR) & ~beyond & ~jammed)
 
 

@@ -113,9 +113,9 @@ def make_breakdown(scene: str, engine: str, error: BaseException, part: str = ""
     """Make the row of an engine that raised, took its process with it, or never came back; `part`: in what."""
     if isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
-    elif type(error).__name__ == "ProcessExpired":  # of Pebble
+    elif type(error).__name__ == "ProcessExpired":  # raised by Pebble
         reason = f"the engine crashed its process (exit code {getattr(error, 'exitcode', None) or 0})"
-    elif type(error).__name__ == "KilledWorker":  # of Dask
+    elif type(error).__name__ == "KilledWorker":  # raised by Dask
         reason = "the engine crashed its process, or hung and was stopped"
     else:
         reason = str(error) if isinstance(error, WitnessError) else say_error(error)

@@ -101,7 +101,7 @@ def _sum_accelerations(quantity: str, scene: Scene, formulas: Solution) -> Array
 def _sum_forces(quantity: str, scene: Scene, formulas: Solution) -> Array:
     assert formulas.drive_condition is not None
     gain = 1.0
-    if scene.drive is not None:  # of a short lever the force is as many times larger
+    if scene.drive is not None:  # a short lever makes the force as many times larger
         short = place_line(scene.linkage, scene.drive, {bar: np.zeros(1) for bar in MOVING_BARS}).most
         gain = max(1.0, max(scene.linkage.lengths) / short)
     return np.asarray(gain * _sum_force_terms(scene, formulas) / formulas.drive_condition)
@@ -181,7 +181,7 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     reference.at = answer.at
     if answer.at.speed is not None:
         rates = (("omega", answer.at.speed), ("alpha", answer.at.acceleration))
-        for name, x in rates if answer.at.stroke is None else ():  # of a stroke the engine finds them
+        for name, x in rates if answer.at.stroke is None else ():  # the engine finds them if a stroke is commanded
             setattr(reference, f"{name}_{answer.at.bar}", np.broadcast_to(np.asarray(x, float), theta_2.shape))
         if reference.omega_3 is not None and reference.omega_4 is not None:
             _add_velocities(scene.linkage, theta, reference)

@@ -99,7 +99,7 @@ def _draw_work_precision(curves: Mapping[str, Sequence[CostPoint]], quantity: st
             style["zorder"] = 3 if look[0] == "recommended" else 2
             draw_line(axes, *_compute_places(row, quantity), label, look, ms=5.5, lw=1.8, **style)
             labels.keep_off(axes, *zip(*_compute_places(row, quantity), strict=True), width=1.8)
-    for point in points:  # what a new user gets
+    for point in points:  # the point that a new user gets
         if point.setting == DEFAULT and math.isfinite(error := getattr(point, quantity)):
             axes.plot(
                 *_compute_places([point], quantity), marker="*", ms=19, color="#d55e00", mec="black", mew=0.9, zorder=5

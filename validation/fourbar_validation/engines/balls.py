@@ -119,7 +119,7 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
     if not y["condition"] > 0:  # singular; NaN where A lies on O4, about which bars 3 and 4 then turn freely
         return y
     zero = acb(0)
-    side = {2: a * w[2], 3: b * w[3], 4: -c * w[4]}  # of the loop
+    side = {2: a * w[2], 3: b * w[3], 4: -c * w[4]}  # sides of the loop
 
     def rates(stated: Ball, known: Complex) -> dict[int, Ball]:
         """Solve for the rates of the other bars, where the sum of i side rate is given."""
@@ -128,7 +128,7 @@ def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
         found = solve_linear([[u.real, v.real], [u.imag, v.imag]], [known.real, known.imag])
         return {bar: stated, **dict(zip((one, other), found, strict=True))}
 
-    # what a probe opens the loop by: slip, m/s, and jerk, m/s^2
+    # a probe opens the loop by slip, m/s, and jerk, m/s^2
     omega = rates(x[f"omega_{bar}"], x.get("slip", zero))
     centripetal = sum((side[k] * omega[k] ** 2 for k in MOVING_BARS), zero)
     alpha = rates(x[f"alpha_{bar}"], x.get("jerk", zero) + centripetal)

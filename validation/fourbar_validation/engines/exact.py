@@ -76,7 +76,7 @@ def compute_sines(linkage: FourBar, command: Command) -> Array:
     result = np.full(len(command.theta_2), np.nan)
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         closed = closure(x | {"theta_2": arb(theta_2)}, branch)
-        # with A on O4 bars 3 and 4 have no direction
+        # bars 3 and 4 have no direction if A is on O4
         result[i] = math.nan if closed is None else np.nan_to_num(_to_double(wedge(*closed[1:])))
     return result
 

@@ -42,7 +42,7 @@ def find_angle(command: Command, motion: Motion, arm: complex, ground: complex) 
     theta = towards + sense * 0.5 * (low + high)
     if motion.stroke_speed is None:
         return command._replace(angle=theta, speed=None)
-    line, velocity = across(theta), 1j * arm * np.exp(1j * theta)  # of the end, per rad/s
+    line, velocity = across(theta), 1j * arm * np.exp(1j * theta)  # velocity of the end, per rad/s
     stroke = np.abs(line)
     with np.errstate(all="ignore"):
         slope = (np.conj(line) * velocity).real / stroke

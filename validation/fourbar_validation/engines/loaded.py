@@ -98,7 +98,7 @@ class Loaded(EngineBars, Protocol):
         self.linear, self.driving = scene.drive, name_driving(scene)
         self.loaded = [pin for effect in scene.effects for pin in effect.loaded_pins]
 
-    # what the engine gives
+    # methods that the engine defines
     def point(self, name: str) -> Array:
         """Locate a point that `description.parts` names, world axes, (2,), m; perhaps the engine's own memory."""
 
@@ -111,7 +111,7 @@ class Loaded(EngineBars, Protocol):
     def alpha(self, bar: int) -> float:
         """Return the angular acceleration of a bar, rad/s^2."""
 
-    # what follows
+    # methods that follow from these
     def angle(self, bar: int) -> float:
         """Compute the direction from the bar's axes; the ground's line as described."""
         if bar == 1:

@@ -57,7 +57,7 @@ class Assembler:
             for vector in (diagonal, at["O4"], *(along[other] for other in CLOSING[bar]), along[bar])
         )
         closed = ROUNDING * (own + d + near + far)
-        # with a bar held, the gap is stationary only where the others lie along the diagonal: this is its least value
+        # the gap with a bar held is stationary only where the others lie along the diagonal: this is its least value
         if max(e - (near + far), abs(near - far) - e) > closed:
             return None
         phi = math.atan2(diagonal[1], diagonal[0])

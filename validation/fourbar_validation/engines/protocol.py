@@ -123,7 +123,7 @@ def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
     time = _read_list("time", data["time"], n) if data.get("time") is not None else None
     command = Command(places, branch, omega, alpha, _read_digits(data.get("remainder"), n), time, scene.motion.bar)
     if place == "stroke":
-        unknown: Array = np.full(n, np.nan)  # of the bar nothing is commanded
+        unknown: Array = np.full(n, np.nan)  # no motion of the bar is commanded
         command = command._replace(angle=unknown, speed=None if omega is None else unknown, acceleration=unknown)
         command = command._replace(stroke=places, stroke_speed=omega)
     return scene, command
@@ -337,7 +337,7 @@ def read_motion(data: Any, command: Command) -> Command:
     if acceleration is None:
         acceleration = command.acceleration if command.stroke is None else 0.0
     made = Command(_read_list(names[0], data[names[0]], n), branch, speed, acceleration, bar=bar)
-    if command.stroke is not None:  # of a stroke nothing of the bar is commanded: who asked knows its motion
+    if command.stroke is not None:  # a stroke commands no motion of the bar: the caller knows its motion
         return made
     require_near(made, command)
     own: dict[str, Any] = {"angle": made.angle, "speed": speed, "acceleration": acceleration}

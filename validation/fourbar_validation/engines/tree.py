@@ -47,7 +47,7 @@ class Tree(Loaded, Protocol):
         self.turns = {1: np.zeros(3)} | {bar: self.turn(bar) for bar in MOVING_BARS}
         self.rows = np.stack([self.turns[bar] for bar in MOVING_BARS])
 
-    # what the engine gives
+    # methods that the engine defines
     def point_jacobian(self, name: str) -> Array:
         """Return the derivative of a point, (2, 3), m."""
 
@@ -66,9 +66,9 @@ class Tree(Loaded, Protocol):
     def carried(self) -> dict[int, Array]:
         """Return the force on each moving bar at its first pin, at the motion and wrenches last set, (2,), N."""
 
-    # what follows
+    # methods that follow from these
     def gap(self) -> tuple[float, float]:
-        """B on bar 3 minus B on bar 4."""
+        """Return B on bar 3 minus B on bar 4."""
         x, y = (self.point("end3") - self.point("end4")).tolist()
         return x, y
 

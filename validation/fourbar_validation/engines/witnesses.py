@@ -198,7 +198,7 @@ def make_prediction(witness: Witness, scene: Scene, at: Command, answer: Answer)
         return lambda quantity, where: answer.predicted.get(quantity, np.zeros(len(where)))
     predict = witness.predictor
     if at.bar != 2 or at.stroke is not None:
-        return None  # what predicts knows the command of bar 2 alone
+        return None  # the prediction knows the command of bar 2 alone
     if predict is None or (witness.tolerance.conditioned and (find_missing("flint") or find_refusal(scene))):
         return None  # the law in the condition stands alone
     return lambda quantity, where: predict(scene, at, quantity, where)

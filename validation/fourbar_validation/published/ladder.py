@@ -50,7 +50,7 @@ def published(show_all: bool, out: Path | None) -> int:
     """Compare the figures of the sources with ours; exit 1 on a difference that no erratum explains."""
     from rich.console import Console
 
-    try:  # what the last of the sources needs is missed before the first is printed
+    try:  # a missing requirement of the last source is noticed before the first is printed
         import_module("scipy.integrate")
     except ModuleNotFoundError:
         raise DependencyError(f"a free motion among the sources needs SciPy: {say_install('validation')}") from None

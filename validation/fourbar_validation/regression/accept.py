@@ -144,7 +144,7 @@ def accept_command(results: Path, to: Path | None, even_failing: bool) -> None:
     if counts.status != HOLDS and not even_failing:
         why = f"{counts[FAILS]} comparisons fail" if counts[FAILS] else "nothing was compared"
         raise InputError("RESULTS", str(results), f"must hold, or say --even-failing: {why}")
-    if not run.verified:  # nothing says whether it lost some of its rows
+    if not run.verified:  # the record does not say whether it lost some of its rows
         raise InputError(run.key, str(run.table), f"needs a {ABOUT} with its rows and SHA-256; `run` writes one")
     too_long = counts.total > CSV_ROWS
     if not too_long:  # first: if the table is damaged nothing is written

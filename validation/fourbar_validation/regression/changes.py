@@ -210,7 +210,7 @@ def _require_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, str, Seq
 
 
 def _index_rows(scene: str, rows: Iterable[Row]) -> dict[Key, Row]:
-    worst_last = sorted(rows, key=lambda row: VERDICTS.index(row.verdict))  # of two of one name the worse one counts
+    worst_last = sorted(rows, key=lambda row: VERDICTS.index(row.verdict))  # the worse of two rows of one name counts
     return {(scene, row.engine, row.setting, row.quantity): row for row in worst_last}
 
 

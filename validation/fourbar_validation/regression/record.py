@@ -242,7 +242,7 @@ def accept(run: Recorded, target: Path) -> None:
         if name in kept and (table := run.table.with_name(name)).is_file():
             _copy(table, target / name)
         else:
-            (target / name).unlink(missing_ok=True)  # of the state before
+            (target / name).unlink(missing_ok=True)  # a file of the previous state
     write_about(run.about, target)
 
 

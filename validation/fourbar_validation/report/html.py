@@ -144,7 +144,7 @@ def write_markdown(summary: Summary) -> str:
 def _make_view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
     rows = sort_rows(scene.rows)
     cells = [Cell(line, *each) for line, each in enumerate(zip(rows, compute_shares(rows), strict=True), first_line)]
-    ranked = sorted(reversed(cells), key=lambda cell: (cell.row.compared, cell.used))  # of a place the last stays
+    ranked = sorted(reversed(cells), key=lambda cell: (cell.row.compared, cell.used))  # the last cell of a place stays
     by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
     # a share of undecided numbers is no error, unless it fails
     worst = {cell.row.engine: cell for cell in ranked if cell.row.quantity != "undecided" or cell.row.failed}

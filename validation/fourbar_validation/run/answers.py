@@ -135,12 +135,12 @@ def compare_inertia(question: Question) -> Iterator[Row]:
 def _check_inertia(question: Question, bare: Question, witness: Witness) -> Iterator[Row]:
     answer, (loaded, _) = bare.answer(witness), question.answered.get(witness.name, (None, 0.0))
     if answer.refusal is not None and loaded is not None and loaded.refusal is not None:
-        return  # which has its row
+        return  # the refusal has its row
     drive = name_driving(question.scene)
     rows = compare_answer(bare, replace(witness, expected=(drive,)), answer)
     rows = [row for row in rows if row.quantity == drive or row.verdict in (REFUSES, FAILS)]
     rows = [row for row in rows if row.quantity != "undecided"]
-    if rows:  # what fails besides the torque, or stands in place of it, is not left out
+    if rows:  # a failure besides the torque, or in place of it, is not left out
         worst = max(rows, key=lambda row: VERDICTS.index(row.verdict))
         reason = worst.reason if worst.quantity in (drive, "all") else f"{worst.quantity}: {worst.reason}"
         yield replace(worst, quantity=f"{drive}_inertia", reason=reason)
@@ -149,7 +149,7 @@ def _check_inertia(question: Question, bare: Question, witness: Witness) -> Iter
 def _take_inertia(answer: Answer, drive: str) -> Answer:
     """Take the part of an answer that is of the bars' inertia."""
     alone = {**answer.quantities, drive: answer.quantities[f"{drive}_inertia"]}
-    alone.pop("drive_condition", None)  # which holds how near loads and friction are to jamming
+    alone.pop("drive_condition", None)  # it says how near loads and friction are to jamming
     return replace(answer, quantities=alone, evidence={}, alarms=[])
 
 

@@ -136,7 +136,7 @@ def _check_sums(question: Question) -> Iterator[Row]:
     first_pins = {2: np.zeros(2), 3: solution.A, 4: O4}
     for number in MOVING_BARS:
         force_on, couple = acting.on(number)
-        # what the ground pulls at bars 2 and 4 goes through their pins; between moving bars it cancels
+        # the ground's pull on bars 2 and 4 goes through their pins; between moving bars it cancels
         resultant = force_on + actions.through.get({2: "O2", 4: "O4"}.get(number, ""), 0.0)
         load = np.broadcast_to(resultant, len(solution))
         balance.push(np.stack([load.real, load.imag], axis=1), first_pins[number])
@@ -229,13 +229,13 @@ def compare_status(
     differ &= formulas.status_code != NOT_ASSEMBLED
     if reference.drive_condition is not None:
         own = [formulas.a_G2, formulas.a_G3, formulas.a_G4, *formulas.acceleration.values()]
-        # where all is there that the forces need, what is lacking is theirs
+        # if everything that the forces need is finite, a missing number is the forces' own
         moves = np.isfinite(np.hstack([a for a in own if a is not None])).all(axis=1)
         in_line = reference.drive_condition < IN_ONE_LINE
         differ |= (formulas.status_code == OVERFLOW) & moves & in_line
         differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (reference.drive_condition > NEAR)
     close = mark_touching(scene.linkage, formulas.theta_2) | (reference.condition < NEAR) | (formulas.condition < NEAR)
-    if sines is not None and len(near := np.flatnonzero(close)):  # where exact arithmetic has to decide
+    if sines is not None and len(near := np.flatnonzero(close)):  # exact arithmetic has to decide there
         sine = np.abs(sines(near))
         closes, in_line = np.isfinite(sine), formulas.status_code[near] == SINGULAR
         differ[near] |= (formulas.status_code[near] == NOT_ASSEMBLED) == closes

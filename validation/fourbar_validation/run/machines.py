@@ -41,7 +41,7 @@ def apply_alike(
 
 
 class Cluster:
-    """The workers of a scheduler: each with this checkout, these libraries, and what witnesses are added."""
+    """The workers of a scheduler: each with this checkout, these libraries, and the engines that are added."""
 
     def __init__(self, scheduler: str) -> None:
         """Connect, and look at every worker.
@@ -50,7 +50,7 @@ class Cluster:
         """
         from distributed import Client
 
-        for of_dask in ("client", "batched"):  # what they log of a lost scheduler, with tracebacks, is one line of ours
+        for of_dask in ("client", "batched"):  # one line of ours replaces their log of a lost scheduler
             logging.getLogger(f"distributed.{of_dask}").setLevel(logging.CRITICAL)
         self.scheduler, why = scheduler, ""
         try:
@@ -134,7 +134,7 @@ class Cluster:
             except TimeoutError:  # the worker that has it is gone, or the result was lost in transit
                 if self.lost([task]):
                     raise processes.StalledError from None
-            except CancelledError:  # what was unfinished when the scheduler was lost
+            except CancelledError:  # unfinished when the scheduler was lost
                 raise self._say_gone() from None
             except ImportError as error:  # a worker that joined later; what an engine does not find is in its row
                 raise self._find_unfit(error) from None

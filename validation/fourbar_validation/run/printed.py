@@ -123,7 +123,7 @@ def check_blocks(question: Question) -> Iterator[Row]:
         with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
             size = scale_of(quantity, scene, solution, ours)[long[ends]]
         condition = find_condition(quantity, scene.linkage, solution)[long[ends]]
-        condition = np.where(np.isnan(condition), 1.0, condition)  # what the command decides where nothing closes
+        condition = np.where(np.isnan(condition), 1.0, condition)  # decided by the command where nothing closes
         # evaluated by the same code, but not in the same company of a processor's registers
         apart = find_error(quantity, one, other, size) * condition
         error[known] = np.maximum(error[known], apart[known])
@@ -161,7 +161,7 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         tells = condition * NOTHING_TO_TELL > EPS
         turns = np.array([count_half_turns(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
         wide = divide(width, size) * condition / (K * EPS * turns)
-        if (beyond := tells & (wide > 1.0)).any():  # by what rounding the data does, no more
+        if (beyond := tells & (wide > 1.0)).any():  # allowed is only what rounding the data does
             expected = np.max([predict_from_data(scene, sampled, quantity, beyond) for quantity in quantities], axis=0)
             wide = np.where(beyond, divide(width, expected), wide)
         share = np.where(tells, np.maximum(divide(true, BARS * width), wide), 0.0)

@@ -72,7 +72,7 @@ class Question:
         try:
             with np.errstate(all="ignore"):
                 return self.answer(FREE_BODY)
-        except Exception:  # as of any engine
+        except Exception:  # a failure as of any engine
             return None
 
     @cached_property

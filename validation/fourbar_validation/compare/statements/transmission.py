@@ -67,13 +67,13 @@ def _compare_over(scene: Scene, answer: Answer, predicted: Predicted | None) -> 
         allowed_gain = allowed / sine * largest / np.abs(ratio)
     closed = (
         answer.assembled & (half.outer >= 0.0) & (half.inner >= 0.0) & ~find_singular(state.at)
-    )  # whether both say so is a row of its own
+    )  # a row of its own compares whether both say so
     where = closed & ~(allowed >= NOTHING_TO_TELL)  # a missing number is none that holds
     moving = where & (at.omega_2 != 0.0)
     acute = np.minimum(angle, math.pi - angle)
     outside = np.maximum(np.maximum(extremes.least - angle, angle - extremes.greatest), 0.0)
     for what, error, bound, counts in (
-        # what divides every tolerance is not to be had from the formulas alone
+        # the divisor of every tolerance must not come from the formulas alone
         ("condition", np.abs(state.at.sin_mu - np.sin(theta[4] - theta[3])), allowed, where),
         ("drive condition", np.abs(np.abs(drive_sine(state.at, drive)) - driven), allowed, where),
         ("transmission angle", np.abs(transmission.transmission_angle(state) - acute), allowed, where),

@@ -35,7 +35,7 @@ class Driven(ClosedLoop):
         root = ET.fromstring(mjcf)
         crank = root.find(".//joint[@name='O2']")
         assert crank is not None
-        # what the flywheel was laid out by is a measure of the linkage's inertia about O2
+        # the inertia that sized the flywheel is a measure of the linkage's inertia about O2
         self.flywheel = float(crank.attrib.pop("armature"))
         self.add_drive(root)
         super().__init__(ET.tostring(root, encoding="unicode"))

@@ -45,7 +45,7 @@ class MujocoTree(Tree):
             for name, at in part.points.items():
                 body.add_site(name=name, pos=[*at, 0.0])
         with warnings.catch_warnings():
-            # of the mass matrix at q = 0, which inverse dynamics never divides by
+            # the warning is about the mass matrix at q = 0, which inverse dynamics never divides by
             warnings.filterwarnings("ignore", "Inertia matrix is too close to singular")
             self.model = model = spec.compile()
         # a centre or site nearer than 1e-6 m is taken for the body's origin, silently; these marks are why

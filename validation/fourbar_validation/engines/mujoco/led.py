@@ -65,7 +65,7 @@ class Lead:
                 branch[index] = loop.branch()
         self.input[0, self.closes] = np.unwrap(self.input[0, self.closes])
         theta_2, omega_2, alpha_2 = self.input[:, self.closes]
-        # of speed and acceleration the greatest, as of a law: what flywheel and closure are laid out for
+        # greatest speed and acceleration, as for a law: flywheel and closure are sized by them
         most = float(np.abs(omega_2).max()), float(np.abs(alpha_2).max()) or np.finfo(float).tiny
         self.scene, self.of_input = (
             replace(scene, motion=Motion(theta_2, *most)),

@@ -122,7 +122,7 @@ class ResidualMonitor:
         except np.linalg.LinAlgError:  # exactly at a limit position nothing closes the loop
             return dict.fromkeys(seen.answer, math.inf)
         expected = {name: float(np.linalg.norm(value - closed.answer[name])) for name, value in seen.answer.items()}
-        # what the solver left over: the pin forces differ by as much as F43
+        # remainder of the solver: the pin forces differ by as much as F43
         remaining = {self.drive: abs(torque - float(seen.answer[self.drive]))}
         remaining |= dict.fromkeys(PIN_FORCES, float(np.linalg.norm(loop_force - seen.answer["F43"])))
         for name, error in remaining.items():

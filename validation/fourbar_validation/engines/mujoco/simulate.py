@@ -160,7 +160,7 @@ class _Simulation:
             assert start is not None
             self._run(segment, start)
         self.out["theta_2"] = clip_angles(self.scene, self.out["theta_2"])
-        # where nothing moved the command stands for the motion
+        # the command stands for the motion where nothing moved
         commanded = zip(COMMANDS[bar], (self.command.angle, *list_speeds(self.command)), strict=True)
         made = [np.where(np.isnan(self.out[name]), x, self.out[name]) for name, x in commanded]
         made[0] = made[0] + 2.0 * np.pi * np.round((self.command.angle - made[0]) / (2.0 * np.pi))

@@ -104,7 +104,7 @@ def examine_corrected(
         if time.perf_counter() - start < CORRECTING and (model := correct(topology, key, value)) is not None:
             try:
                 answers = _list_answers(UserLoop(Topology(model, names), scene), scene)
-            except FourBarError:  # what the other differences make of it is no four-bar
+            except FourBarError:  # the other differences leave no four-bar
                 answers = None
         result.append(answers)
     return result
@@ -176,7 +176,7 @@ class UserLoop(Assembled):
                 self.data.eq_active[i] = 0
                 self.notes.append(f"its equality {model.equality(i).name or i!r} is switched off: it is no pin")
 
-    # what `Assembler` asks of a tree
+    # methods that `Assembler` needs of a tree
     def place(self, x: Sequence[float]) -> None:
         """Move to a configuration."""
         self.data.qpos[:] = self.topology.qpos(x)
@@ -214,7 +214,7 @@ class UserLoop(Assembled):
         mujoco.mj_resetData(self.model, data)
         data.eq_active[:] = active
         data.qpos[:], data.qvel[:] = q, v
-        if self.crank is not None:  # what its own armature takes belongs to the drive
+        if self.crank is not None:  # the torque of its own armature belongs to the drive
             data.qfrc_applied[self.crank] = self.armature * self.topology.sense["O2"] * alpha_2
 
         def acceleration(couple: float) -> float:

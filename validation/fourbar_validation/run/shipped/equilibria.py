@@ -116,7 +116,7 @@ def _hold(scene: Scene, angle: Array, branch: int) -> Array:
         answer = FreeBody().answer(scene, at)
         if answer.refusal is not None:
             raise NotAskedError(answer.refusal)
-        if "torque" not in answer.quantities:  # nothing assembles
+        if "torque" not in answer.quantities:  # no position assembles
             return np.full(angle.shape, np.nan)
         sine = np.sin(answer.quantities["theta_4"] - answer.quantities["theta_3"])
     sound = np.asarray(answer.assembled) & (np.abs(sine) >= WELL_CONDITIONED)
