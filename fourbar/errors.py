@@ -68,7 +68,7 @@ class DependencyError(FourBarError):
 
 
 def say_install(extra: str) -> str:
-    """How to install what an extra of this package needs: no index of packages has the package itself."""
+    """Return how to install an extra of this package from where it came, as no package index has the package itself."""
     if (Path(__file__).parents[1] / "pyproject.toml").is_file():
         return f'pip install ".[{extra}]" in the checkout'
     from importlib.metadata import requires
@@ -142,7 +142,7 @@ def _read_exit(left: SystemExit, streams: tuple[TextIO, ...]) -> int:
 
 
 def _is_unread(stream: TextIO) -> bool:
-    """Whether a stream is a pipe that nobody reads any more; taken for one where the system does not know."""
+    """Return True if a stream is a pipe that nobody reads any more, or if the system cannot tell."""
     if not hasattr(select, "poll"):
         return True
     try:

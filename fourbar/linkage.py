@@ -27,7 +27,7 @@ ENDS = {2: ("O2", "A"), 3: ("A", "B"), 4: ("O4", "B")}
 FIRST_PIN = {bar: first for bar, (first, _) in ENDS.items()}
 SECOND_PIN = {1: "O4", **{bar: second for bar, (_, second) in ENDS.items()}}
 NO_NUMBERS = (bool, str, bytes, complex)
-"""What `float` may read all the same."""
+"""Types that `require` rejects although `float` may read them."""
 A_BRANCH = "must be +1 (open) or -1 (crossed)"
 MOST_STEPS = 100_000_000
 """Intervals of any motion or curve."""
@@ -36,7 +36,7 @@ ANY, AT_LEAST_ZERO, POSITIVE = "a finite number", "a finite number >= 0", "a fin
 
 
 def is_within(number: float, bound: str) -> bool:
-    """Whether a finite number keeps a bound."""
+    """Return True if a finite number satisfies a bound."""
     return number > 0.0 if bound == POSITIVE else number >= 0.0 if bound == AT_LEAST_ZERO else True
 
 
@@ -107,18 +107,18 @@ def require_bar(key: str, value: object) -> int:
 
 
 REQUIRED = object()
-"""In place of what is left out: the number has to be stated."""
+"""Mark that replaces a default: the number has to be stated."""
 
 
 class Declared(NamedTuple):
-    """How a number of a scene is stated, in constructors, scene files, studies and tolerances."""
+    """Declaration of a number of a scene, for constructors, scene files, studies and tolerances."""
 
     unit: str
     bound: str = ANY
     left_out: Any = REQUIRED
     """Value where a scene file leaves it out."""
     pair: bool = False
-    """Whether it is a magnitude in this unit with an angle in rad."""
+    """True for a magnitude in this unit with an angle in rad."""
 
 
 def check_numbers(description: Any, key: str) -> None:
@@ -161,7 +161,7 @@ class Bar:
 
     @property
     def moment_of_inertia(self) -> float:
-        """About the mass centre, kg m^2; of a uniform slender bar, m L^2/12, where it is left out."""
+        """Moment of inertia about the mass centre, kg m^2; if left out, that of a uniform slender bar, m L^2/12."""
         return self.mass * self.length * self.length / 12.0 if self.inertia is None else self.inertia
 
     @property
@@ -171,7 +171,7 @@ class Bar:
 
     @property
     def to_centre(self) -> complex:
-        """From the first pin to G in the bar's frame: along + i across, m."""
+        """Vector from the first pin to G in the bar's frame: along + i across, m."""
         r, phi = self.mass_centre
         if not isinstance(r, float):  # a longer number
             return r * np.cos(phi) + 1j * (r * np.sin(phi))

@@ -1,4 +1,4 @@
-"""What `solve` returns: one array per quantity, and `None` for what was not requested."""
+"""Result of `solve`: one array per quantity, and `None` for what was not requested."""
 
 import csv
 import io
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 SCHEMA = "fourbar-analyze/1"
 Conversion = Mapping[str, tuple[str, float]]
-"""From an SI unit to another unit, and the factor from the one to the other; a unit that is left out stays."""
+"""Units to show: for an SI unit another unit and the factor to it; a unit that is left out stays."""
 SI: Conversion = {}
 DEGREES: Conversion = {"rad": ("deg", 180.0 / math.pi)}
 
@@ -64,12 +64,12 @@ class Solution(Quantities):
     ground: tuple[Any, Any] | None = field(default=None, init=False)
     """Length and angle of the ground bar, m and rad; of a study (m, 1) each where they vary."""
     drive: "LinearDrive | None" = field(default=None, init=False)
-    """Where the drive is linear."""
+    """Linear drive of the scene; None: a bar is driven."""
     stopped_at: float | None = field(default=None, init=False)
     """When a free motion reached a limit position or change point, s; None: it did not."""
 
     at: Command = field(default=None, init=False)  # type: ignore[assignment]  # `solve` states it
-    """What was commanded, of a free motion theta_2."""
+    """Name of the commanded quantity; theta_2 for a free motion."""
 
     def __len__(self) -> int:
         return len(self.theta_2)
@@ -99,7 +99,7 @@ class Solution(Quantities):
 
     @property
     def assembled(self) -> NDArray[np.bool_]:
-        """Where the loop closes, (n,)."""
+        """Mark the positions where the loop closes, (n,)."""
         return np.not_equal(self.status_code, NOT_ASSEMBLED)
 
     @property
@@ -152,7 +152,7 @@ def split_parts(name: str, values: Array) -> dict[str, Array]:
 
 
 def list_parts(values: Mapping[str, Array | None], scalars: tuple[str, ...]) -> dict[str, Array]:
-    """Of the quantities that have values the scalars named and the magnitudes of the pin forces."""
+    """List the given scalars and the magnitudes of the pin forces, as far as they have values."""
     found: dict[str, Array] = {}
     for name in (*scalars, *PIN_FORCES):
         if (own := values.get(name)) is not None:

@@ -1,4 +1,4 @@
-"""From a scene to its solution: block by block over the positions, stage by stage, no further than wanted."""
+"""Solver of a scene: block by block over the positions, stage by stage, no further than wanted."""
 
 import cmath
 from collections.abc import Iterable, Iterator, KeysView, Mapping
@@ -36,15 +36,15 @@ Part = tuple[Any, ...]
 
 
 class Members(Protocol):
-    """What else can be solved: the scenes of m linkages, whose numbers are arrays (`fourbar.vary`)."""
+    """Scenes of m linkages, whose numbers are arrays (`fourbar.vary`); `solve` takes them in place of one scene."""
 
     @property
     def scene(self) -> Scene:
-        """What does not vary."""
+        """Return the scene, whose other numbers do not vary."""
 
     @property
     def at(self) -> Command:
-        """What is commanded, (m, n)."""
+        """Return the command, (m, n)."""
 
     def members(self, rows: slice | None, count: int, begins: Scene | None = None) -> Scene:
         """Make the scene of some members, or of all as columns, each repeated for `count` positions."""
@@ -202,7 +202,7 @@ def _store_block(
 
 
 RATES = ("acceleration", "speed", "stroke_speed")
-"""Of a command: a number for all positions, or an array."""
+"""Fields of a command that are one number for all positions or an array."""
 
 
 def _refuse(at: Command) -> None:
@@ -285,7 +285,7 @@ def find_requested(
 
 
 def make_arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None) -> dict[str, Array]:
-    """To write into: new ones, or those given."""
+    """Return the arrays to write into: the given ones, and new ones for the rest."""
     given = {} if out is None else out
     return {
         name: given[name] if name in given else np.empty(shape if name in SCALARS else (*shape, 2)) for name in names
@@ -360,7 +360,7 @@ def _list_foreign(scene: Scene) -> tuple[str, ...]:
 
 
 def _list_absent(scene: Scene) -> tuple[str, ...]:
-    """Those, and what does not exist without dry friction, or without friction that depends on the pin forces."""
+    """List quantities of the other kind of drive, and those of dry or load-dependent friction where there is none."""
     absent = _list_foreign(scene)
     if not any(effect.dry for effect in scene.effects):
         absent = (*absent, *OF_DRY_FRICTION)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 TEMPORARY = ".part"
-"""What the name of an unfinished file ends with."""
+"""Suffix of the name of an unfinished file."""
 
 
 @contextmanager

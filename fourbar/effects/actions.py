@@ -1,4 +1,4 @@
-"""What loads and effects do to the bars: forces and moments, and the generalised force that they make."""
+"""Forces and moments that loads and effects apply to the bars, and their generalized force."""
 
 from collections.abc import Iterable
 from functools import cache
@@ -16,7 +16,7 @@ AT_REST = 50.0 * 2.0**-52
 
 
 def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
-    """Of bars 2, 3, 4 of a linkage, with the inertia that effects (a flywheel) add."""
+    """List the inertial properties of bars 2, 3, 4, with the inertia that effects (a flywheel) add."""
     own = [Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving]
     for effect in effects:
         for bar, inertia in effect.carried.items():
@@ -40,9 +40,9 @@ class Actions:
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
         self.moments: dict[int, Any] = {}
-        """About the first pins O2, A, O4, N m, but for the couples between two bars."""
+        """Moments about the first pins O2, A, O4, N m, without the couples between two bars."""
         self.couples: dict[str, Any] = {}
-        """Between the two bars that meet at a pin, on the second of them, N m."""
+        """Couples between the two bars that meet at a pin, on the second of them, N m."""
         self.through: dict[str, Any] = {}
         """Forces between bars 2 and 3, 3 and 4, as if through their pin, on the second of them, complex, N."""
 
@@ -142,7 +142,7 @@ class Actions:
         return np.where(np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving)
 
     def turning(self, pin: str) -> Number:
-        """Whether the two bars turn against each other in a motion, as far as rounding lets it be known."""
+        """Mark where the two bars rotate relative to each other in a motion, as far as round-off can tell."""
         i, j = PINS[pin]
         h = self.state.coefficient
         return abs(self.state.slip(pin)) > AT_REST * (abs(h(2)) + abs(h(i)) + abs(h(j)))

@@ -1,4 +1,4 @@
-"""What every effect is made of: physics alone."""
+"""Base classes of all effects, without units or files."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -21,7 +21,7 @@ class SolvedFriction(NamedTuple):
 
     pins: PinForces
     from_jamming: Any = None
-    """How far the friction is from jamming, in (0, 1]."""
+    """Distance of the friction from jamming, in (0, 1]."""
     residual: Any = None
     """Largest |mu r |F| - couple| that remains, N m."""
     status: Any = None
@@ -36,16 +36,16 @@ class Effect:
 
     __slots__ = ()
     key: ClassVar[str]
-    """Its name: under ``[effects]``, and in every table."""
+    """Name of the effect under ``[effects]`` and in every table."""
     example: ClassVar[str] = ""
     """One line of a scene file."""
     numbers: ClassVar[Mapping[str, Declared]] = {}
-    """Its numbers by their names."""
+    """Declarations of the effect's numbers by name."""
     dry: ClassVar[bool] = False
-    """Whether its couples jump where the relative rotation at a pin changes its sense."""
+    """True if the couples jump where the relative rotation at a pin reverses."""
 
     counts_turns: ClassVar[bool] = False
-    """Whether it depends on where the motion began (`counted_from`)."""
+    """True if the effect depends on where the motion began (`counted_from`)."""
 
     @property
     def loaded_pins(self) -> tuple[str, ...]:

@@ -42,7 +42,7 @@ class LinearDrive:
 
     @property
     def ends(self) -> tuple[tuple[float, SpringEnd], tuple[float, SpringEnd]]:
-        """Both, with the sense in which it pushes them along its line."""
+        """Return both ends, each with the sense in which the drive pushes it along its line."""
         return (-1.0, self.start), (1.0, self.end)
 
     @property

@@ -52,7 +52,7 @@ class Table:
 
     @property
     def covers_a_turn(self) -> bool:
-        """Whether every angle lies in it."""
+        """Return True if the table covers every angle."""
         return math.isclose(self.theta_2[-1] - self.theta_2[0], TURN, rel_tol=1e-12)
 
     def at(self, theta_2: Any) -> Any:

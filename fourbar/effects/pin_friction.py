@@ -26,7 +26,7 @@ from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared
 from fourbar.quantities import JAMMED, OK, SEVERAL, Array
 
 ONE, NONE, MANY = range(3)
-"""How many solutions there are."""
+"""Number of solutions of the friction equations."""
 ROUNDING = 32.0 * 2.0**-52
 """Change of x, relative, that is the rounding of its evaluation."""
 STEPS = 200
@@ -140,7 +140,7 @@ class PinFriction(PinRows):
         return couples
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
-        """Its couples where the pin forces (name: (n, 2), N) are known already."""
+        """Add the friction couples for pin forces that are known already (name: (n, 2), N)."""
         for pin, mu, r in self.pins:
             load = np.hypot(*np.asarray(forces[PIN_FORCE[pin]]).T)
             actions.couple(pin, -actions.sense(pin) * (mu * r * load))

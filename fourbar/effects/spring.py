@@ -30,7 +30,7 @@ COINCIDE = 16.0 * 2.0**-52
 
 
 AT = Declared("m", left_out=(0.0, 0.0), pair=True)
-"""How the place of an end on its bar is stated."""
+"""Declaration of the position of an end on its bar."""
 GAS = {
     **dict.fromkeys(("extended", "stroke"), Declared("m", POSITIVE)),
     **dict.fromkeys(("extended_force", "compressed_force"), Declared("N", AT_LEAST_ZERO)),
@@ -53,12 +53,12 @@ class SpringEnd(NamedTuple):
 
     @property
     def in_bar(self) -> Any:
-        """In the bar's frame, along + i across its line, m; an array, whose products all round alike."""
+        """Return the vector in the bar's frame, along + i across its line, m; an array, so that products round alike."""
         point = polar(self.distance, self.angle)
         return np.asarray(point) if isinstance(point, complex) else point
 
     def of(self, state: State) -> Any:
-        """In the bar's frame, in the numbers of a state's library."""
+        """Return the vector in the bar's frame, m, as a number of the library of a state."""
         return self.in_bar if namespace(state.at.u2) is np else polar(self.distance, self.angle)
 
     def from_pin(self, pin: str, state: State) -> tuple[Any, Any]:
@@ -71,11 +71,11 @@ class SpringEnd(NamedTuple):
         return arm, dot(arm, arm)
 
     def arm(self, state: State) -> Any:
-        """From the bar's first pin, complex, m, world axes."""
+        """Return the vector from the bar's first pin, complex, m, world axes."""
         return self.of(state) * state.direction(self.bar)
 
     def place(self, state: State) -> Any:
-        """Where it is, complex, m."""
+        """Return the position of the end, complex, m."""
         return state.foot(self.bar) + self.arm(state)
 
 
@@ -187,7 +187,7 @@ class Springs(Effect):
         object.__setattr__(self, "springs", tuple(self.springs))
 
     def act(self, actions: Actions, state: State) -> None:
-        """At `start` the tension along the unit vector to `end`, at `end` its opposite."""
+        """Add the tension at `start` along the unit vector to `end`, and its opposite at `end`."""
         for spring in self.springs:
             across = spring.end.place(state) - spring.start.place(state)
             actions.pull(spring.start, spring.end, _divide_by_distance(spring, across) * across)

@@ -41,13 +41,13 @@ UNDECIDED = 32.0 * U
 by at most about 12 U times them."""
 NOWHERE = np.empty(0, dtype=np.intp)
 NO_MOTION = Coefficients(*[np.nan] * 8)
-"""Where positions alone are wanted."""
+"""Coefficients of NaN, used where only positions are wanted."""
 Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
 """Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
 
 
 def find_undecided(factor: Any, constant: Any, size: Any, part: float = UNDECIDED) -> Any:
-    """Where doubles cannot decide the sign of a factor of Heron's formula, the constant and 4 a d times a square."""
+    """Mark where doubles cannot decide the sign of a factor of Heron's formula, a constant and 4 a d times a square."""
     return (constant < 0.0) & (abs(factor) < part * (abs(constant) + size))
 
 
@@ -59,9 +59,9 @@ class Dynamics(NamedTuple):
     residual: Any
     status: Any
     drive: Any
-    """Its torque, N m, or its force, N."""
+    """Torque of the drive, N m, or its force, N."""
     work: Any
-    """Its power over the commanded angle's speed, N m, which has no pole where the driven bar rests."""
+    """Power of the drive over the commanded angle's speed, N m; it has no pole where the driven bar rests."""
 
 
 class Case(NamedTuple):
@@ -76,9 +76,9 @@ class Case(NamedTuple):
     points: tuple[tuple[str, int, Any], ...] = ()
     """The scene's own: name, bar, and place in the bar's frame at its first pin, complex, m."""
     side: Any = 0
-    """In which sense pins at rest are about to turn, or the part of its torque that dry friction holds them with."""
+    """Impending direction of rotation at pins at rest, or the fraction of its torque with which friction holds them."""
     drive: "LinearDrive | None" = None
-    """In place of a couple on the driven bar."""
+    """Linear drive that replaces the couple on the driven bar."""
 
     @classmethod
     def of(cls, scene: Scene, bar: int = 2) -> "Case":
@@ -104,11 +104,11 @@ class Case(NamedTuple):
 
     @property
     def names(self) -> DriveNames:
-        """What the quantities of the drive are called."""
+        """Return the names of the drive's quantities."""
         return COUPLE if self.drive is None else LINE
 
     def sines(self, at: Position) -> dict[int, Any]:
-        """Of the angles between two moving bars, each by the third one's number."""
+        """Compute the sines of the angles between two moving bars, keyed by the third one's number."""
         return {bar: self.path.drive_sine(at, bar) for bar in MOVING_BARS}
 
     def drive_speed(self, state: State) -> Any:
@@ -149,7 +149,7 @@ class Case(NamedTuple):
         return self._replace(drive_bar=bar, path=path, side=side)
 
     def started(self, at: Command) -> "Case":
-        """With effects that know that the motion begins at a position, of as many linkages as there are."""
+        """Return a copy whose path-dependent effects begin at this position; it may hold many linkages."""
         state = self.at(at)
         return self._replace(terms=tuple(term.counted_from(state, at.branch) for term in self.terms))
 
@@ -257,7 +257,7 @@ def _restore_unit(linkage: FourBar, path: Path) -> Loop:
 
 
 def take_steadiest(sines: dict[int, Any], of: dict[int, PinForces]) -> PinForces:
-    """Of pin forces solved by the moments of two bars those of the pair with the greatest sine."""
+    """Select, of the pin forces solved by the moments of two bars, those of the pair with the greatest sine."""
     s2, s3, s4 = (abs(sines[bar]) for bar in MOVING_BARS)
     first, second = (s2 >= s3) & (s2 >= s4), s3 >= s4
     rows = zip(*(of[bar] for bar in MOVING_BARS), strict=True)

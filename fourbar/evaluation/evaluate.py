@@ -234,7 +234,7 @@ def compute_bar(gap: Any, size: Any) -> Any:
 
 
 def is_finite(values: Mapping[str, Any]) -> bool:
-    """Whether every entry is a number, from their squares; False also where a square leaves the range of doubles."""
+    """Return True if every entry is finite, judged by squares; also False if a square leaves the range of doubles."""
     squares = (np.vdot(value, value) if isinstance(value, np.ndarray) else value for value in values.values())
     return all(cmath.isfinite(square) for square in squares)
 
@@ -250,7 +250,7 @@ def withhold_in_place(case: Case, found: Evaluated) -> None:
 
 
 def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:
-    """Where a quantity is no number and the status promises one: the status that says so, and NaN from that stage on.
+    """Replace a promised quantity that is no number: set the status that says so, and NaN from that stage on.
 
     `code`: status of each position, changed in place. `in_line`: where the two bars that are not driven are in line:
     there no forces hold them in balance.
@@ -297,7 +297,7 @@ PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G
 
 
 def list_kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
-    """Those of the quantities that come before the forces, a scene's own points among them."""
+    """List the wanted quantities that come before the forces, the scene's own points included."""
     values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
     if case.drive is not None and not wanted.isdisjoint(OF_LINE):
         stroke, unit = case.drive.line(state)

@@ -43,7 +43,7 @@ VANISHING = 2.0**-300
 
 @dataclass(slots=True, eq=False)
 class Released:
-    """What the linkage did at the times of the scene, until it stopped."""
+    """Motion of a released linkage at the times of the scene, until it stopped."""
 
     command: Command
     """theta_2 (continuous), branch, omega_2, alpha_2, time and the independent angle, for `solve(scene, at=...)`."""
@@ -295,7 +295,7 @@ class _Run:
             self.theta[bar] = now + 2.0 * math.pi * round((self.theta[bar] - now) / (2.0 * math.pi))
 
     def _starts(self) -> bool:
-        """Whether it moves on: at a standstill dry friction holds what is weaker than it."""
+        """Return True if the linkage moves on; at a standstill dry friction holds it against any weaker force."""
         self.side = 0.0
         rate = float(self.y[1])
         if not self.dry:

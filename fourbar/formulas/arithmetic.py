@@ -32,7 +32,7 @@ def namespace(*numbers: Number) -> Any:
 
 
 def _find_namespace(number: Number) -> Any:
-    """Of a type seen for the first time: what takes part in NumPy's functions, and what is no array, is NumPy's."""
+    """Find the functions for a type seen for the first time: NumPy's for its own operands and for what is no array."""
     found: Any = np
     array = hasattr(number, "__array_namespace__") or hasattr(number, "__dlpack__")
     if array and not isinstance(number, np.generic) and not hasattr(number, "__array_ufunc__"):
@@ -54,7 +54,7 @@ def make_like(values: Number, other: Number) -> Number:
 
 
 def is_any(mask: Number) -> bool:
-    """Whether a mask may hold at any entry; `np.any` costs a plain number fifty times as much."""
+    """Return True if a mask may hold at any entry; for a plain number `np.any` takes fifty times as long."""
     if isinstance(mask, PLAIN):
         return bool(mask)
     if isinstance(mask, np.ndarray) or namespace(mask) is np:
@@ -63,12 +63,12 @@ def is_any(mask: Number) -> bool:
 
 
 def is_zero(x: Number) -> Number:
-    """Where a number is 0 whatever it is differentiated by: an array of another library, which may be, nowhere."""
+    """Mark zeros that are not differentiated; arrays of another library may be, so nothing is marked in them."""
     return (type(x) is float or namespace(x) is np) and x == 0.0
 
 
 def select(mask: Number, x: Number, y: Number) -> Number:
-    """Of two forms of one number x where a mask holds, y elsewhere; for a plain one the number itself."""
+    """Select x where a mask holds and y elsewhere, two forms of one number; a plain mask returns one of them."""
     if isinstance(mask, PLAIN):
         return x if mask else y
     if isinstance(mask, np.ndarray):
@@ -180,7 +180,7 @@ def power_of_two(x: Number) -> Number:
 
 
 def sine(u: Number, v: Number) -> Number:
-    """Of the angle from one direction to another: zero exactly where they are equal."""
+    """Return the sine of the angle between two directions; exactly zero if they are equal."""
     return u.real * v.imag - u.imag * v.real
 
 

@@ -22,7 +22,7 @@ HALF_PI_LOWEST = -1.4973849048591833e-33
 SPLITTER = 2.0**27 + 1.0
 """Splits the 53 bits of a double into two halves."""
 TERMS = 27
-"""Of the series of sine and cosine up to an eighth of a turn: the next ones are below 1e-32."""
+"""Number of terms of the series of sine and cosine up to an eighth of a turn; the next ones are below 1e-32."""
 
 
 def lengthen(number: Number) -> Number:

@@ -1,4 +1,4 @@
-"""What can turn, and how far: limit positions of each moving bar, ranges, change points, swing, time ratio.
+"""Mobility: limit positions of each moving bar, ranges, change points, swing, time ratio.
 
 Let bar k (length l) close the loop with the ground (d) and the other two moving bars (x, y). With e
 the distance from the bar's free end to the far end of the ground, the loop closes where
@@ -26,7 +26,7 @@ TOUCHING = U
 """Bars that miss each other by up to this times the sum of the lengths count as touching: each length was
 itself rounded by up to that, so the linkage meant touches as well as not."""
 MARGIN = math.radians(1.0)
-"""What `choose_range` leaves out at each end of an interval: at a limit itself no speeds exist."""
+"""Angle that `choose_range` leaves out at each end of an interval, because no speeds exist at a limit itself."""
 NARROW = 4.0
 """An interval shorter than NARROW * MARGIN gives up this part of its width at each end instead."""
 AT_CHANGE_POINT = 4.0 * U
@@ -161,7 +161,7 @@ def find_intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float],
 
 
 def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
-    """Whether a moving bar can turn through 360 deg against the ground (through change points, if need be)."""
+    """Return True if a moving bar can turn through 360 deg against the ground (through change points, if need be)."""
     reach = reach_of(linkage, bar)
     return reach.beyond_folded <= 0.0 and reach.beyond_stretched <= 0.0
 
@@ -267,7 +267,7 @@ class Circuit(NamedTuple):
     theta_2: tuple[float, float]
     """The range [from, to] in which it assembles, rad; a whole turn where the input turns fully."""
     branches: tuple[int, ...]
-    """Its branches; both of them meet at the limits of theta_2 or at change points."""
+    """Branches of the circuit; two branches meet at the limits of theta_2 or at change points."""
 
 
 def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
@@ -308,13 +308,13 @@ GRASHOF = {
     3: ("GRCR", "double rocker"),
     4: ("GRRC", "rocker-crank"),
 }
-"""By the number of the shortest bar, which turns fully against all others."""
+"""Barker's code and the name by the number of the shortest bar, which turns fully against all others."""
 CHANGE_POINT = {1: "SCCC", 2: "SCRR", 3: "SRCR", 4: "SRRC"}
 PARALLELOGRAM = "parallelogram (crossed: antiparallelogram)"
 
 
 class LinkageType(NamedTuple):
-    """What a linkage is called, and on what evidence."""
+    """Type of a linkage and the sums and bars that decide it."""
 
     surplus: float
     """p + q - s - l, m: > 0 Grashof, 0 change point, < 0 non-Grashof."""
@@ -328,7 +328,7 @@ class LinkageType(NamedTuple):
     longest: int
     """Number of the longest bar, the lowest of equal ones."""
     turning: tuple[int, ...]
-    """Which of the bars 2, 3, 4 turn fully against the ground (through change points, if need be)."""
+    """Bars among 2, 3, 4 that turn fully against the ground (through change points, if need be)."""
 
 
 def classify(linkage: FourBar) -> LinkageType:

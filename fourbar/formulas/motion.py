@@ -71,12 +71,12 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
 
 
 def may_turn_fast(lengths: Loop) -> Number:
-    """Whether |d^2 - a^2| > FAST e^2 where e is shortest."""
+    """Return True if |d^2 - a^2| > FAST e^2 where e is shortest."""
     return lengths.d + lengths.a > FAST * abs(lengths.d - lengths.a)
 
 
 def find_fast_turns(lengths: Loop, at: Position) -> Number:
-    """Where t and x g/e^2 are large and cancel: |d^2 - a^2| > FAST e^2, and x S, y root of one sign."""
+    """Mark where t and x g/e^2 are large and cancel: |d^2 - a^2| > FAST e^2, and x S, y root have the same sign."""
     d, a, b, c, _, _ = lengths
     y = (d - a) * (d + a)
     return (abs(y) > FAST * at.e2) & ((y * at.root) * ((b - c) * at.half.sk) > 0.0)
@@ -142,11 +142,11 @@ class Frame(NamedTuple):
     """i alpha - omega^2, 1/s^2."""
 
     def velocity(self, r: Number) -> Number:
-        """Of the end of an arm, m/s: v_pin + i omega r."""
+        """Compute the velocity of the end of an arm r, m/s: v_pin + i omega r."""
         return self.v_pin + self.i_omega * r
 
     def acceleration(self, r: Number) -> Number:
-        """Of the end of an arm, m/s^2: a_pin + (i alpha - omega^2) r."""
+        """Compute the acceleration of the end of an arm r, m/s^2: a_pin + (i alpha - omega^2) r."""
         return self.a_pin + self.turn * r
 
 
@@ -162,9 +162,9 @@ class State(NamedTuple):
     """q' of the independent angle, rad/s."""
     moving: Rates
     bar: int = 2
-    """Whose angle is the independent one."""
+    """Number of the bar whose angle is the independent one."""
     q: Number = None
-    """That angle, rad; None: theta_2."""
+    """Independent angle, rad; None: theta_2."""
 
     def direction(self, bar: int) -> Number:
         """e^{i theta} of bar 1 (from O2 to O4), 2, 3 or 4."""
@@ -189,7 +189,7 @@ class State(NamedTuple):
         return self.lengths.d * self.at.u1 if bar == 4 else 0.0
 
     def frame(self, bar: int) -> Frame:
-        """Of bar 1, 2, 3 or 4: the pins O2, O4 of the others rest, the coupler's moves with bar 2."""
+        """Return the frame of bar 1, 2, 3 or 4. Its pin is at rest at O2 and O4; the coupler's pin moves with bar 2."""
         pin, v_pin, a_pin = self.foot(bar), 0.0, 0.0
         if bar == 3:
             of_2 = self.frame(2)
@@ -202,17 +202,17 @@ class State(NamedTuple):
         return self.foot(bar) + z * self.direction(bar)
 
     def point_coefficient(self, bar: int, z: Number) -> Number:
-        """Its derivative by the independent angle, m/rad."""
+        """Compute the derivative of the position of a bar's point z by the independent angle, m/rad."""
         own = (1j * self.coefficient(bar)) * (z * self.direction(bar))
         return own + (1j * self.k.h2) * self.foot(3) if bar == 3 else own
 
     def velocity(self, bar: int, z: Number) -> Number:
-        """Its velocity, m/s."""
+        """Compute the velocity of a bar's point z, m/s."""
         frame = self.frame(bar)
         return frame.velocity(z * frame.u)
 
     def acceleration(self, bar: int, z: Number) -> Number:
-        """Its acceleration, m/s^2."""
+        """Compute the acceleration of a bar's point z, m/s^2."""
         frame = self.frame(bar)
         return frame.acceleration(z * frame.u)
 

@@ -55,18 +55,18 @@ class Path(NamedTuple):
     bar: int
     """2, 3 or 4."""
     lengths: Loop
-    """In the order of the reading: ground, the bar itself, coupler, the other one."""
+    """Loop in the order of this path: ground, the bar itself, coupler, the remaining bar."""
     theta_1: Number
     """Direction of the ground from O2 to O4, rad."""
     u1: Number
     """e^{i theta_1}, its opposite where the loop is read from bar 4."""
     unit: Number = 1.0
-    """Of the lengths, a power of two near the longest, m: no product of them leaves the range of doubles."""
+    """Unit of the lengths, a power of two near the longest, m: no product of them leaves the range of doubles."""
     may_stay_parallel: bool = False
-    """Whether there are two pairs of equal bars."""
+    """True if there are two pairs of equal bars."""
 
     def half_angle(self, q: Number) -> HalfAngle:
-        """Of the independent angle q (rad) against the ground."""
+        """Compute the half angle for the independent angle q (rad) against the ground."""
         return half_angle(self.lengths, q - self.theta_1, opposite=self.bar == 4)
 
     def position(self, q: Number, half: HalfAngle, branch: Number) -> Position:
@@ -161,7 +161,7 @@ def meet_change_points(lengths: Loop) -> Loop:
 
 
 def find_singular(at: Position) -> Number:
-    """Where velocities are 0/0: bars 3 and 4 lie in one line."""
+    """Mark positions where velocities are 0/0 because bars 3 and 4 lie in one line."""
     return np.abs(at.sin_mu) <= NO_DIGIT_LEFT
 
 

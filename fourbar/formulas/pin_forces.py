@@ -26,7 +26,7 @@ class Body(NamedTuple):
 
 
 Bodies = tuple[Body, Body, Body]
-"""Of bars 2, 3, 4."""
+"""Inertial properties of bars 2, 3, 4."""
 
 
 class Wrenches(NamedTuple):

@@ -138,7 +138,7 @@ def coupler_curve(
 
 
 def _compute_state(linkage: FourBar, theta_2: object, branch: object) -> State:
-    """Of positions as a user gives them."""
+    """Compute the state at positions given by a user, after checking them."""
     expect("linkage", linkage, FourBar)
     angles, signs = require_numbers("theta_2", theta_2), require_numbers("branch", branch, A_BRANCH)
     if not (np.abs(signs) == 1.0).all() or signs.shape not in ((), angles.shape):

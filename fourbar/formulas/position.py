@@ -64,9 +64,9 @@ class Position(NamedTuple):
     sin_mu: Number
     """sin(theta_4 - theta_3), signed like the branch."""
     diagonal: Number
-    """From A to O4, complex, m."""
+    """Vector from A to O4, complex, m."""
     e2: Number
-    """Its square e^2, like the root in the unit of the lengths that the loop was closed with."""
+    """Square e^2 of the diagonal; like the root, in the unit of the lengths that the loop was closed with."""
     root: Number
     """sigma sqrt(outer inner); NaN where the loop does not close."""
     half: HalfAngle
@@ -189,7 +189,7 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
 
 
 def find_parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple[Number, Number]:
-    """Where two pairs of bars stay parallel: E1 = E2 = 0, and the root is 4 a d sin h cos h or its opposite.
+    """Mark where two pairs of bars stay parallel: E1 = E2 = 0, and the root is 4 a d sin h cos h or its opposite.
 
     First: the coupler keeps the ground's direction and bars 2, 4 turn together (a = c, b = d).
     Second: B stays on O2, bars 2, 3 turn together and bar 4 rests (a = b, c = d).

@@ -1,4 +1,4 @@
-"""How well a position transmits: transmission angle, speed ratio, mechanical advantage, nearest singular position."""
+"""Transmission quality: transmission angle, speed ratio, mechanical advantage, nearest singular position."""
 
 import math
 from typing import NamedTuple

@@ -18,7 +18,7 @@ class Quantity(NamedTuple):
     """scalar, (n,), or vector, (n, 2)."""
     unit: str
     stage: str | None
-    """That computes it; None: it is commanded."""
+    """Stage that computes the quantity; None: it is commanded."""
     meaning: str
     group: str = ""
     """unknown: of the equations of a position, which an engine can be held to; dry friction, pin loads, linear drive:
@@ -105,7 +105,7 @@ UNKNOWNS = tuple(q.name for q in QUANTITIES if q.group == "unknown")
 
 
 class DriveNames(NamedTuple):
-    """What the quantities of a kind of drive are called."""
+    """Names of the quantities of one kind of drive."""
 
     value: str
     error: str
@@ -114,9 +114,9 @@ class DriveNames(NamedTuple):
 
 
 COUPLE = DriveNames("torque", "torque_error", "torque_low", "torque_high")
-"""Of a drive that turns a bar."""
+"""Names for a drive that turns a bar."""
 LINE = DriveNames("drive_force", "drive_force_error", "drive_force_low", "drive_force_high")
-"""Of one that pushes along a line."""
+"""Names for a drive that pushes along a line."""
 OF_LINE = (*dict.fromkeys((*(q.name for q in QUANTITIES if q.group == "linear drive"), *LINE)),)
 """Every quantity that exists only where the drive is linear."""
 FORCES = (*PIN_FORCES, COUPLE.value, LINE.value, "power")
@@ -126,7 +126,7 @@ STATUS_NAMES = (
     *("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound"),
     *("no_torque", "overflow", "invalid", "no_lever"),
 )
-"""By code; `Solution.status_code` says what each means."""
+"""Status names by code; `Solution.status_code` explains each."""
 OK, NOT_ASSEMBLED, SINGULAR, JAMMED, SEVERAL, NO_DIRECTION, WOUND, NO_TORQUE, OVERFLOW, INVALID, NO_LEVER = range(
     len(STATUS_NAMES)
 )

@@ -17,7 +17,7 @@ from fourbar.errors import InputError
 
 FILE = files("fourbar.quantities").joinpath("units.toml")
 DEFINITIONS: str = tomllib.loads(FILE.read_text(encoding="utf-8"))["definitions"]
-"""In the form of the units library."""
+"""Unit definitions in the form of the units library."""
 JOINED = re.compile(r"(?<=[A-Za-z])[.-](?=[A-Za-z])")
 """N.mm, lbf-in: a product."""
 SWAPS = (

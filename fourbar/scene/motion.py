@@ -16,9 +16,9 @@ BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
 FASTEST = math.sqrt(sys.float_info.max)
 """rad/s. The square of any greater speed is beyond the range of a double, and with it every acceleration."""
 OF_STROKE = ("stroke", "stroke_speed", "stroke_acceleration")
-"""What commands a cylinder."""
+"""Names of the commanded stroke, speed and acceleration of a cylinder."""
 DEFAULT_STEPS = 360
-"""Of the default range, where a motion names no angle."""
+"""Number of steps of the default range, which is swept if a motion names no angle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,7 @@ class Motion:
     stroke_acceleration: float = 0.0
     side: str | None = None
     bar: int = field(default=2, init=False)
-    """Which is commanded: 2, 3 or 4; of a stroke the scene's drive tells."""
+    """Number of the commanded bar, 2, 3 or 4; if a stroke is commanded, the scene's drive determines it."""
 
     def __post_init__(self) -> None:
         expect("motion.law", self.law, Law, type(None))
@@ -172,22 +172,22 @@ class Motion:
 
     @property
     def names(self) -> tuple[str, str, str]:
-        """Of what is commanded: theta_2, omega_2 and alpha_2, those of bar 3 or 4, or a stroke and its rates."""
+        """Names of the commanded position, speed and acceleration: of bar 2, 3 or 4, or of the stroke."""
         return COMMANDS[self.bar] if self.stroke is None else OF_STROKE
 
     @property
     def angle(self) -> float | Array | Sweep | FromLimit | None:
-        """Of the commanded bar, as it is stated."""
+        """Angle or stroke that is commanded, as it is stated."""
         return getattr(self, self.names[0])  # type: ignore[no-any-return]
 
     @property
     def speed(self) -> float | None:
-        """Of the commanded bar, rad/s."""
+        """Commanded speed, rad/s, or m/s for a stroke."""
         return getattr(self, self.names[1])  # type: ignore[no-any-return]
 
     @property
     def acceleration(self) -> float:
-        """Of the commanded bar, rad/s^2."""
+        """Commanded acceleration, rad/s^2, or m/s^2 for a stroke."""
         return getattr(self, self.names[2])  # type: ignore[no-any-return]
 
 

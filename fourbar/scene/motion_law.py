@@ -11,14 +11,14 @@ from fourbar.linkage import MOST_STEPS, MOVING_BARS, require_numbers, require_wh
 from fourbar.quantities import Array
 
 ENDS = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
-"""How the motion begins and ends: no condition, at rest, or as one period of a motion that goes on."""
+"""End conditions of the spline: none, at rest, or one period of a motion that goes on."""
 LEAST = {"free": 4, "rest": 2, "periodic": 3}
 """Points that determine the cubic pieces."""
 MOST_POINTS = 100_000
 STEPS = (range(1, MOST_STEPS + 1), f"must be a whole number from 1 to {MOST_STEPS}")
 """Intervals of any motion."""
 COMMANDS = {bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS}
-"""What commands a bar: its angle, speed and acceleration."""
+"""Names of the commanded angle, speed and acceleration by bar."""
 ANGLES = {bar: names[:1] for bar, names in COMMANDS.items()}
 
 
@@ -78,17 +78,17 @@ class Law:
 
     @property
     def bar(self) -> int:
-        """Whose angle it gives: 2, 3 or 4."""
+        """Number of the bar whose angle the law gives: 2, 3 or 4."""
         return find_bar("motion.law", self, ANGLES) or 2
 
     @property
     def angle(self) -> tuple[float, ...]:
-        """That angle, rad."""
+        """Angles of the law's bar at its times, rad."""
         found: tuple[float, ...] = getattr(self, f"theta_{self.bar}")
         return found
 
     def times(self) -> Array:
-        """Where it is evaluated, (steps + 1,), s."""
+        """Return the times at which the law is evaluated, (steps + 1,), s."""
         return np.linspace(self.time[0], self.time[-1], self.steps + 1)
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:

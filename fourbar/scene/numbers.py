@@ -11,7 +11,7 @@ from fourbar.scene.motion_law import COMMANDS
 from fourbar.scene.point import Point
 
 THREE_SIGMA = 3.0
-"""What counts as the width of a normal distribution in a worst case."""
+"""Half width of a normal distribution in a worst case, in standard deviations."""
 OF_MOTION = {
     name: Declared(f"{unit}{per}")
     for unit, commands in (("rad", COMMANDS.values()), ("m", [OF_STROKE]))
@@ -39,7 +39,7 @@ def find_unit(key: str) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """How far one number of a scene may be off.
+    """Tolerance of one number of a scene.
 
     Parameters
     ----------

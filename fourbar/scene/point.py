@@ -9,7 +9,7 @@ from fourbar.quantities import UNITS
 
 LONGEST_NAME = 40
 OF_POINTS = {"": "position", "v_": "velocity", "a_": "acceleration"}
-"""What is evaluated of a point: the beginning of the quantity's name, and the stage."""
+"""Quantities evaluated for a point: the prefix of the name and the stage."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Point:
 
     @property
     def key(self) -> str:
-        """Its entry in a scene file."""
+        """Key of the point in a scene file."""
         return f"points.{self.name}"
 
 

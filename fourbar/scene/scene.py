@@ -130,7 +130,7 @@ class Scene:
 
     @property
     def counts_turns(self) -> bool:
-        """Whether an effect depends on where the motion begins."""
+        """Return True if an effect depends on where the motion begins."""
         return any(effect.counts_turns for effect in self.effects)
 
 
@@ -151,11 +151,11 @@ class Independent(NamedTuple):
     sign: Array
     """Sign of the root on the path."""
     side: Array
-    """At a standstill the part of its torque, -1 to 1, that dry friction holds with; +-1: it moves on; else 0."""
+    """Fraction of its torque, -1 to 1, with which dry friction holds at a standstill; +-1: it moves on; else 0."""
 
 
 class Command(NamedTuple):
-    """What one bar, the input unless another is named, must do at each of n independent positions."""
+    """Command of one bar, the input unless another is named, at each of n independent positions."""
 
     angle: Array
     """(n,), rad."""
@@ -166,7 +166,7 @@ class Command(NamedTuple):
     acceleration: float | Array
     """rad/s^2."""
     remainder: Any = None
-    """What the angle as a double leaves out of the one angle meant (mpmath), rad: a limit position plus its offset."""
+    """Exact angle (mpmath) minus its double, rad, for an angle that is a limit position plus an offset."""
     time: Array | None = None
     """(n,), s; where the motion is given over time."""
     bar: int = 2
@@ -177,9 +177,9 @@ class Command(NamedTuple):
     stroke_speed: float | Array | None = None
     """m/s; None where no stroke is commanded, or positions only."""
     lost: Array | None = None
-    """What angle, speed and acceleration leave out as doubles, (n, 3), where they follow from a stroke."""
+    """Round-off left out of angle, speed and acceleration as doubles, (n, 3), where they follow from a stroke."""
     independent: Independent | None = None
-    """Of a released motion."""
+    """Independent angle of a released motion."""
 
     @property
     def commanded(self) -> str:
@@ -188,7 +188,7 @@ class Command(NamedTuple):
 
     @property
     def places(self) -> Array:
-        """What is commanded at each position: angles, strokes, or of a law the times."""
+        """Commanded angles or strokes at each position; the times if a law commands them."""
         own = self.angle if self.stroke is None else self.stroke
         return own if self.time is None else self.time
 
@@ -202,19 +202,19 @@ class Command(NamedTuple):
 
     @property
     def theta_2(self) -> Array:
-        """Of the input, where that is commanded; InputError where it is not."""
+        """Commanded angle of the input, rad; InputError if the input is not commanded."""
         self._require_input()
         return self.angle
 
     @property
     def omega_2(self) -> float | Array | None:
-        """Of the input, likewise."""
+        """Commanded speed of the input, rad/s; InputError if the input is not commanded."""
         self._require_input()
         return self.speed
 
     @property
     def alpha_2(self) -> float | Array:
-        """Of the input, likewise."""
+        """Commanded acceleration of the input, rad/s^2; InputError if the input is not commanded."""
         self._require_input()
         return self.acceleration
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fourbar.effects.spring import SpringEnd
 
 SIDES = {"left": 1.0, "right": -1.0}
-"""On which side of the line from the bar's pivot to the end on the ground, seen towards that, the other end lies."""
+"""Signs of the moving end's side of the line from the bar's pivot to the end on the ground, seen towards the latter."""
 
 
 class Triangle(NamedTuple):

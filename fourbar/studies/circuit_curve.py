@@ -29,7 +29,7 @@ from fourbar.studies.sloped import Sloped
 SAMPLES = 3600
 """Positions of a whole branch that are looked at for friction, and for zeros where they cannot be proven."""
 NOTHING = 1e-11
-"""Of the sum of the absolute terms of Q: no more than this everywhere is what rounding leaves of zero."""
+"""Fraction of the sum of the absolute terms of Q: a Q no larger than this everywhere is zero within round-off."""
 AT_END = 1e-12
 """rad; an equilibrium so near to an end of the sweep is in it."""
 
@@ -111,7 +111,7 @@ class CircuitCurve:
         self.singular = [each for each in self.singular if self.inside(np.array([each[0]]), np.zeros(1))[0]]
 
     def inside(self, psi: Array, radius: Array) -> NDArray[np.bool_]:
-        """Whether psi, within a radius, lies in the sweep, if one is stated."""
+        """Mark where psi, within a radius, lies in the sweep, if one is stated."""
         if self.sweep is None or self.sweep[1] - self.sweep[0] >= TURN:
             return np.ones(psi.shape, dtype=bool)
         middle, half = 0.5 * (self.sweep[0] + self.sweep[1]) - self.theta_1, 0.5 * (self.sweep[1] - self.sweep[0])
@@ -150,7 +150,7 @@ class CircuitCurve:
         return points[self.inside(points[:, 0], np.zeros(1))]
 
     def sorted(self, points: Array) -> Array:
-        """Those in the sweep, along the rows."""
+        """Return the points in the sweep, in order along the rows."""
         points = points[self.inside(points[:, 0], np.zeros(1))]
         tau, row = self.tau(points)
         return points[np.lexsort((tau, row))]
@@ -176,7 +176,7 @@ class CircuitCurve:
         return np.broadcast_to(actions.size, len(points))
 
     def level(self, points: Array) -> NDArray[np.bool_]:
-        """Whether rounding leaves nothing of Q."""
+        """Mark points where Q is zero within round-off."""
         return np.asarray(np.abs(self.force(points)) <= NOTHING * self.size(points))
 
     def in_rows(self, tau: Array, branch: Array) -> Array:

@@ -34,17 +34,17 @@ if TYPE_CHECKING:
 AT_ONCE = 512
 """Positions: each number is then as many rows as the scene has numbers, and stays in the cache."""
 HUNDREDTH, DEGREE = 0.01, math.radians(1.0)
-"""By which a number, or an angle, is changed where its influence is told."""
+"""Relative change of a number and change of an angle (rad) for which its influence is reported."""
 AT_REST = "at_rest"
 """Status where dry friction holds a pin at rest: its couple, and all that hangs on it, jumps with the motion."""
 
 
 class Influence(NamedTuple):
-    """Of a hundredth of one number, or of a degree, on one quantity, where it is largest."""
+    """Largest influence of one number, changed by a hundredth or an angle by a degree, on one quantity."""
 
     key: str
     change: float
-    """In the quantity's unit, signed; of a vector that is no force the length of its change."""
+    """Change in the quantity's unit, signed; for a vector that is no force the length of its change."""
     theta_2: float
     """rad."""
 
@@ -61,10 +61,10 @@ class Sensitivity:
     numbers: Array
     """Their values, (p,); of motion.theta_2 and of what a motion law varies NaN."""
     status: list[str]
-    """Of each position, as in `Solution.status`; "at_rest": dry friction holds a pin, torque and pin forces have no
-    derivative there. Where the status is not ok what it is about is NaN."""
+    """Status of each position, as in `Solution.status`; "at_rest": dry friction holds a pin, torque and pin forces have
+    no derivative there. Quantities that a status other than ok concerns are NaN."""
     by: dict[str, Array]
-    """By quantity, (p, n) or (p, n, 2)."""
+    """Derivatives by quantity, (p, n) or (p, n, 2)."""
 
     def of(self, quantity: str, key: str) -> Array:
         """d(quantity)/d(key), (n,) or (n, 2); of a component F12_x or of a magnitude |F12| (n,).
@@ -126,7 +126,7 @@ class Sensitivity:
         return sorted((row for row in rows if row.change != 0.0), key=lambda row: -abs(row.change))
 
     def _list_rows(self) -> list[tuple[str, str, str]]:
-        """By quantity its values and the numbers that change it most."""
+        """List for each quantity its values and the numbers that change it most."""
         rows = []
         for name in (name for name in ("torque", "theta_3", "theta_4", *PIN_FORCES) if name in self.by):
             part = f"|{name}|" if name in PIN_FORCES else name

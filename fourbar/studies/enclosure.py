@@ -64,23 +64,23 @@ class Extreme(NamedTuple):
     """The extreme lies between these two, rounded outwards."""
     high: float
     theta_2: float
-    """Where it is, or with tolerances where it was found, rad."""
+    """theta_2 of the extreme, or with tolerances theta_2 where it was found, rad."""
 
 
 class Extremes(NamedTuple):
-    """What `extremes` returns."""
+    """Result of `extremes`."""
 
     parts: tuple[tuple[float, float], ...]
     """The intervals of theta_2 (rad) that the bounds hold over."""
     distance: float
-    """How near to a limit of the input or a pole of the torque they reach, rad; 0 where there is none."""
+    """Distance kept from limits of the input and poles of the torque, rad; 0 where there is none."""
     least: dict[str, Extreme]
-    """By quantity: torque (N m) or drive_force (N), |F12| .. |F14| (N), transmission (rad)."""
+    """Least values by quantity: torque (N m) or drive_force (N), |F12| .. |F14| (N), transmission (rad)."""
     greatest: dict[str, Extreme]
     boxes: int
-    """That were evaluated."""
+    """Number of boxes that were evaluated."""
     nominal: "Extremes | None" = None
-    """Of the linkage without its tolerances, where it has any."""
+    """Extremes of the linkage without its tolerances, if it has any."""
 
     def over_estimate(self, name: str, sign: int) -> float | None:
         """Compare how far the proven greatest (+1) or least (-1) lies from the nominal with the farthest linkage found.

@@ -43,15 +43,15 @@ from fourbar.studies.sloped import Sloped
 from fourbar.studies.zeros import AT_CHANGE_POINT, Zeros, find_zeros
 
 A_JUMP = 1e-6
-"""Of the sum of the absolute terms: a torsion spring wound by half a turn makes Q jump, which is no zero."""
+"""Fraction of the sum of the absolute terms: a torsion spring wound by half a turn makes Q jump, which is no zero."""
 STILL = 1e-3
-"""Where bar 2 turns by less than this of bar 4 it stands at a limit, and theta_4 takes its place."""
+"""Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit, and theta_4 takes its place."""
 A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
 
 
 HALVINGS = 60
-"""Of the distance between two samples: to its last digits."""
+"""Number of halvings of the distance between two samples, enough to reach its last digits."""
 
 
 class _CircuitRange(NamedTuple):
@@ -60,10 +60,10 @@ class _CircuitRange(NamedTuple):
     ends: tuple[RestPosition, RestPosition]
     row: int
     low: float
-    """Where it begins, and how far it goes, rad of the row's own angle."""
+    """Start and extent of the range, rad of the row's own angle."""
     width: float
     samples: int
-    """How many are in it."""
+    """Number of samples in the range."""
 
 
 class Equilibrium(NamedTuple):
@@ -79,20 +79,20 @@ class Equilibrium(NamedTuple):
     inertia: float
     """Equivalent inertia J, kg m^2."""
     frequency: float | None
-    """Of small undamped oscillations, Hz; None: not stable, or without inertia."""
+    """Frequency of small undamped oscillations, Hz; None: not stable, or without inertia."""
     held: tuple[RestPosition, RestPosition] | None
     """The ends of the positions around it that dry friction holds; None: there is none."""
 
 
 class Equilibria(NamedTuple):
-    """What `equilibrium` returns."""
+    """Result of `equilibrium`."""
 
     found: tuple[Equilibrium, ...]
     """Along theta_2, the open branch first; none where the linkage is indifferent."""
     indifferent: tuple[tuple[RestPosition, RestPosition], ...]
     """Ends of ranges in which Q is zero throughout, to the rounding of the description: it stays wherever it is put."""
     proven: bool
-    """Whether no other equilibrium can be; otherwise there may be others between the samples."""
+    """True if no other equilibrium can exist; otherwise there may be others between the samples."""
     not_decided: tuple[RestPosition, ...]
     """Change points, nearer than 1e-4 rad to which nothing is decided."""
     held: tuple[tuple[RestPosition, RestPosition], ...]
@@ -100,7 +100,7 @@ class Equilibria(NamedTuple):
     positions: Solution
     """The scene's positions at rest: `torque` holds them, anything from `torque_low` to `torque_high` with friction."""
     moves: NDArray[np.int8]
-    """How each begins to move when released: +1 as theta_2 grows, -1 as it falls, 0 it stays, or has no speeds."""
+    """Sign of the change of theta_2 when each position is released; 0: it stays, or has no speeds."""
 
 
 def equilibrium(scene: Scene) -> Equilibria:
@@ -285,12 +285,12 @@ def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
 
 
 def _holds(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
-    """Whether friction holds."""
+    """Mark the points where friction holds."""
     return (_add_friction(curve, points, 1) <= 0.0) & (_add_friction(curve, points, -1) >= 0.0)
 
 
 def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
-    """How positions begin to move: +1 as theta_2 grows, -1 as it falls, 0 they stay."""
+    """Find the direction in which positions start to move: sign of the change of theta_2, 0 where they stay."""
     state = curve.state(points)
     ahead, back = _add_friction(curve, points, 1), _add_friction(curve, points, -1)
     level = NOTHING * curve.size(points)
@@ -332,7 +332,7 @@ def _list_ranges(curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]
 
 
 def _is_inside(curve: CircuitCurve, point: Array, of: _CircuitRange) -> bool:
-    """Whether a point lies in a range."""
+    """Return True if a point lies in a range."""
     tau, row = curve.tau(point[None])
     return bool(row[0] == of.row and np.remainder(tau[0] - of.low, TURN) <= of.width)
 

@@ -31,7 +31,7 @@ class Given(NamedTuple):
     values: dict[str, Any]
     xp: Any
     zero: Any
-    """Of the shape and the kind of the results."""
+    """Zero of the shape and the kind of the results."""
     eps: float
     """The spacing of its numbers at 1."""
 
@@ -104,7 +104,7 @@ def _replace_given(scene: Scene, known: Mapping[str, SceneNumber], given: Given)
 
 
 class Moved(NamedTuple):
-    """What the commanded bar does."""
+    """Motion of the commanded bar."""
 
     q: Any
     speed: Any
@@ -215,7 +215,7 @@ def _check_given(keys: Sequence[str], values: Sequence[Any], positions: tuple[in
 
 
 def _is_plain(value: Any) -> bool:
-    """Whether a value is one number of Python or NumPy."""
+    """Return True if a value is one number of Python or NumPy."""
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 

@@ -35,11 +35,11 @@ class Bending(NamedTuple):
     moment: Array
     """Signed, N m, (n,)."""
     x: Array
-    """Where along the bar, m, (n,)."""
+    """Place of the moment along the bar, m, (n,)."""
 
 
 class InternalForces(NamedTuple):
-    """What `internal_forces` returns; NaN at positions without forces."""
+    """Result of `internal_forces`; NaN at positions without forces."""
 
     x: Array
     """Stations from the first pin along the line between the bar's pins, m, (k,)."""
@@ -50,7 +50,7 @@ class InternalForces(NamedTuple):
     M: Array
     """Bending moment, N m, (n, k)."""
     uniform: bool
-    """Whether weight and inertia are spread as those of a uniform slender bar; otherwise they act at G."""
+    """True if weight and inertia are spread as those of a uniform slender bar; otherwise they act at G."""
     largest: Bending
     """Largest |M| of all x, on both sides of every foot and where V = 0."""
 
@@ -90,11 +90,11 @@ class _Beam(NamedTuple):
     length: float
     foot: Array
     force: Complex
-    """In the bar's axes, x + i y."""
+    """Force in the bar's axes, x + i y."""
     couple: Array
     uniform: bool
     density: float
-    """Of a uniform bar, kg/m; otherwise 0."""
+    """Mass per length of a uniform bar, kg/m; otherwise 0."""
     pull: Complex
     """Acceleration of the first pin less gravity, in the bar's axes, m/s^2, (n,)."""
     omega: Array
@@ -154,7 +154,7 @@ class _Recorder(Actions):
         self.items: list[tuple[Any, Any, Any]] = []
         """Place from the first pin and force in the bar's axes, and couple."""
         self.place: Any = 0.0j
-        """Where a pure couple acts, in the bar's axes."""
+        """Point in the bar's axes where a pure couple acts."""
 
     def force(self, bar: int, force: Any, arm: Any = 0.0j) -> None:
         """Record a force on the bar, world axes."""

@@ -19,7 +19,7 @@ from fourbar.scene import Scene
 from fourbar.scene.numbers import OF_MOTION
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
-"""Of what is commanded."""
+"""Keys of the commanded angle or stroke."""
 SAME_FOR_ALL = (
     *("title", "source", "drive", "bar", "branch", "through", "free", "law", "frame", "table", "picture"),
     *("from", "to", "steps", "limit", "offset"),
@@ -37,7 +37,7 @@ class SceneNumber(NamedTuple):
     bound: str = ANY
 
     def holds(self, values: Any) -> Any:
-        """Where a scene would take the numbers."""
+        """Mark the numbers that a scene would accept."""
         low = {ANY: True, AT_LEAST_ZERO: values >= 0.0, POSITIVE: values > 0.0}[self.bound]
         return namespace(values).isfinite(values) & low
 
@@ -134,7 +134,7 @@ class ManyBars(Bar):
 
     @property
     def to_centre(self) -> Any:
-        """As of one bar, whose cosine and sine are those of the C library, not of NumPy."""
+        """Vector to G as a single bar has it: cosine and sine are those of the C library, not of NumPy."""
         r, phi = self.mass_centre
         if isinstance(phi, NDArrayOperatorsMixin) or namespace(r, phi) is not np:  # with its derivatives, or traced
             return polar(r, phi)
@@ -151,7 +151,7 @@ LEFT_OUT = "is left out of the scene and follows the length; state it to give it
 
 
 def is_left_out(scene: Scene, entry: SceneNumber) -> bool:
-    """Whether a number is one that the scene leaves to a uniform bar."""
+    """Return True if the scene leaves a number to a uniform bar."""
     if entry.place[0] != "linkage" or len(entry.place) < 3:
         return False
     bar = getattr(scene.linkage, str(entry.place[1]))

@@ -61,15 +61,15 @@ class Undecided:
         raise LimitError("a comparison of balls is undecided: there is no bound")
 
     def any(self) -> bool:
-        """Whether it may hold anywhere."""
+        """Return True if the comparison may hold anywhere."""
         return not self.fails.all()
 
     def of_one(self, x: Any, y: Any) -> "Sloped":
-        """Of two forms of one number, whose slopes are those of either."""
+        """Select between two forms of one number; the slopes are those of either where the mask is undecided."""
         return self._choose(x, y, _hull(take_slopes(x), take_slopes(y)))
 
     def _choose(self, x: Any, y: Any, unknown: Any) -> "Sloped":
-        """Both sides where it is undecided, with these slopes."""
+        """Select between two values and slopes; undecided entries get the hull of both values and the given slopes."""
         pairs = (
             (take_values(x), take_values(y), _hull(take_values(x), take_values(y))),
             (take_slopes(x), take_slopes(y), unknown),
@@ -81,7 +81,7 @@ class Undecided:
 
 
 def decided(holds: Any, fails: Any) -> Any:
-    """Where a comparison holds, if each is decided."""
+    """Return where a comparison holds if every entry is decided, else an `Undecided`."""
     return holds if (holds | fails).all() else Undecided(holds, fails)
 
 
@@ -97,25 +97,25 @@ class Sloped(NDArrayOperatorsMixin):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the values."""
+        """Shape of the values."""
         return self.values.shape
 
     @property
     def real(self) -> "Sloped":
-        """Of both."""
+        """Real part of values and slopes."""
         return Sloped(real(self.values), real(self.slopes))
 
     @property
     def imag(self) -> "Sloped":
-        """Of both."""
+        """Imaginary part of values and slopes."""
         return Sloped(imag(self.values), imag(self.slopes))
 
     def conjugate(self) -> "Sloped":
-        """Of both."""
+        """Return the complex conjugate of values and slopes."""
         return Sloped(conjugate(self.values), conjugate(self.slopes))
 
     def differs(self, other: Any) -> Any:
-        """Where the value or a derivative is not that of the other, (n,)."""
+        """Mark where the value or a derivative is not that of the other, (n,)."""
         return self._compared(other, np.not_equal)
 
     def _compared(self, other: Any, function: Any) -> Any:
@@ -164,7 +164,7 @@ def _find_by_name(function: Any, args: Sequence[Any], options: Any) -> Any:
 
 
 def take_values(number: Any) -> Any:
-    """Without the derivatives."""
+    """Return the values without their derivatives."""
     return number.values if isinstance(number, Sloped) else number
 
 
@@ -174,7 +174,7 @@ def take_slopes(number: Any) -> Any:
 
 
 def _apply_by_entry(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Of an array; of one of objects, entry by entry."""
+    """Make a function that applies to a whole array, or entry by entry to an array of objects."""
     each = np.frompyfunc(function, 1, 1)
     return lambda z: each(z) if z.dtype == object else function(z)
 

@@ -1,4 +1,4 @@
-"""What the tolerances of a scene do to its quantities: from samples, and to first order from the sensitivities."""
+"""Spread of a scene's quantities due to its tolerances: from samples, and to first order from the sensitivities."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -56,7 +56,7 @@ class Spread(NamedTuple):
 
     @property
     def parted(self) -> NDArray[np.bool_]:
-        """Where first order and samples differ by more than `PARTED`, or only samples have a value."""
+        """Mark where first order and samples differ by more than `PARTED`, or only samples have a value."""
         larger = np.fmax(self.deviation, self.first_order)
         size = np.nanmax(np.abs(self.nominal), initial=0.0)
         differ = ~(np.abs(self.deviation - self.first_order) <= PARTED * larger) & np.isfinite(self.deviation)
@@ -65,7 +65,7 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tolerances:
-    """What `tolerances` returns."""
+    """Result of `tolerances`."""
 
     scene: Scene
     samples: int
@@ -73,7 +73,7 @@ class Tolerances:
     theta_2: Array
     """(n,), rad."""
     spreads: dict[str, Spread]
-    """By quantity; vectors as components F12_x, F12_y, pin forces also as magnitude |F12|."""
+    """Spreads by quantity; vectors as components F12_x, F12_y, pin forces also as magnitude |F12|."""
     without: NDArray[np.intp]
     """Members without a value of everything at each position, (n,)."""
     apart: int
@@ -99,7 +99,7 @@ class Tolerances:
         return f"Tolerances {self.scene.title!r}: {describe_extent(self.theta_2)}, {tried}"
 
     def _list_rows(self) -> list[tuple[str, str, str, str]]:
-        """By quantity its nominal values, and the largest standard deviation and worst case."""
+        """List for each quantity its nominal values, and the largest standard deviation and worst case."""
         shown = [name for name in ("torque", "theta_3", "theta_4", *(f"|{name}|" for name in PIN_FORCES))
                  if name in self.spreads]  # fmt: skip
         rows = []

@@ -33,9 +33,9 @@ class Study:
     """m linkages at n positions each, from one scene; made by `vary`."""
 
     scene: Scene
-    """What does not vary."""
+    """Scene with the numbers that do not vary."""
     values: dict[str, Array]
-    """By key, lengths first, (m,); NaN in a member that a scene would refuse."""
+    """Varied numbers by key, lengths first, (m,); NaN in a member that a scene would refuse."""
     invalid: NDArray[np.bool_]
     """The members that a scene would refuse, (m,)."""
     at: Command
@@ -88,7 +88,7 @@ class Study:
 
 
 def _find_turns(effects: Iterable[Effect]) -> dict[int, Any]:
-    """Of the effects that know where the motion begins, by their index: the whole turns of each of their pins."""
+    """Find the whole turns of each pin for the effects that depend on where the motion begins, by their index."""
     found = {index: getattr(effect, "turns", None) for index, effect in enumerate(effects)}
     return {index: turns for index, turns in found.items() if turns is not None}
 

@@ -36,7 +36,7 @@ MANY = 10_000
 STEPS = 6
 """Newton's steps from a unique zero to its last digits."""
 MARGIN = 1e-12
-"""Of the closure and of an angle in rad: far above the rounding of doubles."""
+"""Margin of the closure and of an angle in rad, far above the rounding of doubles."""
 
 
 class Zeros(NamedTuple):
@@ -45,9 +45,9 @@ class Zeros(NamedTuple):
     found: Array
     """Zeros, each proven to exist and to be simple."""
     undecided: Array
-    """Where a zero with a vanishing derivative may be."""
+    """Points where a zero with a vanishing derivative may be."""
     complete: bool
-    """Whether there are no others, but for those nearer than AT_CHANGE_POINT to a change point."""
+    """True if there are no other zeros, except any nearer than AT_CHANGE_POINT to a change point."""
 
 
 def find_zeros(
@@ -113,7 +113,7 @@ def find_zeros(
 
 
 def _may_close(lengths: Loop, centres: Array, radii: Array) -> NDArray[np.bool_]:
-    """Where the loop may close in a box: |g(c)| is no more than its greatest slopes allow."""
+    """Mark boxes in which the loop may close: |g(c)| is no more than its greatest slopes allow."""
     d, a, b, c = lengths[:4]
     slope = np.minimum(np.abs(np.sin(centres)) + radii, 1.0) * [a * d, b * c]
     size = a * d + b * c + 0.5 * (a * a + b * b + c * c + d * d)
@@ -143,7 +143,7 @@ class _Newton:
         self.det = self.g_psi * self.F_mu - self.g_mu * self.F_psi
 
     def without_zero(self, i: int, radius: Array) -> bool:
-        """Whether F vanishes nowhere in a box, by its values or from the centre by its slopes."""
+        """Return True if F vanishes nowhere in a box, by its values or from the centre by its slopes."""
         moved = self.F[i] + self.F_psi[i] * self.arb(0, radius[0]) + self.F_mu[i] * self.arb(0, radius[1])
         return any(value.is_finite() and not value.contains(0) for value in (moved, self.over[i]))
 
@@ -168,12 +168,12 @@ def _polish(lengths: Loop, function: Callable[[Any, Any], Sloped], step: tuple[A
 
 
 def _holds(centre: float, radius: float, ball: Any) -> bool:
-    """Whether a ball lies inside an interval."""
+    """Return True if a ball lies inside an interval."""
     return abs(float(ball.mid()) - centre) + float(ball.rad()) < radius * (1.0 - MARGIN)
 
 
 def _is_inside(at: Array, r: Array, centre: Array, radius: Array) -> bool:
-    """Whether a box lies inside another, whole turns apart or not."""
+    """Return True if a box lies inside another, whole turns apart or not."""
     return bool((np.abs(_wrap(at - centre)) + r <= radius * (1.0 - MARGIN)).all())
 
 

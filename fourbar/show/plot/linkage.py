@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 ON_BAR = 1e-3
-"""Of a bar's length: a point that lies nearer to its line is on it, as far as can be seen."""
+"""Fraction of a bar's length: a point nearer than this to the bar's line looks as if it were on it."""
 
 
 def locate_pins(view: View, factor: float = 1.0) -> dict[str, Point]:
