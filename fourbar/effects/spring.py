@@ -53,7 +53,7 @@ class SpringEnd(NamedTuple):
 
     @property
     def in_bar(self) -> Any:
-        """Return the vector in the bar's frame, along + i across its line, m; an array, so that products round alike."""
+        """Return the vector in the bar's frame, along + i across its line, m; an array, so products round alike."""
         point = polar(self.distance, self.angle)
         return np.asarray(point) if isinstance(point, complex) else point
 
