@@ -1,4 +1,4 @@
-"""Who evaluates the positions of one linkage, and the linkages of one position: their times and their picture."""
+"""Time the libraries that evaluate positions of one linkage, and linkages of one position, and draw the times."""
 
 import ctypes
 import shutil

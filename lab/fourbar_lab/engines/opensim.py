@@ -35,7 +35,7 @@ ZERO = (0.0, 0.0, 0.0)
 PER_COORDINATE = {2: np.array([1.0, 0.0, 0.0]), 3: np.array([0.0, 1.0, 1.0]), 4: np.array([0.0, 1.0, 0.0])}
 """Derivative of each bar's direction by the coordinates."""
 PASSES = 50
-"""Each pass leaves a millionth to a tenth of the multipliers of the one before, down to rounding."""
+"""Number of passes; each leaves a millionth to a tenth of the previous pass's multipliers, down to rounding."""
 LEAST_CONDITIONED = 1e-11
 """Simbody 4.6 drops a constraint as dependent from 5e-12 to 7e-12 on: 1000 positions near limits of 40 linkages."""
 TIME_IS_ALPHA = (1.0 / 6.0, 0.0, 0.0, 0.0)

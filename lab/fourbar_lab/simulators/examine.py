@@ -1,4 +1,4 @@
-"""Each simulator in its own environment, compared with the formulas at the states that it reached by itself."""
+"""Compare each simulator, in its own environment, with the formulas at the states that it reached by itself."""
 
 import json
 import math

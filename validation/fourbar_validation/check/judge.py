@@ -115,7 +115,7 @@ class Judge:
 
     @cached_property
     def near(self) -> list[Solution]:
-        """The same half a unit of a rounded theta_2 away."""
+        """Solve again half a unit of a rounded theta_2 away, to either side; empty if theta_2 is not rounded."""
         rounding = self.table.theta_2_rounding
         if not rounding.any():
             return []
@@ -123,7 +123,7 @@ class Judge:
         return [solve(self.scene, self.stage, at=self.at._replace(angle=x, remainder=None)) for x in moved]
 
     def judged(self, key: str, ours: Array) -> tuple[Array, Array, Array]:
-        """(error, allowed, apart) of the table where `ours` is taken for the right numbers, each (n,)."""
+        """Return (error, allowed, apart) of the table if `ours` is taken for the right numbers, each (n,)."""
         quantity, size = name_quantity(key), self.size(key)
         scale = replace_zero_size(size)  # quantities whose terms are all 0
         theirs = self.table.values[key]

@@ -78,12 +78,12 @@ class ReleasedAnswer:
     terms: Array
     """Their magnitudes, summed, (n,), J."""
     stopped_at: float | None = None
-    """When its bars 3 and 4 first came to lie in one line, s; None: they did not. It moves on."""
+    """Time at which its bars 3 and 4 first came to lie in one line, s; None if they did not. It moves on."""
     refusal: str | None = None
     """A declared limit that the scene meets; then the arrays are empty."""
 
     @classmethod
     def refused(cls, engine: str, setting: str, reason: str) -> "ReleasedAnswer":
-        """No motion, and why."""
+        """Return an answer without a motion, and with the reason."""
         none = np.empty(0)
         return cls(engine, setting, none, none, none, none, refusal=reason)

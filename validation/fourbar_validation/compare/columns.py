@@ -25,7 +25,7 @@ CSV_ROWS = 1_000_000
 
 
 class Columns:
-    """Both files while they are written: whole at the end of a `with`, not there where it fails."""
+    """Writer of both files, which are complete at the end of a `with`, and do not exist if it fails."""
 
     def __init__(self, out: Path) -> None:
         self.out = out

@@ -49,14 +49,14 @@ from fourbar_validation.compare.tolerance import (
 Predicted = Callable[[str, Mask], Array]
 """The error to be expected of a quantity, in its own unit, (n,); it matters at the positions of the mask alone."""
 Nearby = Callable[[Mask], dict[str, Array]]
-"""Every quantity again at the positions of a mask, each within the rounding of its theta_2; NaN elsewhere."""
+"""Function that evaluates every quantity again at the positions of a mask, within theta_2's rounding; NaN elsewhere."""
 Scales = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
 OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, COUPLE.error, LINE.error, "force_error", "power")
 """Quantities with checks of their own: the range in which dry friction holds, its residual, error bars, a product."""
 COMPARED = tuple(name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *OF_LINE))
-"""Every quantity that an exact engine is held to: all that is printed of a position."""
+"""Quantities that are compared with an exact engine: all that is printed of a position."""
 OF_THE_LINE = {"stroke": "sin_mu", "drive_line": "sin_mu", "stroke_speed": "v_B", LINE.value: COUPLE.value}
 """Quantities of a linear drive; each is compared if the quantity it maps to is compared or the engine answers it."""
 OF_FORCES = (*FORCES, *OF_DRY_FRICTION)

@@ -209,7 +209,7 @@ def replace_zero_size(size: Array) -> Array:
 
 
 def find_used(error: Array | float, allowed: Array | float) -> Array:
-    """Return error/allowed: the part of the allowed error that is used; infinite for NaN, 0 for an error of 0."""
+    """Return error/allowed, the used part of the allowed error; infinite if the error is not finite, 0 if it is 0."""
     error, allowed = np.asarray(error, dtype=float), np.asarray(allowed, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         share = np.where(error == 0.0, 0.0, error / allowed)
@@ -217,5 +217,5 @@ def find_used(error: Array | float, allowed: Array | float) -> Array:
 
 
 def find_worst(errors: Array) -> int:
-    """Index of the largest error; what is no number is beyond all."""
+    """Return the index of the largest error; NaN counts as the largest."""
     return int(np.argmax(np.where(np.isnan(errors), np.inf, errors)))

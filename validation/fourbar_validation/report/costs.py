@@ -14,7 +14,7 @@ Point = tuple[float, float]
 
 
 def collect_cost_points(scenes: Iterable[Record]) -> tuple[dict[str, list[Point]], list[float]]:
-    """(microseconds per position, error of the torque) of every scene by engine; the same cost of the formulas."""
+    """Return (microseconds per position, error of the torque) of every scene by engine, and the formulas' cost."""
     points: dict[str, list[Point]] = {}
     formulas: list[float] = []
     for scene in scenes:

@@ -14,7 +14,7 @@ from fourbar_validation.report.summary import OWN, OWN_ENGINES, STATEMENT, Summa
 from fourbar_validation.report.templating import count_or_size, render, write_number, write_share
 
 ALL_OPEN = 8
-"""Up to so many scenes all stand open; the bodies of more are packed, and unpacked when they are opened."""
+"""Most scenes that are all shown open; the bodies of more are packed, and unpacked when they are opened."""
 ORDER = (*UNKNOWNS, "torque_inertia", LINE.value, f"{LINE.value}_inertia")
 """Quantities in the order of the computation; others follow by name."""
 

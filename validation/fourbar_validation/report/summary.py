@@ -92,7 +92,7 @@ FAILURES_KEPT = 1000
 """Lines of a table at the most; everything is in results.csv."""
 TIMED = 1000
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-"""In a reason: what differs by it alone is one reason."""
+"""Pattern of a number in a reason; reasons that differ in numbers alone count as one."""
 STATEMENT = (
     f"K = {K:g} for every exact comparison; where eps/condition > {NOTHING_TO_TELL:g} the row is undecided. "
     "Errors are relative to the largest magnitude over the positions whose condition is at least 0.1; below that "
@@ -234,7 +234,7 @@ class Summary:
 
     @property
     def orders(self) -> list[tuple[str, dict[str, float]]]:
-        """(scene, errors at 4h and 2h and observed order) of what is simulated: at most ORDERS_SHOWN, lowest first."""
+        """Return (scene, errors at 4h and 2h and observed order) of simulations: at most ORDERS_SHOWN, lowest first."""
         few = len(self._orders) <= ORDERS_SHOWN
         return self._orders if few else nlargest(ORDERS_SHOWN, self._orders, key=_find_lowest)
 
@@ -261,7 +261,7 @@ def _list_left_out(scene: Record) -> set[tuple[str, str]]:
 
 
 def compute_shares(rows: Sequence[Row]) -> list[float]:
-    """error/allowed; infinite without an answer, 0 where nothing is allowed and errs, or nothing was compared."""
+    """Return error/allowed; infinite without an answer, 0 if the error is 0 or nothing was compared."""
     of_all = find_used(np.array([row.error for row in rows]), np.array([row.allowed for row in rows]))
     return [share if row.compared else 0.0 for row, share in zip(rows, of_all.tolist(), strict=True)]
 

@@ -53,7 +53,7 @@ def shrink_svg(svg: str) -> str:
 
 
 def _name_styles(svg: str) -> str:
-    """Each style once, as a class: matplotlib repeats it on every mark and text.
+    """Write each style once, as a class, as matplotlib repeats it on every mark and text.
 
     A class is named by its content, so that equal names in one page mean equal styles.
     """

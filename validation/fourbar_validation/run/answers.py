@@ -1,4 +1,4 @@
-"""Each engine's answer: over the scene's motion, what it says of the linkage, and the inertial part of its torque."""
+"""Judge each engine's answer: over the scene's motion, on the linkage, and the inertial part of its torque."""
 
 import math
 from collections.abc import Iterator

@@ -31,7 +31,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """The scene's."""
+        """Return the scene's name."""
         return make_plain(self.suite.name(self.scene))
 
 

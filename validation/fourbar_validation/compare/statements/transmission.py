@@ -40,7 +40,7 @@ def choose_places(linkage: FourBar) -> list[Place]:
 
 
 def compare_transmission(scene: Scene, seen: Seen, answer: Answer, predicted: Predicted | None) -> Iterator[Finding]:
-    """Over the scene's own motion, if it is one, at the stated extremes, and between the stated limits of bar 4."""
+    """Compare over the scene's own motion, if it is one, at the stated extremes, and between bar 4's stated limits."""
     if answer.at is not None and answer.at.omega_2 is not None:
         yield from _compare_over(scene, answer, predicted)
     yield from _compare_extremes(scene.linkage, seen)

@@ -1,4 +1,4 @@
-"""Other means to soften the closure and to drive the crank than the generated MJCF's, for the study of their cost.
+"""Soften the closure and drive the crank by other means than the generated MJCF, for the study of their cost.
 
 Each builds a loop from the generated text; the flywheel of the text is taken out where another
 drive takes its place, and the torque is read where that drive exerts it.
@@ -137,7 +137,7 @@ def remove_attributes(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str
 
 
 def restore_defaults(mjcf: str, _: float = 0.0) -> ClosedLoop:
-    """solref, solimp and the solver left to MuJoCo: 0.02 s, impedance 0.9 to 0.95, Newton to 1e-8."""
+    """Leave solref, solimp and the solver to MuJoCo: 0.02 s, impedance 0.9 to 0.95, Newton to 1e-8."""
     return ClosedLoop(
         remove_attributes(
             mjcf, {"option": ("solver", "tolerance", "iterations"), "equality/connect": ("solref", "solimp")}

@@ -1,4 +1,4 @@
-"""Every field of a compiled model: under which key two models are compared by it, or why it tells nothing new.
+"""List every field of a compiled model: under which key two models are compared by it, or why it adds nothing.
 
 The lists are complete for the MuJoCo of this harness (a test reads the fields off the model itself); a field of
 another MuJoCo that no list knows is compared as it stands.

@@ -1,4 +1,4 @@
-"""Off-screen pictures of MJCF texts by MuJoCo's own renderer, in a process of their own.
+"""Draw off-screen pictures of MJCF texts by MuJoCo's own renderer, in a separate process.
 
 A missing or broken OpenGL may end the process that asks for it, so `render_pictures` asks from outside:
 ``python -m fourbar_validation.engines.mujoco.picture`` reads {name: MJCF} and answers {name: base64 of a PNG}.

@@ -43,7 +43,7 @@ class Contents(NamedTuple):
     pins: dict[str, complex]
     """Places of the pins in the world; NaN if the two bars of a pin do not meet."""
     turns: list[dict[str, float]]
-    """Every statement of the angles of all bars, rad: of the bodies, of the joints, in words."""
+    """Statements of the angles of all bars, rad: by the bodies, by the joints, in words."""
     gravity: complex
     damping: dict[str, float]
     """Damping by pin, as the next field."""
