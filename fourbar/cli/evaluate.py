@@ -76,7 +76,7 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
 
 
 class Form(NamedTuple):
-    """How `analyze` prints: as "summary", "table", "json" or "csv"."""
+    """Output format of `analyze`: "summary", "table", "json" or "csv", with its options."""
 
     kind: str
     decimal: str

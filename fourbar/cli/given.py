@@ -1,4 +1,4 @@
-"""What the commands are given: scenes, numbers with units, places to write to."""
+"""Readers of the commands' arguments: scenes, numbers with units, places to write to."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -68,7 +68,7 @@ def json_option(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def ends_in(out: Path | None, suffix: str) -> bool:
-    """Whether there is a file to write to, and its name has this ending."""
+    """Return True if there is a file to write to and its name has this ending."""
     return out is not None and out.suffix.lower() == suffix
 
 
@@ -115,7 +115,7 @@ def read_lengths(texts: tuple[str, ...]) -> list[float]:
 
 
 def is_bare(text: str) -> bool:
-    """Whether a text is a number without a unit."""
+    """Return True if a text is a number without a unit."""
     try:
         float(text)
     except ValueError:
@@ -129,7 +129,7 @@ def read_number(key: str, text: str, unit: str, bound: str = ANY) -> float:
 
 
 def print_to(text: str, out: Path | None) -> None:
-    """To standard output, or to a file, whole or not at all."""
+    """Print to standard output, or write a file atomically."""
     from fourbar.writing import write_text
 
     if out is None:

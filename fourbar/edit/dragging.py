@@ -1,4 +1,4 @@
-"""What a drag in the drawing means: from a place in the plane to the lengths, angles and forces of the file.
+"""Dragging in the drawing: from a place in the plane to the lengths, angles and forces of the file.
 
 A pin changes the lengths that meet in it, a point its distance and angle, an arrow its force; each number keeps the
 unit that it has in the file and gets no more digits than a pixel is worth.
@@ -19,25 +19,25 @@ from fourbar.solve import solve
 
 PINS = ("A", "B", "O4")
 LEAST_DIGITS = 1e-12
-"""Of the number itself: the finest grain."""
+"""Finest grain, relative to the number itself."""
 
 
 class Handle(NamedTuple):
     """A point of the drawing that can be dragged, besides the pins."""
 
     name: str
-    """What it is, for a reader."""
+    """Name of the handle for a reader."""
     path: Path
-    """Of its pair (distance, angle)."""
+    """Path of the handle's pair (distance, angle) in the file."""
     bar: int
     at: complex
-    """From the bar's first pin in its frame, m: of what the pair is measured from."""
+    """Vector from the bar's first pin to the point that the pair is measured from, in the bar's frame, m."""
     beyond: complex = 0.0j
     """The pair itself, m."""
     turns: bool = True
-    """Whether the pair's angle turns with the bar."""
+    """True if the pair's angle turns with the bar."""
     force: Path | None = None
-    """Of the force whose arrow stands here."""
+    """Path of the force whose arrow stands here."""
 
     def drawn(self) -> dict[str, Any]:
         """Write it for the page."""
@@ -74,7 +74,7 @@ def list_handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
 
 
 class Dragged(NamedTuple):
-    """What the page says of a drag."""
+    """Drag as the page describes it."""
 
     what: str | list[str | int]
     """A pin, or the path of a handle's pair or of its force."""
@@ -83,10 +83,10 @@ class Dragged(NamedTuple):
     grain: float
     """m that a pixel is worth."""
     theta_2: float
-    """Of the position shown, rad."""
+    """Angle theta_2 of the position shown, rad."""
     branch: int
     stretch: float = 1.0
-    """Of an arrow: its length over the one that it is drawn with."""
+    """Length of an arrow relative to the length that it is drawn with."""
 
 
 def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], given: Dragged) -> None:

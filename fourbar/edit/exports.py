@@ -1,4 +1,4 @@
-"""What the workbench makes of a scene besides its file: exports, and the judgement of the harness, in one folder."""
+"""Files that the workbench makes of a scene besides its own: exports, and the harness's report, in one folder."""
 
 import asyncio
 import base64
@@ -19,7 +19,7 @@ from fourbar.solve import find_last_stage, solve
 from fourbar.writing import write_text
 
 ENDINGS = {**{kind: kind for kind in ("svg", "png", "pdf", "csv")}, "mjcf": "xml", "page": "html"}
-"""Of the file, by the name of the format."""
+"""Ending of the file by the name of the format."""
 CHECKOUT = Path(__file__).parents[2]
 HARNESS = "fourbar_validation"
 SHOWN = 30
@@ -83,7 +83,7 @@ class HarnessRun:
 
     @property
     def report(self) -> Path:
-        """Where the report of the last run stands."""
+        """Path of the report of the last run."""
         return self.folder / "report.html"
 
     def start(self, text: str) -> None:

@@ -1,4 +1,4 @@
-"""What the page is told of a scene: JSON, and its columns as doubles, for their text takes longer than to solve.
+"""Reply to the page about a scene: JSON, and columns as doubles, as writing these as text takes longer than solving.
 
 The frame: four bytes with the length of the JSON (little-endian), the JSON padded to a multiple of eight bytes, then
 the columns one after the other, as the JSON lists them.

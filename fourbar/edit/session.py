@@ -45,7 +45,7 @@ MOST_CHARACTERS = 10_000_000
 MOST_KEPT = 20
 """Number of states that are kept to compare with, the one at the start among them."""
 MOST_POSITIONS = 100_000
-"""That a change solves anew, in a second; a slip of the finger on the number of steps is not to fill the memory."""
+"""Largest number of positions solved anew on a change, in a second; a mistyped step count must not fill the memory."""
 LARGEST_STATE = 100_000_000
 """Bytes of a state file."""
 NEW = ("300 mm", "100 mm", "250 mm", "220 mm")
@@ -142,12 +142,12 @@ class Session:
 
     @property
     def fresh(self) -> bool:
-        """Whether nothing has been stated yet: a page begins with an empty drawing."""
+        """Return True if nothing has been stated yet; a page then begins with an empty drawing."""
         return self.disk is None and len(self.texts) == 1
 
     @property
     def saved(self) -> bool:
-        """Whether the file on the disk holds the present state."""
+        """Return True if the file on the disk holds the present state."""
         return self._read_disk() == _hash_text(self.now.text.encode())
 
     def _read_disk(self) -> str | None:
@@ -425,4 +425,4 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
         "refer": True,
     },
 }
-"""What a page can ask for."""
+"""Requests that a page can make."""

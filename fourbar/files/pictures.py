@@ -48,7 +48,7 @@ class Picture:
 
     @property
     def key(self) -> str:
-        """Its entry in a scene file."""
+        """Key of the picture in a scene file."""
         return f"bars.{BAR_NAMES[self.bar]}.picture"
 
     def data_uri(self) -> str:

@@ -31,7 +31,7 @@ from fourbar.studies.keys import COMMAND_KEYS, LEFT_OUT, is_left_out, list_entri
 LARGEST_FILE = 500_000
 """Bytes; a scene takes about a thousand."""
 MOST_DOTS = 100
-"""In one line: the time that the TOML reader takes grows with the square of a dotted key's parts."""
+"""Largest number of dots in one line: the TOML reader's time grows with the square of a dotted key's parts."""
 LONGEST_LINE = 60
 """Characters shown of a line that cannot be read."""
 MOST_LOADS = 1000

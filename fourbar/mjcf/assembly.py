@@ -27,11 +27,11 @@ class Assembly(NamedTuple):
     numbers: tuple[float, ...]
     """theta_2, theta_3, theta_4, and the speeds of joints O2, A, O4."""
     inertia: dict[int, float]
-    """Of each moving bar about its mass centre, a flywheel's with it, kg m^2."""
+    """Inertia of each moving bar about its mass centre, with that of a flywheel, kg m^2."""
     gravity: tuple[float, float]
     """m/s^2."""
     dynamics: dict[str, dict[str, float]]
-    """By pin what its joint holds."""
+    """Attributes of each pin's joint."""
 
 
 def assemble(
@@ -91,7 +91,7 @@ def write_comment(scene: Scene, form: str, reader: str, assembly: Assembly, at_B
 
 DAMPING = {"viscous": ("damping", "coefficients")}
 AT_JOINTS = {"gazebo": {**DAMPING, "friction": ("friction", "torques")}, "drake": DAMPING}
-"""What a joint holds, by effect: its element, and the field of the effect."""
+"""Attributes of a joint by effect: its element, and the field of the effect."""
 DRAKE = "http://drake.mit.edu"
 """Namespace of the elements that only Drake reads."""
 

@@ -31,18 +31,18 @@ from fourbar.solution import Array
 from fourbar.solve import solve
 
 NOTES: dict[str, Any] = tomllib.loads(files("fourbar.mjcf").joinpath("notes.toml").read_text(encoding="utf-8"))
-"""What the model files say of themselves in comments: how they start, and where their numbers stand."""
+"""Comments in the model files: how to start them, and where their numbers stand."""
 AT_REST = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""
 SETTLING = 2.0
 """Time constant with which the drive starts the input from rest, in timesteps: the crank lags by so many, for good."""
 RELEASED_STEPS = 6280
-"""Without a flywheel, in the time in which weights and loads would turn the linkage once."""
+"""Number of timesteps, without a flywheel, in the time in which weights and loads would turn the linkage once."""
 RELEASED_CLOSURE = 2.0
 """Time constant of the closure of a released linkage, in timesteps: measured, 2 takes the least energy out of it."""
 Drive = Literal["flywheel", "motor", "none"]
-"""What turns the linkage: a flywheel that keeps omega_2 or alpha_2; a motor on the driven bar whose control is its
-couple; nothing. A free motion has none."""
+"""Kind of drive: a flywheel that keeps omega_2 or alpha_2; a motor on the driven bar whose control is its couple;
+none. A free motion has none."""
 
 
 def write_mjcf(
@@ -182,7 +182,7 @@ def _fit_pad(scene: Scene) -> float:
 
 
 def compute_mass_ratio(linkage: FourBar) -> float:
-    """Of coupler and output, the heavier by the lighter: (I + m r^2)/L^2 about the first pin, as the closure feels it.
+    """Return the ratio of coupler and output, heavier by lighter: (I + m r^2)/L^2 about the first pin, as felt there.
 
     1 where one of them has no mass.
     """
@@ -230,7 +230,7 @@ def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
 
 
 def find_start(scene: Scene) -> Start:
-    """Where the motion begins: the first position, in the direction of motion, that assembles."""
+    """Find the start of the motion: the first position, in the direction of motion, that assembles."""
     at = command(scene)
     alpha = scene.motion.alpha_2
     speed = scene.motion.omega_2 or 0.0
@@ -260,9 +260,9 @@ def _compute_span(linkage: FourBar) -> float:
 
 
 SINGLE = replace(RECIPE, flywheel=1e3, pad=None)
-"""For single precision: there a flywheel of 1e8 and fitted pads lose the closing force entirely."""
+"""Settings for single precision, where a flywheel of 1e8 and fitted pads lose the closing force entirely."""
 FAST = replace(RECIPE, time_constant_steps=2.0)
-"""For a closure whose acceleration lacks a term: the quicker it yields, the sooner its error makes up for that."""
+"""Settings for a closure whose acceleration lacks a term: the faster it yields, the sooner its error compensates."""
 SIMULATORS = {"mujoco": RECIPE, "warp": SINGLE, "mjx": FAST, "genesis": RECIPE, "newton": SINGLE}
 """Who reads the file, and the settings that carry the loop best there."""
 OWN_MOTORS = ("genesis", "newton")

@@ -106,7 +106,7 @@ MJCF_OF: dict[str, MjcfForm] = {
     "flywheel": MjcfForm(_add_flywheel),
     "load": MjcfForm(_add_load, lambda effect, linkage, speed: effect.greatest_force(linkage) * max(linkage.lengths)),
 }
-"""By the key of an effect."""
+"""MJCF forms of the effects by key."""
 NO_MJCF = {"pin_friction"}
 """Effects of which MJCF has no counterpart: here friction that depends on the pin forces."""
 

@@ -30,16 +30,16 @@ def write_rounded(*numbers: float) -> str:
 
 
 class CameraView(NamedTuple):
-    """What the camera sees: the box in which pins A and B move."""
+    """View of the camera: the box in which pins A and B move."""
 
     x: float
     y: float
     half_height: float
-    """Of the picture, m."""
+    """Half height of the picture, m."""
 
     @property
     def distance(self) -> float:
-        """Of the camera from the plane, m."""
+        """Distance of the camera from the plane, m."""
         return self.half_height / math.tan(math.radians(0.5 * FOVY))
 
 
@@ -82,8 +82,8 @@ FLOOR = 1e-15
 """mjMINVAL: MuJoCo refuses a moving body of less mass (kg) or inertia (kg m^2)."""
 COLOURS = {1: "0.45 0.45 0.48 1", 2: "0.12 0.47 0.71 1", 3: "1 0.5 0.05 1", 4: "0.17 0.63 0.17 1"}
 SLIP_DAMPING = 1e6
-"""Of dry friction, per timestep: the slower the slip that it still softens. The drive prescribes the slip itself, so
-it makes nothing stiff; measured, a reversal is then as exact as any other position."""
+"""Damping of dry friction, per timestep: the greater, the slower the slip that it still softens. The drive prescribes
+the slip itself, so it makes nothing stiff; measured, a reversal is then as exact as any other position."""
 NEVER_NEEDED = ("contact", "limit", "island", "sensor")
 """Features that a closed loop of bars never uses; without contacts there is no midphase, and MuJoCo Warp does not load
 a file that switches it off."""
@@ -124,7 +124,7 @@ def make_motor(bar: int | None) -> dict[str, str]:
 
 
 A_MILLIONTH = 1e-6
-"""Of the heaviest bar's mass: simulations hold down to 1e-11 of it, and forces move by about this part."""
+"""Fraction of the heaviest bar's mass: simulations hold down to 1e-11 of it, and forces move by about this part."""
 ALONE = 1e-3
 """kg, where no bar has a mass."""
 
@@ -146,7 +146,7 @@ def require_carriable(linkage: FourBar) -> None:
 
 
 class Model:
-    """What loads and effects add to: options, attributes of the pins, loads."""
+    """Contents of the model to which loads and effects add: options, attributes of the pins, loads."""
 
     def __init__(self, linkage: FourBar, settings: Settings, timestep: float) -> None:
         self.linkage, self.settings = linkage, settings
@@ -158,7 +158,7 @@ class Model:
         self.cylinder: LinearDrive | None = None
         """A tendon of this name, and unless the drive is "none" an actuator on it whose control is its force, N."""
         self.inertia = dict.fromkeys(MOVING_BARS, 0.0)
-        """What is added to a bar's own, kg m^2."""
+        """Inertia added to that of each bar, kg m^2."""
         self.rest: tuple[float, float, float] | None = None
         """The angles of pins O2, A, O4 in which the bodies are put down, rad; None: every bar along its parent."""
 
@@ -183,7 +183,7 @@ class Model:
         return THICKNESS * max(self.linkage.lengths)
 
     def used(self, attribute: str) -> bool:
-        """Whether any pin carries the attribute."""
+        """Return True if any pin carries the attribute."""
         return any(attribute in attributes for attributes in self.pin.values())
 
     def add_option(self, root: ET.Element) -> None:
@@ -275,7 +275,7 @@ class Model:
         ET.SubElement(ET.SubElement(root, "equality"), "connect", pair, solref=solref, solimp=solimp)
 
     def add_tendons(self, root: ET.Element) -> None:
-        """At the cut pin B a tendon theta_4 - theta_3 takes what acts there; a spring is one between two sites."""
+        """Add a tendon theta_4 - theta_3 for what acts at the cut pin B, and one between two sites for each spring."""
         if not self.pin["B"] and not self.springs and self.cylinder is None:
             return
         tendons = ET.SubElement(root, "tendon")
@@ -344,5 +344,5 @@ class Model:
 
 
 def _is_slack_somewhere(spring: "Spring") -> bool:
-    """Whether a tendon has a rest length for it; any other, a constant force say, is an actuator on the tendon."""
+    """Return True if a rest length of a tendon can express the spring; any other needs an actuator on the tendon."""
     return spring.stiffness > 0.0 and spring.slack <= 0.0

@@ -1,4 +1,4 @@
-"""What can be dialled in the generated MJCF, and the values that hold for every linkage that was tried."""
+"""Settings of the generated MJCF, with values that hold for every linkage that was tried."""
 
 import math
 from dataclasses import dataclass

@@ -1,1 +1,1 @@
-"""What is shown of a scene and its solution: tables, words, drawings, pages."""
+"""Presentation of a scene and its solution: tables, words, drawings, pages."""

@@ -1,4 +1,4 @@
-"""What acts in a scene, as symbols: springs, loads, gravity, drive, flywheel, and what sits in the pins.
+"""Symbols of everything that acts in a scene: springs, loads, gravity, drive, flywheel, and effects in the pins.
 
 Each symbol knows its bar and its points in that bar's frame, so that whoever draws it (plot, film, page) places it at
 any position.
@@ -21,24 +21,24 @@ class Symbol(NamedTuple):
     kind: str
     """spring, force, moment, drive, cylinder, flywheel, gravity, or an effect in a pin: torsion, viscous, ..."""
     name: str
-    """As it is labelled."""
+    """Label of the symbol."""
     bar: int = 1
     """1 to 4."""
     at: complex = 0.0j
-    """Where it acts, from the bar's first pin in the bar's frame, m."""
+    """Point of action, from the bar's first pin in the bar's frame, m."""
     beyond: complex = 0.0j
-    """From there on to the point itself, m: in world axes, or in the bar's frame where `turns`."""
+    """Vector from there to the point itself, m: in world axes, or in the bar's frame where `turns`."""
     vector: complex = 0.0j
     """Force (N) or field (m/s^2); in world axes, or in the bar's frame where `turns`."""
     turns: bool = False
     moment: float = 0.0
     """N m; of a drive and of what acts in a pin 0."""
     end: "tuple[int, complex] | None" = None
-    """Of a spring or a cylinder the bar and the point at its other end."""
+    """Bar and point at the other end of a spring or a cylinder."""
     pin: str = ""
-    """Of what acts in a pin."""
+    """Pin of an effect that acts in one."""
     table: Any = None
-    """Of a load its factor over theta_2."""
+    """Factor of a load over theta_2."""
 
     def sign(self, theta_2: float) -> float:
         """+1 or -1, 0 where the load's factor is zero."""

@@ -136,7 +136,7 @@ def _write_scene_file(scene: Scene) -> str | None:
 
 
 def _collect_sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> dict[str, Any]:
-    """Both branches over theta_2, or that of another command over what is commanded."""
+    """Collect both branches over theta_2, or those of another command over the commanded quantity."""
     motion = scene.motion
     swept, own = list_sweep(scene), command(scene)
     where, start, name = thin_out(swept), None, swept.commanded
@@ -196,7 +196,7 @@ def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
 
 
 def thin_out(where: Command) -> Command:
-    """At most `MAX_ROWS` of the positions, evenly, both ends included."""
+    """Take at most `MAX_ROWS` of the positions, evenly, both ends included."""
     n = len(where.angle)
     return where if n <= MAX_ROWS else where.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
 
@@ -252,7 +252,7 @@ def _encode_pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[i
 FORMATS = ("html", "gif", "mp4")
 SCRIPTS = ("numbers.js", "picture.js", "acting.js", "chart.js", "tolerances.js", "page.js")
 LIVE_SCRIPTS = ("fields.js", "drag.js", "edit.js")
-"""Of the workbench besides."""
+"""Additional scripts of the workbench."""
 
 
 def write(

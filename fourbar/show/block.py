@@ -1,4 +1,4 @@
-"""What `analyze` and `classify` print: one block of aligned lines, at most 80 columns wide."""
+"""Output of `analyze` and `classify`: one block of aligned lines, at most 80 columns wide."""
 
 import math
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""What frame and pins bear over a motion and what the drive delivers, to choose bearings and a motor; its energy."""
+"""Loads of frame and pins over a motion, and the power and energy of the drive, to choose bearings and a motor."""
 
 import warnings
 from typing import Any, NamedTuple
@@ -73,12 +73,12 @@ def shaking_moment(solution: Solution) -> Array:
 
 
 def _compute_moment(distance: Any, angle: Any, force: Array) -> Array:
-    """About O2, of a force at a place, N m, (n,), of a study (m, n)."""
+    """Compute the moment of a force at a place about O2, N m, (n,), of a study (m, n)."""
     return np.asarray(distance * (np.cos(angle) * force[..., 1] - np.sin(angle) * force[..., 0]))
 
 
 class Driving(NamedTuple):
-    """What the drive does, as it is shown."""
+    """Torque or force of the drive, as it is shown."""
 
     name: str
     symbol: str
@@ -87,7 +87,7 @@ class Driving(NamedTuple):
     """(n,); None where only positions are known."""
     error: Array | None
     keys: DriveNames
-    """Of its torque or force among the quantities."""
+    """Names of its torque or force among the quantities."""
     speed_key: str
     speed: Array | None
     """rad/s of the driven bar, or m/s of the stroke."""
@@ -111,7 +111,7 @@ def describe_drive(scene: Scene) -> str:
 
 
 def is_once_round(solution: Solution) -> Any:
-    """Whether a sweep goes over whole turns: its last position then repeats the first; of a study (m,)."""
+    """Return True if a sweep covers whole turns, so that its last position repeats the first; for a study (m,)."""
     angle = solution.at.angle
     if angle.shape[-1] == 1:
         return np.zeros(angle.shape[:-1], dtype=bool)
@@ -170,13 +170,13 @@ class MotorDuty(NamedTuple):
     rms_power: float
     """W."""
     energy_in: float | None
-    """That the drive gives to the linkage over the sweep, J; None where it does not move through two positions."""
+    """Energy from the drive to the linkage over the sweep, J; None where it does not move through two positions."""
     energy_out: float | None
-    """That the linkage gives back, J."""
+    """Energy from the linkage back to the drive, J."""
     closed: bool
     """The sweep is one turn of the input, or several."""
     peak_force: float | None = None
-    """Of a linear drive, N."""
+    """Peak force of a linear drive, N."""
     rms_force: float | None = None
 
 

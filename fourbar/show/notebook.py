@@ -1,4 +1,4 @@
-"""How a scene and a solution show themselves in a notebook, and a solution as a table of pandas."""
+"""Display of a scene and a solution in a notebook, and of a solution as a table of pandas."""
 
 from base64 import b64encode
 from html import escape

@@ -1,4 +1,4 @@
-"""What `analyze --sensitivity`, `extremes` and `equilibrium` print: as tables, or as one JSON object, SI and rad."""
+"""Output of `analyze --sensitivity`, `extremes` and `equilibrium`: tables, or one JSON object, SI and rad."""
 
 import math
 from typing import TYPE_CHECKING, Any

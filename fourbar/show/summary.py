@@ -1,4 +1,4 @@
-"""What one wants to know of a solved scene: ranges, peaks and where they are, what the drive needs, where it ends.
+"""Summary of a solved scene: ranges, peaks and their places, needs of the drive, ends of the motion.
 
 `locate_between` finds what the steps of a sweep pass over: reversals of dry friction, and the largest torque and pin
 forces. `summarize` computes the facts; `fourbar.show.block` prints them.
@@ -28,7 +28,7 @@ CUTS = 40
 ROUNDS = 5
 """Calls: a step of 5 degrees is cut down to 5e-8 degrees, less than a largest value can be told from the next by."""
 MOST_PEAKS = 6
-"""Of one quantity, the highest."""
+"""Number of peaks of one quantity that are listed, the highest."""
 GROWING = 1e-3
 """Part of itself by which what has a largest value grows no more in the last two calls; towards a pole it grows on."""
 AT_REST = 1e-12
@@ -42,11 +42,11 @@ class Between(NamedTuple):
     """A sweep with what its steps pass over."""
 
     solution: Solution
-    """At its positions and, among them, at both sides of each reversal and where each of `list_sizes` is largest."""
+    """Solution at its positions and also at both sides of each reversal and where each of `list_sizes` is largest."""
     reversals: list[tuple[float, str]]
     """Commanded angle or stroke, rad or m, and the pin at which dry friction reverses there: the pin forces jump."""
     growing: set[str]
-    """Those of `list_sizes` that grow without bound within a step; all where nothing was looked for between."""
+    """Names in `list_sizes` that grow without bound within a step; all of them where no step was searched."""
 
 
 def list_sizes(solution: Solution) -> dict[str, Array]:
@@ -171,7 +171,7 @@ class Peak(NamedTuple):
 
     value: float
     place: float
-    """What is commanded there, rad or m; of a motion over time the time, s."""
+    """Commanded angle or stroke at the peak, rad or m; for a motion over time the time, s."""
 
 
 class PinLoad(NamedTuple):
@@ -200,7 +200,7 @@ class Facts:
     stretches: list[Stretch]
     """Places from and up to which the linkage assembles, None at the ends of the motion; empty: everywhere."""
     drive: Driving | None
-    """What drives; None of a released linkage, and where only positions are known."""
+    """Drive; None for a released linkage, and where only positions are known."""
     peak: Peak | None
     """Largest torque or force of the drive, signed."""
     duty: MotorDuty | None
@@ -214,13 +214,13 @@ class Facts:
     strokes: tuple[float, float] | None
     """Smallest and largest stroke that assembles on the branch, and with a stroke commanded on the side."""
     between: Between
-    """What the steps pass over."""
+    """Events within the steps of the sweep."""
     error: float | None
     """Largest error bar of the drive and of the pin forces, as a part of the value; None where none was computed."""
 
     @property
     def linear(self) -> bool:
-        """Whether a cylinder drives."""
+        """Return True if a cylinder drives."""
         return self.solution.drive is not None
 
 

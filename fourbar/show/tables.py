@@ -1,4 +1,4 @@
-"""How every printed table looks, the table of positions of `analyze --table`, and the line of what runs long."""
+"""Layout of every printed table, the table of positions of `analyze --table`, and the progress line of long work."""
 
 import io
 import math
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 MOST_DIGITS = 16
-"""Of a double."""
+"""Largest number of significant digits of a double."""
 GAP = 2
 """Blanks between two columns of the table, the divider among them."""
 MOST_ROWS = 40
@@ -160,7 +160,7 @@ def write_cells(values: Array, form: str = ".6g") -> list[str]:
 
 
 def _count_digits(torque: Array, error: Array) -> list[str]:
-    """How many digits of the torque are not rounding."""
+    """Count the digits of the torque that are not round-off."""
     with np.errstate(all="ignore"):
         digits = np.clip(np.floor(np.log10(np.abs(torque) / error)), 0, MOST_DIGITS)
     known = np.isfinite(torque) & np.isfinite(error)

@@ -1,4 +1,4 @@
-"""What `fourbar tolerance` prints: a table where the spread is largest, and one JSON object."""
+"""Output of `fourbar tolerance`: a table where the spread is largest, and one JSON object."""
 
 import math
 from collections.abc import Callable
@@ -34,7 +34,7 @@ def list_shown_parts(found: Tolerances) -> list[str]:
 
 
 def find_part_unit(part: str) -> str:
-    """Of a quantity, a magnitude, or a component of a point, which may be called v or a."""
+    """Return the unit of a quantity, a magnitude, or a component of a point, which may be called v or a."""
     unit: str = UNITS.get(part.strip("|"), "m")
     return unit
 

@@ -137,7 +137,7 @@ def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None
 
 
 def draw_angles(axes: "Axes", view: View) -> None:
-    """Those of the bars that are not the axis."""
+    """Draw the angles of the bars that are not the axis."""
     over = draw_axes(axes, view)
     bars = [bar for bar in MOVING_BARS if view.time is not None or f"theta_{bar}" != view.sweep.commanded]
     for bar in bars:
@@ -154,7 +154,7 @@ def draw_angles(axes: "Axes", view: View) -> None:
 
 
 def _draw_rates(axes: "Axes", view: View, letter: str, unit: str, title: str, what: str) -> None:
-    """Of the commanded bar (where it is not zero) and the other two."""
+    """Draw the rates of the commanded bar (where they are not zero) and of the other two bars."""
     over, driven = draw_axes(axes, view), view.sweep.at.bar
     name = {"omega": "ω", "alpha": "α"}[letter]
     digits, others = {2: "₂", 3: "₃", 4: "₄"}, [bar for bar in MOVING_BARS if bar != driven]
@@ -306,7 +306,7 @@ def draw_transmission(axes: "Axes", view: View) -> None:
 
 
 def find_free_place(mu: Array) -> float:
-    """Where along the axis the curve keeps furthest from a remark at 40 deg, as a part of its length."""
+    """Find the place along the axis, as a part of its length, where the curve is furthest from a remark at 40 deg."""
     half = REMARK / 2.0
     best, clearance = 1.0 - half, -1.0
     for place in np.linspace(1.0 - half, half, 25):
@@ -357,7 +357,7 @@ EVERY = 60.0
 MOST_DOTS = 12
 """... or, over time or a stroke, a round number that gives no more than these."""
 LONG_NUMBERS = 2000.0
-"""From here on the numbers along a radius are too wide for four of them."""
+"""Smallest number too wide for four of its kind along a radius."""
 
 
 def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:

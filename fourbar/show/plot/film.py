@@ -28,7 +28,7 @@ MAX_FRAMES = 1500
 SIZE = (6.4, 5.6)
 DPI = 100
 SWEEP_SECONDS = 6.0
-"""Of a film of a sweep, where nothing else is stated."""
+"""Duration of a film of a sweep if no other is stated, s."""
 WINDOW = 24
 """Positions whose symbols the window is made to hold."""
 SHORTEST = 1.0

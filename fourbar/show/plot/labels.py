@@ -108,7 +108,7 @@ class Labels:
 
 
 STEP, MARK = 3.0, 4.5
-"""Of the points along a line, and radius of a mark, typographic points."""
+"""Distance of the points along a line, and radius of a mark, typographic points."""
 RING = np.array([(math.cos(k * math.tau / 12), math.sin(k * math.tau / 12)) for k in range(12)])
 
 

@@ -1,4 +1,4 @@
-"""What tolerances do to torque, pin forces and points: bands and shares of the variance; and what these depend on."""
+"""Plots of studies: bands of tolerances for torque, pin forces and points, shares of the variance, sensitivities."""
 
 import textwrap
 from pathlib import Path
@@ -42,7 +42,7 @@ SHADES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", FAINT)
 OFF_SCALE = 98.0
 """Percentile of the half widths beyond which an axis is not stretched: towards a limit they grow without end."""
 MOST_NUMBERS = 12
-"""Of a scene's numbers, those that matter most: more are thin bars that nobody reads."""
+"""Number of the most influential parameters shown; a chart of more is unreadable."""
 BELOW = 30.0
 """Space that numbers and name of an axis take, typographic points."""
 MOST_PANELS = 6

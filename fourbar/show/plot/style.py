@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 INK, MUTED, FAINT = "#1a1a1a", "#6b6b6b", "#d9d9d9"
 POINT = "#8A3B78"
-"""Of the scene's own points."""
+"""Colour of the scene's own points."""
 # Okabe and Ito's palette: distinguished by colour-blind readers, and by lightness and dashes in grey
 BAR_COLOURS = {2: "#0072B2", 3: "#D55E00", 4: "#007A5A"}
 BAR_DASHES: dict[int, Any] = {2: "-", 3: (0, (5, 1.6)), 4: (0, (7, 1.6, 1.4, 1.6))}
@@ -35,7 +35,7 @@ FORCE_WIDTHS = dict(zip(PIN_FORCES, (2.6, 2.0, 1.6, 1.1), strict=True))
 
 
 def choose_force_line(name: str) -> dict[str, Any]:
-    """How the curve of a pin force is drawn and named."""
+    """Return the style and the label of the curve of a pin force."""
     look = {"color": FORCE_COLOURS[name], "ls": FORCE_DASHES[name], "lw": FORCE_WIDTHS[name]}
     return {**look, "label": write_force_name(name)}
 
@@ -47,7 +47,7 @@ def write_force_name(name: str) -> str:
 
 TITLE: dict[str, Any] = {"parse_math": False, "size": 10.5, "weight": "bold", "x": 0.012, "ha": "left"}
 CAPTION: dict[str, Any] = {"parse_math": False, "size": 6.8, "color": MUTED, "x": 0.012, "ha": "left"}
-"""Of a whole figure, above and below its panels."""
+"""Styles of the texts of a whole figure, above and below its panels."""
 OPEN: dict[str, Any] = {"mfc": "white", "mec": INK}
 """A mark that is a ring."""
 HEADED: dict[str, Any] = {"arrowstyle": "-|>", "lw": 1.5, "shrinkA": 0.0, "shrinkB": 0.0}
@@ -58,7 +58,7 @@ FORMATS = ("svg", "png", "pdf")
 
 
 _ONE_AT_A_TIME = RLock()
-"""Of the threads that draw: matplotlib's settings are those of the whole program."""
+"""Lock of the threads that draw, because matplotlib's settings apply to the whole program."""
 
 
 @contextmanager

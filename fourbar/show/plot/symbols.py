@@ -31,17 +31,17 @@ LENGTHS = {"force": 7.0, "moment": 2.6, "drive": 3.2, "flywheel": 4.0, "torsion"
 """Length of an arrow and radii, in sizes of a support; other rings around pins have RING."""
 RING = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
 NAMED_AT = {"viscous": -0.4, "friction": 0.4, "pin_friction": 0.9, "flywheel": -1.0, "torsion": 0.0}
-"""Where around a ring its name stands, rad: several at one pin do not meet."""
+"""Angle around its ring at which a name stands, rad, so that several at one pin do not meet."""
 SMALLEST, SHARE = 0.5, 0.12
 """A symbol at a pin is as large as this share of the shortest bar there lets it be, and no smaller than half."""
 ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
 LONGEST = 7.0
-"""Of an arrow, in sizes of a support: the largest of the sweep, or where values diverge all that are as large."""
+"""Length of an arrow, in sizes of a support: the largest of the sweep, or if values diverge all that are as large."""
 BARREL = 0.85
-"""Of the shortest stroke of the sweep is the barrel of a cylinder; the rod is what comes out of it."""
+"""Length of a cylinder's barrel as a fraction of the shortest stroke of the sweep; the rod is what comes out of it."""
 COILS = 7
 OPENING = math.radians(250.0)
-"""Of an arc with an arrow head."""
+"""Extent of an arc with an arrow head."""
 
 
 class Place(NamedTuple):
@@ -53,7 +53,7 @@ class Place(NamedTuple):
     """Direction of each bar."""
     pins: dict[str, complex]
     factor: float
-    """From m."""
+    """Factor from m to the unit of the drawing."""
     theta_2: float
     torque: float
     """N m; NaN where there is none."""
@@ -83,16 +83,16 @@ class Place(NamedTuple):
 
 @dataclass(slots=True)
 class DrawnSymbol:
-    """What one symbol has put into a drawing."""
+    """Parts of a drawing that one symbol has added."""
 
     artists: list[Any] = field(default_factory=list)
     lines: list[list[Point]] = field(default_factory=list)
-    """That labels keep off, and that a window has to show."""
+    """Lines that labels avoid and that a window has to show."""
     text: str = ""
     label: Point | None = None
-    """Where the text belongs; None: it stands already."""
+    """Place of the text; None: it is placed already."""
     away: complex = 0.0j
-    """From there outwards, of length 1."""
+    """Direction from there outwards, of length 1."""
 
 
 def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) -> Place:

@@ -1,4 +1,4 @@
-"""What a drawing shows: the sweep of a scene on one branch, and one position of it in detail."""
+"""Content of a drawing: the sweep of a scene on one branch, and one position of it in detail."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -34,7 +34,7 @@ class View:
     here: Solution
     notes: list[str] = field(default_factory=list)
     units: Conversion = field(default_factory=dict)
-    """Of the numbers drawn; what is left out has the SI unit with a prefix."""
+    """Units of the numbers drawn; one that is left out is the SI unit with a prefix."""
     dimensions: bool = False
     """The lengths of the bars are written at them."""
     others: "list[View]" = field(default_factory=list)
@@ -47,7 +47,7 @@ class View:
 
     @property
     def axis(self) -> "Axis":
-        """What curves are drawn over: time, or what is commanded."""
+        """Quantity on the horizontal axis: time, or the commanded quantity."""
         if self.time is not None:
             longest = max(float(other.time[-1]) for other in self.alike if other.time is not None)
             factor, unit = (1.0, "s") if longest >= 1.0 else choose_unit(longest, "s")
@@ -56,7 +56,7 @@ class View:
 
     @property
     def time(self) -> Array | None:
-        """Of a motion given over time, s."""
+        """Times of a motion given over time, s."""
         return self.sweep.time
 
     @property
@@ -69,7 +69,7 @@ class View:
 
     @property
     def moves(self) -> bool:
-        """Whether velocities, accelerations and forces were evaluated."""
+        """Return True if velocities, accelerations and forces were evaluated."""
         return self.sweep.omega_2 is not None
 
     @property
@@ -84,16 +84,16 @@ class View:
 
 
 class Axis(NamedTuple):
-    """What curves are drawn over."""
+    """Quantity on the horizontal axis."""
 
     symbol: str
     label: str
-    """As it stands at the axis."""
+    """Symbol as it is typeset at the axis."""
     unit: str
     factor: float
-    """From SI to the unit."""
+    """Factor from the SI unit to the unit."""
     values: Array
-    """Of the sweep, in the unit."""
+    """Values of the sweep, in the unit."""
 
     def words(self, place: float, digits: int = 4) -> str:
         """Say a place, which is in SI."""
@@ -123,7 +123,7 @@ def collect_point_vectors(scene: Scene, solution: Solution, letter: str) -> dict
 
 
 def is_over_time(scene: Scene) -> bool:
-    """Whether the motion is one through time: released, or by a law."""
+    """Return True if the motion is one through time: released, or by a law."""
     return scene.motion.free is not None or scene.motion.law is not None
 
 
