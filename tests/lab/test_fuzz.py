@@ -195,7 +195,7 @@ def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatc
 def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A distance that may be 0 had 1 m added."""
 
-    def silent(of: spring.Spring, across: Any, _: object) -> Any:
+    def silent(of: spring.Spring, across: Any) -> Any:
         distance = np.abs(across)
         if isinstance(distance, Sloped):
             distance.values += np.array([float(ball.contains(0)) for ball in distance.values], dtype=object)

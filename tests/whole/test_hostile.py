@@ -90,7 +90,7 @@ def test_reports_hold_hostile_text_as_text(
     assert "<script>" not in markdown
     assert "\n# heading" not in markdown
     assert not re.search(r"(?<!\\)\]\(", markdown)
-    print_table(summary, out)
+    print_table(summary, out, verbose=True)
     shown = capsys.readouterr().out
     assert "[bold red]" in shown
     for name, where in (("terminal", shown), ("markdown", markdown), ("html", html)):

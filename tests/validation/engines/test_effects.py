@@ -102,7 +102,7 @@ def test_exact_engines_agree(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("names", combinations(ACTING, 2), ids="+".join)
+@pytest.mark.parametrize("names", list(combinations(ACTING, 2)), ids="+".join)
 def test_exact_engines_agree_on_pairs(names: tuple[str, str]) -> None:
     assert outcome(scene(*names), EXACT) == ([], set())
 

@@ -561,7 +561,7 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -
     kept, dates = tmp_path / "kept", [f"2026-01-0{night}T02:00:00+00:00" for night in (1, 2, 3)]
     for night, date in enumerate(dates):
         record, rows = made([replace(ROW, error=1e-15 * (1 + night))], {"scene": SCENE})
-        versions = {**record.versions, "mujoco": f"4.{night}.0"} | ({"drake": "1"} if night else {})
+        versions = {**record.versions, "mujoco": f"4.{night}.0"} | ({"newcomer": "1"} if night else {})
         about = replace(record, versions=versions, date=date, commit=f"{night}abcdef")
         run = save(tmp_path / str(night), rows, "scene,engine,-,1,1,3.0\n", about)
         assert status(["accept", str(run), "--to", str(kept)]) == 0
@@ -570,7 +570,7 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(tmp_path: Path) -
     assert table.groupby("date", observed=True).size().to_dict() == dict.fromkeys(dates, 2)
     assert table[table.quantity == "torque"].error.tolist() == [1e-15 * n for n in (1, 2, 3)]
     assert table[table.quantity == "time"].times_formulas.tolist() == [3.0] * 3
-    assert set(table.version_mujoco) == {"4.0.0", "4.1.0", "4.2.0"} and table.version_drake.isna().sum() == 2
+    assert set(table.version_mujoco) == {"4.0.0", "4.1.0", "4.2.0"} and table.version_newcomer.isna().sum() == 2
     assert table.scene_hash.nunique() == 1
 
 

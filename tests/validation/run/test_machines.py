@@ -68,7 +68,7 @@ def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypa
     kills = 0
     while kills < KILLS:
         out, before = tmp_path / f"dask{kills}", kills
-        for step in run(suite, out, EXACT, RunOptions(drawn=False, scheduler=cluster.scheduler_address)):  # type: ignore[attr-defined]
+        for step in run(suite, out, EXACT, RunOptions(drawn=False, sample=0, scheduler=cluster.scheduler_address)):  # type: ignore[attr-defined]
             alive = [pid for nanny in cluster.workers.values() if (pid := running(nanny))]  # type: ignore[attr-defined]
             if not isinstance(step, Summary) and step and alive and kills < KILLS:
                 with suppress(ProcessLookupError):  # killed before, and its nanny has not noticed yet
