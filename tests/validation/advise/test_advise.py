@@ -16,6 +16,7 @@ from fourbar_validation.advise import advise, matters
 from fourbar_validation.advise.worst_errors import compute_errors
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import FAILS
+from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.engines.witnesses import WITNESSES
@@ -122,6 +123,13 @@ def test_a_run_is_no_more_precise_than_required(required: float) -> None:
     # the engine's own prediction is what the formulas find, though it never saw them
     assert worst == pytest.approx(answer.evidence["expected_error"], rel=0.5)
     assert answer.evidence["steps"] < 628
+
+
+def test_a_guest_through_time_is_not_answered_for_by_the_harness() -> None:
+    (simulated,) = (witness for witness in WITNESSES if witness.through_time)
+    guest = Guest("mujoco 3.3.7", simulated.engine, simulated.tolerance, through_time=True)
+    ours, theirs = required_error.adjust_witnesses((simulated, guest), 1e-3)
+    assert ours != simulated and theirs is guest
 
 
 def test_exact_witnesses_stay_exact() -> None:

@@ -15,6 +15,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED, mark_turning
 from fourbar_validation.compare.tolerance import divide, hold_simulated, magnitude
+from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.witnesses import Witness
 
 ROUNDS = 6
@@ -26,10 +27,16 @@ LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
 
 
 def adjust_witnesses(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
-    """Lay out whatever runs through time for `error`, its allowed error; exact engines stay exact."""
+    """Lay out the harness's own simulations for `error`, their allowed error.
+
+    Exact engines stay exact, and a guest keeps its own settings and tolerance: it would otherwise be answered for.
+    """
     tolerance = hold_simulated(error, "steps and softness are laid out for it")
     own: dict[str, Any] = {"engine": partial(Dialled, error), "tolerance": tolerance, "order": None}
-    return tuple(replace(each, **own) if each.through_time else each for each in witnesses)
+    adjusted = [witness.through_time and not isinstance(witness, Guest) for witness in witnesses]
+    return tuple(
+        replace(witness, **own) if ours else witness for witness, ours in zip(witnesses, adjusted, strict=True)
+    )
 
 
 @dataclass(slots=True)
