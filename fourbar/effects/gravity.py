@@ -9,6 +9,7 @@ import numpy as np
 from fourbar.effects.actions import Actions
 from fourbar.effects.effect import Effect
 from fourbar.formulas.arithmetic import is_any, namespace, polar, vector
+from fourbar.formulas.longer import shorten
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, Declared, check_numbers
 
@@ -33,7 +34,8 @@ class Gravity(Effect):
     def field(self) -> Any:
         """g_x + i g_y, m/s^2; a component that the angle as a double cannot tell from zero is zero."""
         u = polar(1.0, self.angle)
-        if namespace(u) is not np:  # it may be differentiated by the angle
+        # it may be differentiated by the angle; in longer numbers the component is what the error bar shows
+        if namespace(u) is not np or shorten(self.angle) is not self.angle:
             return self.magnitude * u
         return self.magnitude * vector(u.real * (abs(u.real) > U), u.imag * (abs(u.imag) > U))
 

@@ -144,3 +144,15 @@ def test_a_long_sweep_searches_for_friction_at_its_ends_alone(monkeypatch: pytes
     (row,) = printed.check_blocks(question)
     assert row.passed
     assert 0 < len(searched) < 10
+
+
+def test_what_gravity_drops_of_its_direction_shows_in_the_error_bar() -> None:
+    """Compare a heavy crank beside its equilibrium with balls: cos(-pi/2) as a double is 6e-17, and taken for zero."""
+    scene = Scene(
+        FourBar(0.3, Bar(0.1, 1e6), Bar(0.25, 0.5), Bar(0.22, 0.4)),
+        Motion(1.5 * np.pi + np.linspace(-1e-3, 1e-3, 101), 1.0),
+        effects=(Gravity(),),
+    )
+    solution, exact = fourbar.solve(scene, "error"), BallArithmetic().answer(scene, command(scene))
+    error = np.abs(solution.torque - exact.quantities["torque"])
+    assert (error <= printed.BARS * solution.torque_error).all()
