@@ -301,7 +301,7 @@ def workers_of(process: subprocess.Popen[bytes]) -> list[int]:
 
 
 @pytest.mark.linux
-@pytest.mark.timeout(60 + 20 * KILLS)
+@pytest.mark.timeout(240 + 20 * KILLS)
 def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path: Path, undisturbed: Path) -> None:
     rng = np.random.default_rng(SEED + 1)
     kills = runs = 0

@@ -290,7 +290,7 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
         return act
 
     if isinstance(ACTING[name], Load):
-        monkeypatch.setattr(free_body_effects, "_load", faulty(free_body_effects._load))
+        monkeypatch.setattr(free_body_effects, "apply_load", faulty(free_body_effects.apply_load))
     else:
         monkeypatch.setitem(free_body_effects.WRENCH_OF, name, faulty(free_body_effects.WRENCH_OF[name]))
     found = failing(scene(name), [witness for witness in EXACT if witness.name == "free-body"])
