@@ -108,13 +108,16 @@ def test_a_long_free_motion_stops_at_ctrl_c(tmp_path: Path) -> None:
         assert running.stdout is not None and running.stdout.readline()
         time.sleep(1.0)
         assert running.poll() is None
-        for _ in range(3):  # Python drops an interrupt that falls into a destructor; a user presses again
+        presses = 0
+        while presses < 3:  # Python drops an interrupt that falls into a destructor; a user presses again
+            presses += 1
             running.send_signal(signal.SIGINT)
             with suppress(subprocess.TimeoutExpired):
                 running.wait(timeout=10.0)
                 break
         _, printed = running.communicate(timeout=10.0)
-    assert running.returncode == INTERRUPTED and printed.strip().endswith(b"error: interrupted")
+    assert running.returncode == INTERRUPTED and printed.splitlines()[-1] == b"error: interrupted"
+    assert presses > 1 or printed.strip() == b"error: interrupted"
 
 
 def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(
