@@ -119,7 +119,7 @@ def command(archive: Path | None) -> None:
 def write_archive(checkout: Path, archive: Path) -> None:
     """Pack the problems with their page, schema, licence and citation, the same bytes each time."""
     files = sorted(PROBLEMS.iterdir())
-    files += [checkout / name for name in ("docs/problems.md", "docs/protocol.md", "docs/protocol.schema.json")]
+    files += [checkout / name for name in ("docs/benchmark.md", "docs/protocol.md", "docs/protocol.schema.json")]
     files += [checkout / name for name in ("LICENSE", "CITATION.cff")]
     with ZipFile(archive, "w", ZIP_DEFLATED) as packed:
         for file in files:

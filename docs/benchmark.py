@@ -1,0 +1,227 @@
+"""Writes what docs/benchmark.md says of each problem, its figures and its matrix. `python docs/benchmark.py`
+
+Data and figures come from models/problems, letters from docs/examples/benchmark.csv; the sentences are written by hand.
+"""
+
+import csv
+import io
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+import fourbar
+from fourbar.quantities import PIN_FORCES
+from fourbar.show.plot.labels import Label, Labels
+from fourbar.show.plot.linkage import draw_mechanism, draw_support, locate_pins, scale_of
+from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, apply_style
+from fourbar.show.plot.view import make_view
+from fourbar.writing import write_text
+from fourbar_validation.check.problem import GROUPS, LEVELS, MISSING, WORSE
+from fourbar_validation.report.svg import COORDINATES, LONG_NUMBER
+
+TARGET = Path(__file__).with_suffix(".md")
+FIGURES = TARGET.with_suffix("")
+PROBLEMS = TARGET.parents[1] / "models" / "problems"
+LETTERS = TARGET.parent / "examples" / "benchmark.csv"
+BLOCK = re.compile(r"<!-- data (\w+) -->\n.*?<!-- end -->\n", re.DOTALL)
+SHOWN_AT = {"change_point": math.radians(40.0), "pinocchio_2729": math.radians(110.0)}
+"""Positions of figures, rad, where the position that the project's figures choose shows little."""
+SIZE, LOW = (3.6, 2.6), (3.6, 1.4)
+"""Sizes of a figure, and of one of a low mechanism, inches."""
+BEYOND_BALLS = ("cylinder", "pin_friction")
+"""Problems with an effect that the ball arithmetic does not take."""
+
+
+def read_problem(name: str) -> dict[str, Any]:
+    """Read a problem as it stands in models/problems."""
+    problem: dict[str, Any] = json.loads((PROBLEMS / f"{name}.json").read_text(encoding="utf-8"))
+    return problem
+
+
+def write_number(value: float) -> str:
+    """Write a number with ten digits at most."""
+    return f"{value:.10g}"
+
+
+def write_pair(pair: list[float]) -> str:
+    """Write a size and an angle, rad, which is shown in degrees."""
+    return f"{write_number(pair[0])} at {write_number(math.degrees(pair[1]))}°"
+
+
+def write_effect(value: Any) -> str:
+    """Write the numbers of an effect, name by name."""
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {write_effect(part)}" for key, part in value.items())
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "; ".join(map(write_effect, value))
+    return write_pair(value) if isinstance(value, list) else write_number(value)
+
+
+def write_data(problem: dict[str, Any]) -> list[str]:
+    """Write lengths and bars as a table, and effects, drive and command as its last rows."""
+    lengths, bars = problem["scene"]["lengths"], problem["scene"].get("bars", {})
+    columns = [name for name in dict.fromkeys((*lengths, *bars)) if name not in ("ground_angle", "offset")]
+    rows = [["bar", *columns], ["---"] * (len(columns) + 1)]
+    rows.append(["length, m", *(write_number(lengths[name]) if name in lengths else "" for name in columns)])
+    for key, head in (("mass", "mass, kg"), ("inertia", "inertia, kg m²"), ("centre", "centre, m")):
+        cells = [bars.get(name, {}).get(key) for name in columns]
+        if any(cell is not None for cell in cells):
+            write = write_pair if key == "centre" else write_number
+            rows.append([head, *("" if cell is None else write(cell) for cell in cells)])
+    return [f"|{'|'.join(row)}|" for row in rows]
+
+
+def write_question(name: str, problem: dict[str, Any]) -> str:
+    """Write what acts, what is commanded, what is asked and where both answers come from."""
+    scene, command = problem["scene"], problem["command"]
+    parts = []
+    if turned := scene["lengths"].get("ground_angle"):
+        parts.append(f"Ground at {write_number(math.degrees(turned))}°.")
+    if (offset := scene["lengths"].get("offset")) is not None:
+        parts.append(f"Guide at y = {write_number(offset)} m.")
+    parts += [f"{key.replace('_', ' ').capitalize()}: {write_effect(value)}." for key, value in
+              (*scene.get("effects", {}).items(), *(("loads", load) for load in scene.get("loads", ())))]  # fmt: skip
+    if "from" in scene.get("drive", {}):
+        parts.append(f"Drive: {write_effect(scene['drive'])}.")
+    angles = np.atleast_1d(command["theta_2"])
+    rates = f"ω₂ {write_number(command['omega_2'])} rad/s"
+    rates += f", α₂ {write_number(command['alpha_2'])} rad/s²" if command.get("alpha_2") else ""
+    branch = f"branch {command['branch'] if np.ndim(command['branch']) == 0 else 'in the file'}"
+    if problem["ask"] == "release":
+        times = problem["times"]
+        start = f"Released at θ₂ {write_number(math.degrees(angles[0]))}°"
+        parts.append(f"{start}, {rates}, {branch}; {len(times)} instants up to {times[-1]:g} s.")
+    else:
+        ends = [write_number(math.degrees(angle)) for angle in (angles[0], angles[-1])]
+        parts.append(f"θ₂ from {ends[0]}° to {ends[1]}° in {len(angles)} positions, {rates}, {branch}.")
+    return f"{' '.join(parts)} **Asked:** {name_asked(problem)}. **Answered by** {name_answers(name, problem)}."
+
+
+def name_asked(problem: dict[str, Any]) -> str:
+    """Name what is asked, with the pin forces as one."""
+    single = [f"`{quantity}`" for quantity in problem["answers"] if quantity not in PIN_FORCES]
+    return f"{', '.join(single)}, {sum(quantity in PIN_FORCES for quantity in problem['answers'])} pin forces"
+
+
+def name_answers(name: str, problem: dict[str, Any]) -> str:
+    """Name the derivations of a problem's answers."""
+    if problem["mechanism"] == "slider-crank":
+        return "free bodies and virtual work"
+    if problem["ask"] == "release":
+        return f"integration, {'elliptic functions' if 'frequency' in problem['answers'] else 'energy'} and free bodies"
+    return (
+        f"formulas{' and' if name in BEYOND_BALLS else ','} free bodies{'' if name in BEYOND_BALLS else ' and balls'}"
+    )
+
+
+def write_matrix(names: list[str]) -> list[str]:
+    """Write a row for each engine with two letters for each problem, and below why a letter is none of A and R."""
+    worst: dict[str, dict[str, dict[str, str]]] = {}
+    reasons: dict[str, list[str]] = {}
+    order = (*LEVELS, WORSE, MISSING, "R")
+    with LETTERS.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            engine = row["engine"] if row["version"] in row["engine"] else f"{row['engine']} {row['version']}"
+            group = next((group for group, quantities in GROUPS.items() if row["quantity"] in quantities), "motion")
+            group = "all" if row["quantity"] == "all" else group
+            letters = worst.setdefault(engine, {}).setdefault(row["problem"], {})
+            letters[group] = max(letters.get(group, row["level"]), row["level"], key=order.index)
+            if row["level"] in ("B", "C", WORSE, MISSING) and row["reason"]:
+                reasons.setdefault(row["reason"], []).append(engine)
+    rows = [["engine", *(str(number) for number in range(1, len(names) + 1))], ["---", *[":-:"] * len(names)]]
+    for engine, cells in worst.items():
+        rows.append([engine, *(write_letters(cells.get(name, {})) for name in names)])
+    lines = [f"|{'|'.join(row)}|" for row in rows]
+    return [*lines, "", *(f"- {', '.join(dict.fromkeys(engines))}: {why}" for why, engines in reasons.items())]
+
+
+def write_letters(levels: dict[str, str]) -> str:
+    """Write a cell: reactions, then torque, or the motion where no torque is asked."""
+    if "all" in levels or not levels:
+        return levels.get("all", MISSING)
+    return levels.get("reactions", MISSING) + levels.get("torque", levels.get("motion", MISSING))
+
+
+def draw_problem(name: str) -> str:
+    """Draw a problem's mechanism to scale, as SVG."""
+    with apply_style():
+        problem = read_problem(name)
+        sliding = problem["mechanism"] == "slider-crank"
+        figure = Figure(figsize=LOW if sliding else SIZE, layout="constrained")
+        axes, labels = figure.add_subplot(), Labels()
+        if sliding:
+            draw_slider_crank(axes, problem, labels)
+        else:
+            view = make_view(fourbar.load(PROBLEMS / f"{name}.toml"), SHOWN_AT.get(name))
+            factor, _, size = scale_of(view)
+            pins = locate_pins(view, factor)
+            axes.plot(*zip(pins["O2"], pins["O4"], strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1)
+            for pin in ("O2", "O4"):
+                draw_support(axes, pins[pin], size, labels)
+            draw_mechanism(axes, view, view.here, 0, labels)
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.margins(0.12)
+        axes.set_axis_off()
+        labels.settle(figure)
+        drawn = io.StringIO()
+        with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+            figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
+    return COORDINATES.sub(lambda part: LONG_NUMBER.sub(r"\1", part.group()), drawn.getvalue())
+
+
+def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> None:
+    """Draw crank, rod, slider and guide at the fifth position."""
+    lengths, theta_2 = problem["scene"]["lengths"], problem["command"]["theta_2"][4]
+    theta_3, stroke = (problem["answers"][key][4] for key in ("theta_3", "stroke"))
+    crank, size, level = lengths["crank"], 0.1 * lengths["rod"], lengths["offset"]
+    pins = {"O2": (0.0, 0.0), "A": (crank * math.cos(theta_2), crank * math.sin(theta_2)), "B": (stroke, level)}
+    assert math.isclose(pins["A"][1] + lengths["rod"] * math.sin(theta_3), level, abs_tol=1e-12)
+    draw_support(axes, pins["O2"], 0.5 * size, labels)
+    guide = [(-crank, level), (1.3 * (crank + lengths["rod"]), level)]
+    corners = [(stroke + x * size, level + 0.6 * y * size) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
+    axes.plot(*zip(*guide, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)))
+    axes.plot(*zip(*corners, strict=True), color=BAR_COLOURS[4], lw=2.0, zorder=3)
+    for line in (guide, corners):
+        labels.keep_off(axes, *line)
+    for bar, (start, stop) in ((2, ("O2", "A")), (3, ("A", "B"))):
+        ends = pins[start], pins[stop]
+        axes.plot(*zip(*ends, strict=True), color=BAR_COLOURS[bar], lw=4.5, solid_capstyle="round", zorder=4)
+        labels.keep_off(axes, *ends, width=4.5)
+    for pin, point in pins.items():
+        axes.plot(*[[value] for value in point], "o", ms=6.0, mew=1.2, zorder=6, **OPEN)
+        labels.add(Label(axes, "$O_2$" if pin == "O2" else f"${pin}$", point, (0.5 * stroke, 0.0), INK, 9.0, 2.5))
+    if problem["scene"].get("loads"):
+        axes.annotate("", (stroke + 1.1 * size, level), (stroke + 3.0 * size, level),
+                      arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.4})  # fmt: skip
+
+
+def text() -> str:
+    """Return the page with its blocks written anew."""
+    page = TARGET.read_text(encoding="utf-8")
+    names = [name for name in BLOCK.findall(page) if name != "matrix"]
+
+    def write_block(block: re.Match[str]) -> str:
+        name = block.group(1)
+        if name == "matrix":
+            lines = write_matrix(names)
+        else:
+            problem = read_problem(name)
+            figure = f"![{problem['title']}]({FIGURES.name}/{name}.svg)"
+            lines = [figure, "", *write_data(problem), "", write_question(name, problem)]
+        return "\n".join((f"<!-- data {name} -->", "", *lines, "", "<!-- end -->", ""))
+
+    return BLOCK.sub(write_block, page)
+
+
+if __name__ == "__main__":
+    FIGURES.mkdir(exist_ok=True)
+    write_text(TARGET, text())
+    for problem_name in BLOCK.findall(TARGET.read_text(encoding="utf-8")):
+        if problem_name != "matrix":
+            write_text(FIGURES / f"{problem_name}.svg", draw_problem(problem_name))
