@@ -1,13 +1,13 @@
 """`python -m fourbar_validation.engine NAME | MODULE:CLASS`: serve an engine by the protocol, one line a question.
 
-NAME is one of our adapters, or the class's own is asked: docs/protocol.md says what a class has.
+NAME is one of our adapters. docs/protocol.md states what a class has.
 """
 
 import hashlib
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, distributions, version
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import IO, Any
 import numpy as np
 
 from fourbar import effects
-from fourbar.errors import InputError
+from fourbar.errors import InputError, LimitError
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer, explain_refusal
 from fourbar_validation.compare.rows import say_error
@@ -24,19 +24,22 @@ from fourbar_validation.engines import protocol
 from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.guests import NOT_FOUND
 from fourbar_validation.engines.hard_suite import BALLS
+from fourbar_validation.engines.mujoco.required_error import adjust_witnesses
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.report.machine import DISTRIBUTIONS
 
 ALL_BUT_CYLINDER = (*(getattr(effects, name).key for name in effects.FILE_OF), "loads", "drive")
 OURS = frozenset(sys.modules)
 """Modules that were imported before those of the engine."""
+Factory = Callable[..., Any]
+"""Makes an engine; the keywords are those of a question's setting, or the step of a released motion."""
 
 
 class NotFoundError(Exception):
     """Error raised if there is no such engine."""
 
 
-def open_engine(entry: str) -> tuple[Callable[..., Any], dict[str, Any]]:
+def open_engine(entry: str) -> tuple[Factory, dict[str, Any]]:
     """Return what makes an engine, and its hello; NotFoundError where there is none."""
     if ":" in entry:
         return _open_class(entry)
@@ -58,10 +61,22 @@ def open_engine(entry: str) -> tuple[Callable[..., Any], dict[str, Any]]:
         hello["version"] = version(DISTRIBUTIONS.get(library, "fourbar"))
     except PackageNotFoundError:
         hello["version"] = ""
-    return witness.engine, hello
+
+    def make(error: float | None = None, **setting: Any) -> Any:
+        laid_out = witness if error is None else adjust_witnesses((witness,), error)[0]
+        return _apply_setting(laid_out.engine(), setting, ())
+
+    return make, hello
 
 
-def _open_class(entry: str) -> tuple[Callable[..., Any], dict[str, Any]]:
+def _apply_setting(engine: Any, setting: dict[str, Any], names: Sequence[str]) -> Any:
+    """Return the engine with a setting; one that knows none has no timestep, and no error but round-off."""
+    if "name" in setting and setting["name"] not in names:
+        raise LimitError(f"it has no setting {setting['name']!r}; it has: {', '.join(names) or 'none'}")
+    return engine.at_setting(**setting) if setting and hasattr(engine, "at_setting") else engine
+
+
+def _open_class(entry: str) -> tuple[Factory, dict[str, Any]]:
     module, _, name = entry.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
@@ -71,7 +86,7 @@ def _open_class(entry: str) -> tuple[Callable[..., Any], dict[str, Any]]:
         if getattr(error, "name", None) in (module, module.partition(".")[0], name):
             raise NotFoundError(say_error(error)) from None
         raise
-    hello = {
+    hello: dict[str, Any] = {
         "engine": getattr(made, "name", None),
         "answers": getattr(made, "quantities", UNKNOWNS),
         "commands": getattr(made, "commands", ("theta_2",)),
@@ -79,8 +94,15 @@ def _open_class(entry: str) -> tuple[Callable[..., Any], dict[str, Any]]:
         "tolerance": getattr(made, "tolerance", "equivalence"),
         "version": str(getattr(made, "version", "")),
         "code": hash_code(module),
+        "settings": list(getattr(made, "settings", ())),
+        "device": getattr(made, "device", ""),
+        "made_for": getattr(made, "made_for", ""),
     }
-    return made, hello
+
+    def make(step: float | None = None, **setting: Any) -> Any:
+        return _apply_setting(made() if step is None else made(step), setting, hello["settings"])
+
+    return make, hello
 
 
 def hash_code(module: str) -> str:
@@ -95,15 +117,20 @@ def hash_code(module: str) -> str:
     return digest.hexdigest()[:16]
 
 
-def answer(engine: Any, question: dict[str, Any]) -> dict[str, Any]:
+def answer(make: Factory, question: dict[str, Any]) -> dict[str, Any]:
     """Answer one question."""
     scene = protocol.scene_from_json(question["scene"])
     if question["ask"] == "release":
         scene = protocol.release_from_json(scene, question["command"], question["times"])
-        step = [float(question["step"])] if "step" in question else []
-        return protocol.released_to_json(engine(*step).release(scene, np.array(question["times"])))
+        step = {"step": float(question["step"])} if "step" in question else {}
+        return protocol.released_to_json(make(**step).release(scene, np.array(question["times"])))
     scene, command = protocol.command_from_json(scene, question["command"])
-    made = engine()
+    try:
+        made = make(**protocol.read_setting(question.get("setting")))
+    except LimitError as limit:
+        return {"refusal": str(limit)}
+    if question["ask"] == "slopes":
+        return {"slopes": made.slopes(scene)} if hasattr(made, "slopes") else {"refusal": "it has no derivatives"}
     if not hasattr(made, "answer"):
         return {"refusal": "it integrates released motions alone"}
     if refusal := explain_refusal(made, command):
@@ -116,7 +143,7 @@ def answer(engine: Any, question: dict[str, Any]) -> dict[str, Any]:
 
 def serve(entry: str, questions: IO[bytes], replies: IO[bytes]) -> None:
     """Answer line by line, until there are no more."""
-    engine: Callable[..., Any] | None = None
+    engine: Factory | None = None
     for line in questions:
         question = json.loads(line)
         try:
@@ -124,7 +151,7 @@ def serve(entry: str, questions: IO[bytes], replies: IO[bytes]) -> None:
                 engine, hello = open_engine(entry)
             if question["ask"] == "hello":
                 reply = hello
-            elif question["ask"] in ("answer", "release"):
+            elif question["ask"] in ("answer", "release", "slopes"):
                 reply = answer(engine, question)
             else:
                 reply = {"error": f"unknown question {question['ask']!r}"}

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -17,10 +18,10 @@ from fourbar_validation.advise.worst_errors import compute_errors
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.guests import Guest
+from fourbar_validation.engines.mujoco import required_error
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.engines.witnesses import WITNESSES
-from fourbar_validation.run import required_error
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import MODELS
 from tests.validation.cost.test_cost import turning
@@ -125,11 +126,12 @@ def test_a_run_is_no_more_precise_than_required(required: float) -> None:
     assert answer.evidence["steps"] < 628
 
 
-def test_a_guest_through_time_is_not_answered_for_by_the_harness() -> None:
+def test_a_guest_is_asked_for_the_error_and_not_answered_for_by_the_harness() -> None:
     (simulated,) = (witness for witness in WITNESSES if witness.through_time)
-    guest = Guest("mujoco 3.3.7", simulated.engine, simulated.tolerance, through_time=True)
-    ours, theirs = required_error.adjust_witnesses((simulated, guest), 1e-3)
-    assert ours != simulated and theirs is guest
+    guest = Guest("mujoco 3.3.7", partial(dict), simulated.tolerance, through_time=True)
+    ours, theirs, exact = required_error.adjust_witnesses((simulated, guest, replace(guest, through_time=False)), 1e-3)
+    assert ours.engine != simulated.engine and theirs.engine() == {"setting": {"error": 1e-3}} == exact.engine()
+    assert theirs.tolerance == ours.tolerance != exact.tolerance == guest.tolerance
 
 
 def test_exact_witnesses_stay_exact() -> None:

@@ -2,15 +2,18 @@
 
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import fourbar
 from fourbar.errors import DependencyError, InputError
+from fourbar.scene import command as list_positions
 from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines import environments, guests
 from fourbar_validation.engines.environments import Entry, make_environment, read_engines, start_engines
+from fourbar_validation.engines.mujoco.required_error import adjust_witnesses
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.regression.record import describe_run
 from fourbar_validation.run.judge import judge
@@ -85,6 +88,25 @@ def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here() -> None:
     assert guest.version and not guest.generated
 
 
+def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
+    pytest.importorskip("mujoco")
+    entry = Entry("mine", adapter="mujoco-simulated", steps=(48, 96))
+    scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
+    (guest,) = start_engines([entry], WITNESSES)
+    (wanted,) = adjust_witnesses([guest], 1e-3)
+    refused, exact = start_engines([replace(entry, setting="fast"), Entry("free", adapter="free-body")], WITNESSES)
+    at = list_positions(scene)
+    try:
+        assert guest.engine().answer(scene, at).setting == "RK4 96/rev"
+        answer = wanted.engine().answer(scene, at)
+        assert answer.evidence["wanted_error"] == 1e-3 and answer.setting != "RK4 96/rev"
+        assert refused.engine().answer(scene, at).refusal == "it does not name 'fast' among its settings"
+        assert adjust_witnesses([exact], 1e-3)[0].engine().answer(scene, at).setting == "exact"
+    finally:
+        for running in guests._RUNNING.values():
+            running.end()
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -94,6 +116,7 @@ def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here() -> None:
         ('[[engine]]\nname = "a"', "must have an adapter or a command"),
         ('[[engine]]\nname = "a"\nadapter = "b"\ncommand = ["c"]', "must have an adapter or a command"),
         ('[[engine]]\nname = "a"\ncommand = "c"', "engine.command = 'c': allowed: name"),
+        ('[[engine]]\nname = "a"\nsteps = [1.5]', "engine.steps = [1.5]: allowed: name"),
         ('[[engine]]\nname = "a"\nadaptor = "c"', "engine.adaptor = 'c': allowed: name"),
     ],
 )

@@ -206,6 +206,8 @@ WRONG_ANSWERS = [
     {"refusal": " "},
     {"refusal": 3},
 ]
+WRONG_SETTINGS = [[], {"name": 1}, {"steps_per_turn": 3.5}, {"steps_per_turn": 0}, {"error": 1.0}, {"error": "small"},
+                  {"steps_per_turn": 9, "error": 0.1}, {"timestep": 0.1}]  # fmt: skip
 
 
 def one_line(error):
@@ -232,6 +234,14 @@ def test_an_answer_that_is_none_is_refused_in_one_line(data):
     with pytest.raises(FourBarError) as raised:
         protocol.answer_from_json("mine", at, data)
     assert one_line(raised.value)
+
+
+@pytest.mark.parametrize("data", WRONG_SETTINGS, ids=str)
+def test_a_setting_that_is_none_is_refused_in_one_line(data) -> None:
+    with pytest.raises(InputError, match=r"^setting = [^\n]*: must be an object with name, and steps_per_turn"):
+        protocol.read_setting(data)
+    assert protocol.read_setting(None) == {} and protocol.read_setting({"error": 0.5}) == {"error": 0.5}
+    assert protocol.read_setting({"name": "a", "steps_per_turn": 1}) == {"name": "a", "steps_per_turn": 1}
 
 
 def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives() -> None:

@@ -22,7 +22,7 @@ from fourbar_validation.engines import protocol
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.places import MODELS
 from tests.support.scenes import crank_rocker
-from tests.validation.engines.test_protocol import WRONG_ANSWERS, WRONG_COMMANDS, WRONG_SCENES, scenes
+from tests.validation.engines.test_protocol import WRONG_ANSWERS, WRONG_COMMANDS, WRONG_SCENES, WRONG_SETTINGS, scenes
 from tests.whole.test_imports import ROOT
 
 PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
@@ -116,7 +116,13 @@ def test_what_an_engine_writes_is_what_the_schema_says(engine: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("part", "wrong"), [("scene", WRONG_SCENES[:7]), ("command", WRONG_COMMANDS[:7]), ("answer", WRONG_ANSWERS[:4])]
+    ("part", "wrong"),
+    [
+        ("scene", WRONG_SCENES[:7]),
+        ("command", WRONG_COMMANDS[:7]),
+        ("answer", WRONG_ANSWERS[:4]),
+        ("setting", WRONG_SETTINGS),
+    ],
 )
 def test_what_is_refused_is_none_by_the_schema_either(part: str, wrong: list[Any]) -> None:
     refused = [

@@ -18,6 +18,7 @@ from filelock import FileLock
 from fourbar.errors import DependencyError, InputError
 from fourbar.files.reading import read_text
 from fourbar.writing import write_text
+from fourbar_validation.engines.further import FOLDERS
 from fourbar_validation.engines.guests import Guest, Program, name_guests, serve
 from fourbar_validation.engines.processes import run_to_end
 from fourbar_validation.engines.witnesses import Witness
@@ -45,12 +46,16 @@ class Entry:
     """Requirements that pip installs."""
     python: str = ""
     """Another interpreter than this one."""
+    setting: str = ""
+    """Name of its setting, one of those that its hello lists."""
+    steps: tuple[int, ...] = ()
+    """Steps in a turn of an engine that runs through time: a run asks for the most, a benchmark for each."""
 
 
 def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
-    """Read engines.toml of these folders and of the package, by name; InputError for what is no entry."""
+    """Read engines.toml of these folders, of the package and of the lab, by name; InputError for what is no entry."""
     result: dict[str, Entry] = {}
-    for file in dict.fromkeys(folder / FILE for folder in (*folders, Path(__file__).parent)):
+    for file in dict.fromkeys(folder / FILE for folder in (*folders, Path(__file__).parent, *FOLDERS)):
         if file.is_file():
             result = result | {name: entry for name, entry in read_engines_of(file).items() if name not in result}
     return result
@@ -71,24 +76,29 @@ def read_engines_of(file: Path) -> dict[str, Entry]:
 
 
 def _read_entry(file: Path, table: object) -> Entry:
-    texts, lists = ("name", "adapter", "python"), ("command", "requires")
+    texts, lists = ("name", "adapter", "python", "setting"), ("command", "requires")
     if not isinstance(table, dict) or not table.get("name"):
         raise InputError("engine", table, "must be a table [[engine]] with a name", str(file))
     for key, value in table.items():
-        fits = isinstance(value, list) and all(isinstance(part, str) for part in value)
-        if key not in (*texts, *lists) or not (fits if key in lists else isinstance(value, str)):
-            allowed = f"allowed: {', '.join(texts)} (texts), {', '.join(lists)} (lists of texts)"
+        if key == "steps" or key in lists:
+            kind = int if key == "steps" else str
+            fits = isinstance(value, list) and all(type(part) is kind for part in value)
+        else:
+            fits = key in texts and isinstance(value, str)
+        if not fits:
+            allowed = f"allowed: {', '.join(texts)} (texts), {', '.join(lists)} (lists of texts), steps (whole numbers)"
             raise InputError(f"engine.{key}", value, allowed, str(file))
     if bool(table.get("adapter")) == bool(table.get("command")):
         raise InputError("engine", table["name"], "must have an adapter or a command", str(file))
-    stated: dict[str, Any] = {key: tuple(value) if key in lists else value for key, value in table.items()}
+    stated: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
     return Entry(**stated)
 
 
 def make_environment(entry: Entry, cache: Path = CACHE) -> str:
     """Return the interpreter of an engine's environment, which is made once; DependencyError where pip fails.
 
-    With this Python all else comes from the environment that runs here; another gets what the harness needs as well.
+    Engines with the same requirements share it. With this Python all else comes from the environment that runs here;
+    another gets what the harness needs as well.
     """
     if not entry.requires and not entry.python:
         return sys.executable
@@ -98,7 +108,7 @@ def make_environment(entry: Entry, cache: Path = CACHE) -> str:
     own = [text for text in requires("fourbar") or [] if "extra ==" not in text] if entry.python else []
     wanted = [*entry.requires, *own]
     key = hashlib.sha256(repr((python, sys.version_info[:2], sys.prefix, wanted)).encode()).hexdigest()[:12]
-    folder = cache / f"{re.sub(r'[^a-zA-Z0-9.]+', '-', entry.name)}-{key}"
+    folder = cache / f"{re.sub(r'[^a-zA-Z0-9.]+', '-', ' '.join(entry.requires) or entry.python)[:40]}-{key}"
     inside = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     cache.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{folder}.lock"):
@@ -133,10 +143,10 @@ def start_engines(
     """Make the environments of engines and read each hello; an adapter of ours is held to what it is held to here."""
     programs = [(entry.adapter or entry.name, entry.name, prepare_program(entry, seconds)) for entry in entries]
     held = {witness.name: witness for witness in witnesses}
-    guests = zip(entries, name_guests(programs, held), strict=True)
-    return tuple(
-        replace(guest, **{name: getattr(held[entry.adapter], name) for name in HELD})
-        if entry.adapter in held
-        else guest
-        for entry, guest in guests
-    )
+    guests = []
+    for entry, guest in zip(entries, name_guests(programs, held), strict=True):
+        kept = HELD if entry.adapter in held else ()
+        same = replace(guest, **{name: getattr(held[entry.adapter], name) for name in kept})
+        steps = {"steps_per_turn": entry.steps[-1]} if entry.steps else {}
+        guests.append(same.at_setting(name=entry.setting, **steps) if entry.setting or steps else same)
+    return tuple(guests)

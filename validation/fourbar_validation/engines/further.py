@@ -4,6 +4,7 @@ import tomllib
 from collections.abc import Iterable
 from importlib.metadata import EntryPoint, PackageNotFoundError, distribution
 from importlib.util import find_spec
+from pathlib import Path
 
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.places import CHECKOUT
@@ -25,3 +26,6 @@ def load_further() -> tuple[Witness, ...]:
 
 
 FURTHER = load_further()
+FOLDERS = tuple(Path(folder) for spec in [find_spec(LAB.replace("-", "_"))] if spec is not None
+                for folder in spec.submodule_search_locations or ())  # fmt: skip
+"""Folder of the lab, whose engines.toml a run reads too; none if the lab is not installed."""

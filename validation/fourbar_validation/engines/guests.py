@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import IO, Any
@@ -106,6 +106,8 @@ class Guest(Witness):
     """Limit of time for each question."""
     releases: bool = False
     """True if it integrates released motions."""
+    setting: str = ""
+    """Name of the setting with which it is asked, one of those that its hello lists."""
 
     def at_step(self, step: float) -> "Asked":
         """Return the engine that integrates with this step, s."""
@@ -113,6 +115,12 @@ class Guest(Witness):
         assert isinstance(engine, Asked)
         engine.step = step
         return engine
+
+    def at_setting(self, **setting: Any) -> "Guest":
+        """Return the guest that is asked with this setting, under the name that was chosen before."""
+        name = setting.pop("name", self.setting)
+        asked = {"name": name, **setting} if name else setting
+        return replace(self, setting=name, engine=partial(self.engine, setting=asked))  # type: ignore[call-arg]
 
 
 def read_guests(entries: Sequence[str], known: Iterable[str], seconds: float | None = None) -> tuple[Guest, ...]:
@@ -152,7 +160,7 @@ def _make_guest(name: str, program: Program, hello: Hello, trouble: str, number:
         positions=tuple(name for name in hello.answers if name in ANGLES),
         stated=False,
         code=_hash_files(program.command),
-        version=hello.version,
+        version=" on ".join(filter(None, (hello.version, hello.device))),
         number=number,
         seconds=program.seconds,
         releases="release" in hello.effects,
@@ -179,7 +187,7 @@ def make_program(entry: str, seconds: float | None = None) -> Program:
 
 def serve(entry: str, seconds: float | None = None, python: str = sys.executable) -> Program:
     """Make the program that serves one of our adapters, or a class of the user's."""
-    ours = [] if CHECKOUT is None else [str(CHECKOUT), str(PACKAGE.parent)]
+    ours = [] if CHECKOUT is None else [str(CHECKOUT), str(PACKAGE.parent), str(CHECKOUT / "lab")]
     path = os.pathsep.join(filter(None, [*ours, os.environ.get("PYTHONPATH", "")]))
     return Program((python, "-m", "fourbar_validation.engine", entry), seconds, (("PYTHONPATH", path),) * bool(path))
 
@@ -272,8 +280,11 @@ def find_needs(scene: Scene) -> list[str]:
 class Asked:
     """The engine of a guest: its program runs on from scene to scene, and is started anew after it broke down."""
 
-    def __init__(self, name: str, program: Program, hello: Hello, trouble: str = "") -> None:
+    def __init__(
+        self, name: str, program: Program, hello: Hello, trouble: str = "", setting: dict[str, Any] | None = None
+    ) -> None:
         self.name, self._program, self._hello, self._trouble = name, program, hello, trouble
+        self._setting = {"setting": setting} if setting else {}
         self.commands = COMMANDS if trouble else hello.commands
         self.step: float | None = None
         """Step of a released motion, s."""
@@ -286,6 +297,7 @@ class Asked:
             "ask": "answer",
             "scene": protocol.scene_to_json(scene),
             "command": protocol.command_to_json(scene, command),
+            **self._setting,
         }
         try:
             return protocol.answer_from_json(self.name, command, self._ask(data, len(command.angle)))
@@ -307,6 +319,9 @@ class Asked:
         if self._trouble:
             raise WitnessError(self._trouble)
         lacking = [need for need in needs if need not in self._hello.effects]
+        name = self._setting.get("setting", {}).get("name")
+        if name is not None and name not in self._hello.settings:
+            return f"it does not name {name!r} among its settings"
         return f"it does not name {', '.join(lacking)} among its effects" if lacking else ""
 
     def _ask(self, data: dict[str, Any], positions: int) -> dict[str, Any]:

@@ -364,6 +364,22 @@ def require_near(made: Command, command: Command) -> None:
             raise InputError(f"at.{key}", None, allowed)
 
 
+def read_setting(data: Any) -> dict[str, Any]:
+    """Read the setting of a question, none where it is left out; InputError names what is wrong."""
+    if data is None:
+        return {}
+    allowed = "must be an object with name, and steps_per_turn (a whole number above 0) or error (above 0, below 1)"
+    checks = {
+        "name": lambda value: isinstance(value, str),
+        "steps_per_turn": lambda value: type(value) is int and value > 0,
+        "error": lambda value: type(value) is float and 0.0 < value < 1.0,
+    }
+    fits = isinstance(data, dict) and all(key in checks and checks[key](value) for key, value in data.items())
+    if not fits or {"steps_per_turn", "error"} <= data.keys():
+        raise InputError("setting", data, allowed)
+    return dict(data)
+
+
 def release_to_json(scene: Scene) -> dict[str, Any]:
     """Write the start and the times of a released motion."""
     motion, free = scene.motion, scene.motion.free

@@ -118,7 +118,7 @@ def command(
         open_run(find_baseline(against), "--against")  # before anything runs
     suite, witnesses = select_scenes(scenes, named, count, seed or 0, types or ALL_TYPES, adapters, time_limit)
     if wanted is not None:
-        from fourbar_validation.run.required_error import adjust_witnesses
+        from fourbar_validation.engines.mujoco.required_error import adjust_witnesses
 
         witnesses = adjust_witnesses(witnesses, wanted)
     chosen = choose_witnesses(engines, witnesses, [path.parent for path in scenes], time_limit)

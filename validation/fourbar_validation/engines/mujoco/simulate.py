@@ -57,6 +57,11 @@ class MujocoSimulated:
     name: str = "mujoco-simulated"
     commands: tuple[str, ...] = ("theta_2", "theta_3", "theta_4", "stroke")
 
+    def at_setting(self, steps_per_turn: int) -> "MujocoSimulated":
+        """Return the engine that makes so many steps in a turn."""
+        settings = replace(self.settings, steps_per_revolution=float(steps_per_turn), steps_per_window=1)
+        return replace(self, settings=settings)
+
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Run the sweep through in time; read every quantity at the crank's own angle, speed and acceleration."""
         began = time.perf_counter()

@@ -27,16 +27,18 @@ LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
 
 
 def adjust_witnesses(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
-    """Lay out the harness's own simulations for `error`, their allowed error.
+    """Lay out simulations for `error`, and hold those of the harness to it.
 
-    Exact engines stay exact, and a guest keeps its own settings and tolerance: it would otherwise be answered for.
+    Exact engines stay exact. A guest is asked for this error; one that states its own tolerance keeps it.
     """
     tolerance = hold_simulated(error, "steps and softness are laid out for it")
-    own: dict[str, Any] = {"engine": partial(Dialled, error), "tolerance": tolerance, "order": None}
-    adjusted = [witness.through_time and not isinstance(witness, Guest) for witness in witnesses]
-    return tuple(
-        replace(witness, **own) if ours else witness for witness, ours in zip(witnesses, adjusted, strict=True)
-    )
+    adjusted: list[Witness] = []
+    for witness in witnesses:
+        laid_out: dict[str, Any] = {"tolerance": tolerance, "order": None} if witness.through_time else {}
+        if witness.through_time and not isinstance(witness, Guest):
+            laid_out["engine"] = partial(Dialled, error)
+        adjusted.append(replace(witness.at_setting(error=error) if isinstance(witness, Guest) else witness, **laid_out))
+    return tuple(adjusted)
 
 
 @dataclass(slots=True)
