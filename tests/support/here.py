@@ -1,5 +1,6 @@
 """Runs judged in this process, where it is not their workers that are tested."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -9,6 +10,21 @@ from fourbar_validation.engines import workers
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import judge
+from fourbar_validation.run.run import Progress
+
+
+class Heard(Progress):
+    """Listener that keeps what a run told: its notes, and the scenes of each stage."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.scenes: Counter[str] = Counter()
+
+    def note(self, line: str) -> None:
+        self.lines.append(line)
+
+    def advance(self, stage: str, scenes: int) -> None:
+        self.scenes[stage] += scenes
 
 
 def summary_of(records: Iterable[Record]) -> Summary:

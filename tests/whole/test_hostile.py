@@ -22,11 +22,10 @@ from fourbar_validation.compare.rows import COLUMNS, FAILS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.memory import WORKER_MEMORY, bound_memory
 from fourbar_validation.engines.witnesses import Witness
-from fourbar_validation.report.summary import Summary
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run import pool
+from fourbar_validation.run.command import choose_witnesses
 from fourbar_validation.run.run import RunOptions, run
-from fourbar_validation.run.selection import choose_witnesses
 from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
@@ -79,8 +78,7 @@ def test_reports_hold_hostile_text_as_text(
 ) -> None:
     judge_here(monkeypatch)
     out = tmp_path / "deep" / "out"
-    *_, summary = run(Named(), out, EXACT, RunOptions(workers=1))
-    assert isinstance(summary, Summary)
+    summary = run(Named(), out, EXACT, RunOptions(workers=1))
     html = (out / "report.html").read_text()
     assert "<script>alert" not in html
     assert "<img src=x" not in html
@@ -281,7 +279,7 @@ def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: py
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
     greedy = Witness("greedy", Greedy, EQUIVALENCE)
-    list(run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False)))
+    run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False))
     failing = [row for row in read_columns(tmp_path / "run" / "results.csv") if row.verdict == FAILS]
     assert {(row.scene, row.engine) for row in failing} == {("b", "greedy")}
     assert "MemoryError" in failing[0].reason

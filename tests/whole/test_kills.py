@@ -29,13 +29,13 @@ from fourbar_validation.report.machine import CODE, build, hash_modules, name_co
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import pool
-from fourbar_validation.run.run import Collected, RunOptions, run
-from fourbar_validation.run.selection import choose_witnesses
+from fourbar_validation.run.command import choose_witnesses
+from fourbar_validation.run.run import COLLECTING, RunOptions, run
 from fourbar_validation.run.store import RunningError, Store
 from fourbar_validation.scenes.random import DrawnType
-from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, read_scene_files
+from fourbar_validation.scenes.suites import AS_LONG_AS, MOST_POSITIONS, Files, Random, Suite, read_scene_files
 from tests.support.guests import list_processes, write_program
-from tests.support.here import judge_here
+from tests.support.here import Heard, judge_here
 from tests.support.unlucky import Few, Moody, Unlucky, dies_at_first
 
 SEED = 7
@@ -51,13 +51,11 @@ TYPES = tuple(DrawnType)
 EXACT = choose_witnesses("free-body")
 
 
-def judge_all(
-    suite: object, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2, seconds: float | None = None
-) -> Summary:
-    *steps, last = run(suite, out, witnesses, RunOptions(workers=workers, seconds=seconds, drawn=False, sample=0))  # type: ignore[arg-type]
-    assert isinstance(last, Summary)
-    assert sum(step for step in steps if isinstance(step, Collected)) == len(suite)  # type: ignore[arg-type]
-    return last
+def judge_all(suite: Suite, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2) -> Summary:
+    heard = Heard()
+    summary = run(suite, out, witnesses, RunOptions(workers=workers, drawn=False, sample=0), progress=heard)
+    assert heard.scenes[COLLECTING] == len(suite)
+    return summary
 
 
 @pytest.mark.slow
@@ -67,7 +65,8 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     hangs = 2.0 * max(1.0, load / (os.cpu_count() or 1))  # s; a busy machine is given longer
     moody = Witness("moody", Moody, EQUIVALENCE)
-    judge_all(Few(), tmp_path / "run", (*EXACT, moody), seconds=hangs)
+    monkeypatch.setattr(workers, "SECONDS", hangs)
+    judge_all(Few(), tmp_path / "run", (*EXACT, moody))
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
     failing = {(row.scene, row.engine): row.reason for row in rows if row.verdict == FAILS}
     assert set(failing) == {("b", "moody"), ("c", "moody")}
@@ -376,7 +375,7 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(motion: s
 
 
 def test_a_scene_of_many_positions_has_longer_before_it_counts_as_hanging() -> None:
-    assert pool.find_longest(Files((), 50_000)) > 20 * pool.find_longest(Random(1, 0, TYPES))
+    assert pool.find_time_limit(Files((), 50_000), ()) > 20 * pool.find_time_limit(Random(1, 0, TYPES), ())
 
 
 class Blunders:
@@ -409,11 +408,11 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr(fourbar_validation.run.run, "PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "write_html", lambda *_, **__: "")
     blunders = Witness("blunders", Blunders, EQUIVALENCE)
-    *_, without = run(Few(), tmp_path / "without", (*EXACT, blunders), RunOptions(drawn=False))
-    assert not drawn and not any(record.figure for record in without.shown)  # type: ignore[union-attr]
+    without = run(Few(), tmp_path / "without", (*EXACT, blunders), RunOptions(drawn=False))
+    assert not drawn and not any(record.figure for record in without.shown)
     once = Blunders.titles.count("b")
-    *_, last = run(Few(), tmp_path / "with", (*EXACT, blunders))
-    assert isinstance(last, Summary) and len(drawn) == 3 and {"b", "c"} < set(drawn)
+    last = run(Few(), tmp_path / "with", (*EXACT, blunders))
+    assert len(drawn) == 3 and {"b", "c"} < set(drawn)
     assert {record.name for record in last.shown if record.figure} == set(drawn)
     assert Blunders.titles.count("b") == 2 * once
     assert (tmp_path / "with" / "results.csv").read_bytes() == (tmp_path / "without" / "results.csv").read_bytes()

@@ -23,10 +23,10 @@ from fourbar_validation.engines.witnesses import WITNESSES, WORK
 from fourbar_validation.regression.change import WHOLE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.answers import check_statements
+from fourbar_validation.run.command import choose_witnesses
 from fourbar_validation.run.judge import CHECKS
 from fourbar_validation.run.released import ENGINES, FULL
 from fourbar_validation.run.run import RunOptions, run
-from fourbar_validation.run.selection import choose_witnesses
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
@@ -48,14 +48,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     with pytest.MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
-        list(
-            run(
-                Random(8, 1, tuple(DrawnType)),
-                folder / "results",
-                choose_witnesses("free-body"),
-                RunOptions(workers=1, drawn=False),
-            )
-        )
+        options = RunOptions(workers=1, drawn=False)
+        run(Random(8, 1, tuple(DrawnType)), folder / "results", choose_witnesses("free-body"), options)
     return folder
 
 

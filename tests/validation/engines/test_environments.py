@@ -16,8 +16,8 @@ from fourbar_validation.engines.environments import Entry, make_environment, rea
 from fourbar_validation.engines.mujoco.required_error import adjust_witnesses
 from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.regression.record import describe_run
+from fourbar_validation.run.command import choose_witnesses
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.selection import choose_witnesses
 from tests.support.scenes import crank_rocker
 
 CLASS = """

@@ -23,13 +23,12 @@ from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests
 from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.witnesses import WITNESSES
-from fourbar_validation.report.summary import Summary
+from fourbar_validation.run.command import Request, select_scenes
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.run import RunOptions, run
-from fourbar_validation.run.selection import select_scenes
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.guests import list_processes, write_program
-from tests.support.here import judge_here
+from tests.support.here import Heard, judge_here
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import ROOT
 
@@ -253,7 +252,7 @@ def test_names_stand_apart() -> None:
 )
 def test_what_is_not_there_is_refused_in_one_line(entry: str, part: str) -> None:
     with pytest.raises(InputError) as error:
-        select_scenes((), None, None, 0, "", (entry,))
+        select_scenes(Request(witness=(entry,)))
     assert str(error.value).startswith("--witness = ") and part in str(error.value) and "\n" not in str(error.value)
 
 
@@ -308,9 +307,7 @@ def test_a_report_shows_the_versions_that_guests_state(tmp_path: Path) -> None:
     ]
     save(SCENE, tmp_path / "scene.toml")
     suite = read_scene_files([tmp_path / "scene.toml"])
-    steps = run(suite, tmp_path / "out", guests.read_guests(entries, ()), RunOptions(drawn=False))
-    *_, summary = steps
-    assert isinstance(summary, Summary)
+    summary = run(suite, tmp_path / "out", guests.read_guests(entries, ()), RunOptions(drawn=False))
     shown = {line.name: line.version for line in summary.engines if line.name in stated}
     assert shown == {"numpy-like": "", "own": "2.1", "own 3.0": ""}
     assert "| own 2.1 |" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
@@ -337,15 +334,16 @@ def test_parts_judged_by_another_code_are_made_again(tmp_path: Path, monkeypatch
     suite = read_scene_files((tmp_path / "scene.toml",))
     judge_here(monkeypatch)
 
-    def notes(entries: Sequence[str]) -> list[Any]:
-        steps = run(suite, tmp_path / "out", guests.read_guests(entries, ()), RunOptions(drawn=False))
-        found = []
-        for step in steps:
-            found += [step] if isinstance(step, str) else []
+    class Interrupting(Heard):
+        def advance(self, stage: str, scenes: int) -> None:
             if any((tmp_path / "out" / "parts").iterdir()):
-                break
-        steps.close()  # type: ignore[attr-defined]
-        return found
+                raise KeyboardInterrupt
+
+    def notes(entries: Sequence[str]) -> list[str]:
+        heard, witnesses = Interrupting(), guests.read_guests(entries, ())
+        with pytest.raises(KeyboardInterrupt):
+            run(suite, tmp_path / "out", witnesses, RunOptions(drawn=False), progress=heard)
+        return heard.lines
 
     program = write_program(tmp_path, "program")
     for factor, expected in (("1.0", 0), ("1.0", 0), ("1.01", 1), ("1.01", 0)):

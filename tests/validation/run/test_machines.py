@@ -21,10 +21,9 @@ from fourbar.errors import InputError
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines import workers
 from fourbar_validation.report.machine import name_code
-from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import machines
 from fourbar_validation.run.machines import ClusterError
-from fourbar_validation.run.run import RunOptions, run
+from fourbar_validation.run.run import Progress, RunOptions, run
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_here
 from tests.whole.test_kills import COUNT, EXACT, FULL, IN_A_CHUNK, KILLS, SEED, TYPES, judge_all
@@ -66,14 +65,20 @@ def test_killed_workers_change_no_byte(cluster: object, tmp_path: Path, monkeypa
         judge_all(suite, tmp_path / "here")
     rng = np.random.default_rng(SEED)
     kills = 0
-    while kills < KILLS:
-        out, before = tmp_path / f"dask{kills}", kills
-        for step in run(suite, out, EXACT, RunOptions(drawn=False, sample=0, scheduler=cluster.scheduler_address)):  # type: ignore[attr-defined]
+
+    class Killing(Progress):
+        def advance(self, stage: str, scenes: int) -> None:
+            nonlocal kills
             alive = [pid for nanny in cluster.workers.values() if (pid := running(nanny))]  # type: ignore[attr-defined]
-            if not isinstance(step, Summary) and step and alive and kills < KILLS:
+            if scenes and alive and kills < KILLS:
                 with suppress(ProcessLookupError):  # killed before, and its nanny has not noticed yet
                     os.kill(alive[int(rng.integers(len(alive)))], signal.SIGKILL)
                     kills += 1
+
+    while kills < KILLS:
+        out, before = tmp_path / f"dask{kills}", kills
+        options = RunOptions(drawn=False, sample=0, scheduler=cluster.scheduler_address)  # type: ignore[attr-defined]
+        run(suite, out, EXACT, options, progress=Killing())
         assert kills > before
         for name in ("results.csv", "results.parquet"):
             assert (tmp_path / "here" / name).read_bytes() == (out / name).read_bytes()
@@ -94,7 +99,7 @@ def test_no_scheduler_is_one_line_and_leaves_no_client_half_open(
 
     monkeypatch.setattr(distributed, "Client", Noted)
     with dask.config.set({"distributed.comm.timeouts.connect": "1s"}), pytest.raises(InputError) as caught:
-        list(run(Random(1, SEED, TYPES), tmp_path, EXACT, RunOptions(drawn=False, scheduler=address)))
+        run(Random(1, SEED, TYPES), tmp_path, EXACT, RunOptions(drawn=False, scheduler=address))
     assert "must be the address of a Dask scheduler" in str(caught.value) and "\n" not in str(caught.value)
     assert not made
 
@@ -148,10 +153,10 @@ def test_a_cluster_without_workers_or_without_the_checkout_is_one_line(
     suite, out = Random(1, SEED, TYPES), tmp_path / "out"
     with monkeypatch.context() as hurried, pytest.raises(workers.NoWorkersError, match="no workers; start some"):
         hurried.setattr(workers, "STALL", 0.5)
-        list(run(suite, out, EXACT, RunOptions(drawn=False, scheduler=address)))
+        run(suite, out, EXACT, RunOptions(drawn=False, scheduler=address))
     started("worker", *WORKER)
     with pytest.raises(ClusterError, match="PYTHONPATH") as caught:
-        list(run(suite, out, EXACT, RunOptions(drawn=False, scheduler=address)))
+        run(suite, out, EXACT, RunOptions(drawn=False, scheduler=address))
     assert "\n" not in str(caught.value) and "no such module" in str(caught.value)
 
 
@@ -166,15 +171,20 @@ def test_a_lost_scheduler_ends_the_run_and_writes_nothing(
 ) -> None:
     scheduler, address = started("scheduler", "--host", "127.0.0.1", "--port", "0")
     started("worker", *WORKER)
-    suite, steps = Random(100, SEED, TYPES), 0
-    with pytest.raises(ClusterError, match="the scheduler is gone; what is finished is kept"):
-        for step in run(suite, tmp_path / "out", EXACT, RunOptions(drawn=False, scheduler=address)):
-            steps += bool(step)
-            if steps:
+    suite, judged = Random(100, SEED, TYPES), 0
+
+    class Losing(Progress):
+        def advance(self, stage: str, scenes: int) -> None:
+            nonlocal judged
+            judged += bool(scenes)
+            if judged:
                 scheduler.send_signal(getattr(signal, how))
+
+    with pytest.raises(ClusterError, match="the scheduler is gone; what is finished is kept"):
+        run(suite, tmp_path / "out", EXACT, RunOptions(drawn=False, scheduler=address), progress=Losing())
     assert not [each for each in caplog.records if each.exc_info]  # two tracebacks before the one line
     written = [path.read_bytes().partition(b"\n")[2] for path in (tmp_path / "out" / "parts").iterdir()]
-    assert len(written) >= steps
+    assert len(written) >= judged
     assert all(f'"{FAILS}"' not in gzip.decompress(part).decode() for part in written)
 
 
@@ -184,4 +194,5 @@ def test_a_worker_of_another_code_or_library_is_refused(
 ) -> None:
     monkeypatch.setattr(machines, "name_code", lambda: name_code() | {"numpy": "1.0"})
     with pytest.raises(ClusterError, match=r"not set up as this machine: numpy is [2-9]\S+ there and 1\.0 here"):
-        list(run(Random(1, SEED, TYPES), tmp_path, EXACT, RunOptions(drawn=False, scheduler=cluster.scheduler_address)))  # type: ignore[attr-defined]
+        options = RunOptions(drawn=False, scheduler=cluster.scheduler_address)  # type: ignore[attr-defined]
+        run(Random(1, SEED, TYPES), tmp_path, EXACT, options)

@@ -68,17 +68,26 @@ class Change:
         return new.failed, math.inf if math.isnan(grown) else grown
 
 
-def compare_row(key: Key, old: Row | None, new: Row | None) -> Change:
-    """Compare a row of both runs, or take that of one of them."""
-    if old is None or new is None:
-        fails = new is not None and new.verdict == FAILS
-        kind = Kind.NEW_FAILURE if fails else Kind.NEW
-        if old is not None:
-            kind = Kind.GONE_FAILURE if old.verdict == FAILS and old.quantity in WHOLE else Kind.GONE
-        return Change(kind, key, old, new, math.nan)
-    condition = min((c for c in (old.condition, new.condition) if c > 0.0), default=1.0)
-    round_off = ROUND_OFF * EPS / condition
-    return Change(_choose_kind(old, new, round_off), key, old, new, round_off)
+def compare_row(
+    key: Key, old: Row | None, new: Row | None, *, asked: bool = True, differs: Kind | None = None
+) -> Change:
+    """Compare a row of both runs, or take that of one of them.
+
+    `asked`: whether the new run was to answer it. `differs`: in what the two rows answer different questions, if so.
+    """
+    round_off = math.nan
+    if old is None:
+        kind = Kind.NEW_FAILURE if new is not None and new.verdict == FAILS else Kind.NEW
+    elif new is None and not asked:
+        kind = Kind.NOT_RUN
+    elif new is None:
+        kind = Kind.GONE_FAILURE if old.verdict == FAILS and old.quantity in WHOLE else Kind.GONE
+    else:
+        round_off = ROUND_OFF * EPS / min((c for c in (old.condition, new.condition) if c > 0.0), default=1.0)
+        kind = _choose_kind(old, new, round_off)
+        if differs is not None:
+            kind = Kind.NEW_FAILURE if new.verdict == FAILS and old.verdict != FAILS else differs
+    return Change(kind, key, old, new, round_off)
 
 
 def _choose_kind(old: Row, new: Row, round_off: float) -> Kind:

@@ -1,6 +1,5 @@
 """Two runs held against each other, scene by scene: both tables are sorted, and neither is ever whole in memory."""
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +9,7 @@ from typing import TypeVar
 
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import FAILS, FORMULAS, VERDICTS, Row, sort_rows
+from fourbar_validation.compare.rows import FORMULAS, VERDICTS, Row, sort_rows
 from fourbar_validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, compare_row
 from fourbar_validation.regression.fault import Fault
 from fourbar_validation.regression.record import About
@@ -75,23 +74,23 @@ class Differences:
 
     def add(self, changes: Sequence[Change]) -> None:
         """Add the rows of one more scene."""
-        self.kinds.update(each.kind for each in changes)
-        self.counts.add(each.new for each in changes if each.new is not None)
-        alike = (each for each in changes if each.kind not in OTHER_QUESTION)
-        self._compared.add(each.new for each in alike if each.new is not None and each.old is not None)
+        self.kinds.update(change.kind for change in changes)
+        self.counts.add(change.new for change in changes if change.new is not None)
+        alike = (change for change in changes if change.kind not in OTHER_QUESTION)
+        self._compared.add(change.new for change in alike if change.new is not None and change.old is not None)
         self.fault.add(changes)
-        there = any(each.new is not None for each in changes)
-        for each in changes:
-            if each.kind is Kind.NOT_RUN and there:
-                self._engines_not_run.add(each.key[1])
-            elif each.kind is Kind.NOT_RUN:
-                self._scenes_not_run.add(f"scene {each.key[0]}")
-            elif each.kind in OTHER_QUESTION and each.old is not None and each.new is not None:
-                self._not_compared.add(_explain_refusal(each, each.old, each.new))
-            some = self._changes.setdefault(each.kind, [])
-            some.append(each)
-            if len(some) > 2 * self.kept:
-                self._changes[each.kind] = nlargest(self.kept, some, key=lambda one: one.severity)
+        scene_was_run = any(change.new is not None for change in changes)
+        for change in changes:
+            if change.kind is Kind.NOT_RUN and scene_was_run:
+                self._engines_not_run.add(change.key[1])
+            elif change.kind is Kind.NOT_RUN:
+                self._scenes_not_run.add(f"scene {change.key[0]}")
+            elif change.kind in OTHER_QUESTION and change.old is not None and change.new is not None:
+                self._not_compared.add(_say_why_not_compared(change, change.old, change.new))
+            same_kind = self._changes.setdefault(change.kind, [])
+            same_kind.append(change)
+            if len(same_kind) > 2 * self.kept:
+                self._changes[change.kind] = nlargest(self.kept, same_kind, key=lambda one: one.severity)
 
     def of(self, kind: Kind) -> list[Change]:
         """List the changes of one kind, the worst first; at most `kept` of them."""
@@ -100,7 +99,7 @@ class Differences:
     @property
     def changes(self) -> list[Change]:
         """Return the changes that are kept, by scene, engine, setting and quantity."""
-        return sorted((each for kind in Kind for each in self.of(kind)), key=lambda each: each.key)
+        return sorted((change for kind in Kind for change in self.of(kind)), key=lambda change: change.key)
 
     @property
     def rows(self) -> int:
@@ -138,10 +137,10 @@ class Differences:
         return FAILED if self.regressed or self.nothing else HOLDS
 
 
-def _explain_refusal(of: Change, old: Row, new: Row) -> str:
-    if of.kind is Kind.OTHER_SETTING:
-        return f"{of.key[0]} / {of.key[1]}: {old.setting} -> {new.setting}"
-    return f"scene {of.key[0]} {'changed' if of.kind is Kind.OTHER_SCENE else 'has other positions'}"
+def _say_why_not_compared(change: Change, old: Row, new: Row) -> str:
+    if change.kind is Kind.OTHER_SETTING:
+        return f"{change.key[0]} / {change.key[1]}: {old.setting} -> {new.setting}"
+    return f"scene {change.key[0]} {'changed' if change.kind is Kind.OTHER_SCENE else 'has other positions'}"
 
 
 def compare_rows(old: tuple[About, Iterable[Row]], new: tuple[About, Iterable[Row]], kept: int = KEPT) -> Differences:
@@ -161,43 +160,41 @@ def compare_runs(
 
     `engines`: those that have rows in the new run.
     """
-    scenes = {each.scene: each for each in list_scene_changes(old[0].scenes, new[0].scenes)}
+    scenes = {change.scene: change for change in list_scene_changes(old[0].scenes, new[0].scenes)}
     names = find_renamed(old[0].scenes, new[0].scenes)
     surroundings, older = _list_surroundings(old[0], new[0])
     notes = [f"renamed: {before} -> {after}" for before, after in names.items()]
-    result = Differences(surroundings, list(scenes.values()), notes, kept)
-    known = engines | (new[0].engines or set())
+    differences = Differences(surroundings, list(scenes.values()), notes, kept)
+    answering = {FORMULAS} | engines | (new[0].engines or set())
     for scene, before, after in _merge_scenes(_rename_scenes(old[1], names), new[1]):
-        wanted = scene in new[0].scenes if new[0].scenes else bool(after) or not engines
+        run_for = scene in new[0].scenes if new[0].scenes else bool(after) or not engines
         rows = _index_rows(scene, before), _index_rows(scene, after)
-        result.add(_compare_scene(*rows, known if wanted else set(), wanted, scenes.get(scene)))
+        differences.add(_compare_scene(*rows, answering if run_for else set(), scenes.get(scene)))
     if older:
-        result.notes += [
-            f"{result.compared} of {result.rows} rows are compared: the others are of one run alone",
-            *older,
-        ]
-    return result
+        compared = f"{differences.compared} of {differences.rows} rows are compared: the others are of one run alone"
+        differences.notes += [compared, *older]
+    return differences
 
 
 def _rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
     """Return the old run's scenes under the new run's names; nothing is held in memory if none differs."""
     if not names:
         return scenes
-    return sorted(((names.get(name, name), some) for name, some in scenes), key=lambda each: each[0])
+    return sorted(((names.get(name, name), rows) for name, rows in scenes), key=lambda scene: scene[0])
 
 
 def group_by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
     """Group the rows by scene."""
-    for scene, some in groupby(rows, key=lambda row: row.scene):
-        yield scene, list(some)
+    for scene, rows_of_scene in groupby(rows, key=lambda row: row.scene):
+        yield scene, list(rows_of_scene)
 
 
 def _merge_scenes(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:
     """Yield each scene that either run has, with what both have of it; InputError where the scenes are not in order."""
-    both = merge(_require_order("OLD", old), _require_order("NEW", new), key=lambda each: each[0])
-    for scene, some in groupby(both, key=lambda each: each[0]):
-        rows = {run: each for _, run, each in some}
-        yield scene, rows.get("OLD", ()), rows.get("NEW", ())
+    both = merge(_require_order("OLD", old), _require_order("NEW", new), key=lambda entry: entry[0])
+    for scene, entries in groupby(both, key=lambda entry: entry[0]):
+        by_run = {run: rows for _, run, rows in entries}
+        yield scene, by_run.get("OLD", ()), by_run.get("NEW", ())
 
 
 def _require_order(run: str, scenes: ByScene[T]) -> Iterator[tuple[str, str, Sequence[T]]]:
@@ -215,55 +212,48 @@ def _index_rows(scene: str, rows: Iterable[Row]) -> dict[Key, Row]:
 
 
 def _compare_scene(
-    before: Mapping[Key, Row], after: Mapping[Key, Row], engines: set[str], wanted: bool, other: SceneChange | None
+    before: Mapping[Key, Row], after: Mapping[Key, Row], engines: set[str], change: SceneChange | None
 ) -> list[Change]:
-    """Tell what happened to each row of a scene; `engines`: those it was run for, where it was `wanted` at all."""
-    settings = _list_other_settings(before, after)
+    """Tell what happened to each row of a scene, for which `engines` were to answer, and what changed in it."""
+    renamed = _pair_settings(before, after)
     changes = []
-    for key in sorted(before.keys() | after.keys()):
-        if key in settings.values():
-            continue  # it stands with its counterpart
-        old, new = before.get(key), after.get(settings.get(key, key))
-        result = compare_row(key, old, new)
-        if new is None and not (wanted and (key[1] in engines or key[1] == FORMULAS)):
-            result = Change(Kind.NOT_RUN, key, old, None, math.nan)
-        elif old is not None and new is not None and (other is not None or key in settings):
-            kind = Kind.OTHER_SETTING if other is None else Kind.OTHER_SCENE
-            kind = Kind.OTHER_POSITIONS if other is not None and other.positions_alone else kind
-            fails = new.verdict == FAILS and old.verdict != FAILS
-            result = Change(Kind.NEW_FAILURE if fails else kind, key, old, new, result.round_off)
-        changes.append(result)
+    for key in sorted((before.keys() | after.keys()) - set(renamed.values())):
+        differs = Kind.OTHER_SETTING if key in renamed else None
+        if change is not None:
+            differs = Kind.OTHER_POSITIONS if change.positions_alone else Kind.OTHER_SCENE
+        new = after.get(renamed.get(key, key))
+        changes.append(compare_row(key, before.get(key), new, asked=key[1] in engines, differs=differs))
     return changes
 
 
-def _list_other_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict[Key, Key]:
-    """Rows that both runs have with one setting each, but not the same: old key to new key."""
+def _pair_settings(before: Mapping[Key, Row], after: Mapping[Key, Row]) -> dict[Key, Key]:
+    """Pair the rows that each run has with a single setting of its own: old key to new key."""
 
-    def alone(keys: Iterable[Key]) -> dict[tuple[str, str, str], Key]:
-        result: dict[tuple[str, str, str], list[Key]] = {}
+    def index_single(keys: Iterable[Key]) -> dict[tuple[str, str, str], Key]:
+        groups: dict[tuple[str, str, str], list[Key]] = {}
         for key in keys:
-            result.setdefault((key[0], key[1], key[3]), []).append(key)
-        return {name: group[0] for name, group in result.items() if len(group) == 1}
+            groups.setdefault((key[0], key[1], key[3]), []).append(key)
+        return {name: group[0] for name, group in groups.items() if len(group) == 1}
 
-    old, new = alone(before.keys() - after.keys()), alone(after.keys() - before.keys())
+    old, new = index_single(before.keys() - after.keys()), index_single(after.keys() - before.keys())
     return {old[name]: new[name] for name in old.keys() & new.keys() if "-" not in (old[name][2], new[name][2])}
 
 
 def _list_surroundings(old: About, new: About) -> tuple[list[tuple[str, str, str]], list[str]]:
     """List what the runs were made with where it differs, and what a record cannot say."""
-    result = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
-    result += _take_both(old.versions, new.versions)
-    result.append(("machine", old.machine, new.machine))
-    result += [each for each in _take_both(old.settings, new.settings) if each[0] != "suite"]
-    suites = [each.settings.get("suite", "not recorded")[:12] for each in (old, new)]
+    pairs = [("commit", old.commit, new.commit)] if old.commit and new.commit else []
+    pairs += _take_both(old.versions, new.versions)
+    pairs.append(("machine", old.machine, new.machine))
+    pairs += [pair for pair in _take_both(old.settings, new.settings) if pair[0] != "suite"]
+    suites = [about.settings.get("suite", "not recorded")[:12] for about in (old, new)]
     notes = []
     if suites[0] != suites[1] and not (old.scenes and new.scenes):
         silent = "neither run says" if not (old.scenes or new.scenes) else "the older record does not say"
         notes.append(f"the scenes' hash is another ({suites[0]} -> {suites[1]}), and {silent} what they ask: "
                      "a scene that changed cannot be named, rows are compared by name alone")  # fmt: skip
-    return [(what, before, after) for what, before, after in result if before != after], notes
+    return [(what, before, after) for what, before, after in pairs if before != after], notes
 
 
 def _take_both(old: Mapping[str, str], new: Mapping[str, str]) -> list[tuple[str, str, str]]:
-    none = "not recorded"
-    return [(what, old.get(what, none), new.get(what, none)) for what in sorted(old.keys() | new.keys())]
+    unstated = "not recorded"
+    return [(what, old.get(what, unstated), new.get(what, unstated)) for what in sorted(old.keys() | new.keys())]

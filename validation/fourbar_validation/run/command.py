@@ -1,34 +1,86 @@
 """`python -m validation run`: what is judged, by whom, how, and against what."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 import click
 
-from fourbar.errors import FAILED, HOLDS, DependencyError, InputError
+from fourbar.errors import FAILED, DependencyError, InputError
 from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import FAILS
+from fourbar_validation.engines.environments import read_engines, start_engines
+from fourbar_validation.engines.further import FURTHER
+from fourbar_validation.engines.guests import Guest, read_guests
+from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard, hold_fully
+from fourbar_validation.engines.witnesses import WITNESSES, Witness
 from fourbar_validation.places import PROGRAM
-from fourbar_validation.regression.accept import add_output_options, report_differences
-from fourbar_validation.regression.record import find_baseline, open_run
+from fourbar_validation.regression.accept import FORMS, add_output_options, report_differences
+from fourbar_validation.regression.record import COLUMNS, find_baseline, open_run
 from fourbar_validation.report.junit import list_cases, write_document
-from fourbar_validation.report.summary import Summary
-from fourbar_validation.run.run import SAMPLE, WORKERS, Collected, Pictured, RunOptions, run
-from fourbar_validation.run.selection import choose_witnesses, find_askable, select_scenes
-from fourbar_validation.scenes.random import DrawnType
+from fourbar_validation.run.run import DRAWING, SAMPLE, WORKERS, Progress, RunOptions, run
+from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
+from fourbar_validation.scenes.suites import Random, Suite, read_default_suite, read_scene_files, read_suite
 
 ALL_TYPES = ",".join(kind.value for kind in DrawnType)
-STAGES = {int: "judging", Collected: "collecting", Pictured: "drawing"}
-"""Names of the stages in the progress line."""
 EXCLUDED = (
-    ("--random", "scenes", "judges random linkages; leave out the scene files"),
-    ("--suite", "scenes", "has its own scenes; leave out scene files and --random"),
-    ("--suite", "--random", "has its own scenes; leave out scene files and --random"),
+    ("random", "scenes", "judges random linkages; leave out the scene files"),
+    ("suite", "scenes", "has its own scenes; leave out scene files and --random"),
+    ("suite", "random", "has its own scenes; leave out scene files and --random"),
 )
 """Option, what it cannot be combined with, and why."""
-OF_RANDOM = ("--seed", "--type")
+OF_RANDOM = ("seed", "type")
+"""Options that say which random linkages are drawn."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """Everything that the command line of a run states, by the names of its options; None where it states nothing."""
+
+    scenes: tuple[Path, ...] = ()
+    out: Path = Path("results")
+    engines: str | None = None
+    error: float | None = None
+    suite: str | None = None
+    random: int | None = None
+    seed: int | None = None
+    type: str | None = None
+    workers: int = WORKERS
+    scheduler: str | None = None
+    against: str | None = None
+    witness: tuple[str, ...] = ()
+    time_limit: float | None = None
+    sample_shipped: int = SAMPLE
+    verbose: bool = False
+    no_pictures: bool = False
+    markdown: Path | None = None
+    html: Path | None = None
+    junit: Path | None = None
+
+    @property
+    def forms(self) -> dict[str, Path | None]:
+        """Return the files in which differences are written, by their form."""
+        return {form: getattr(self, form) for form in FORMS}
+
+    def require_consistent(self) -> None:
+        """Refuse options that contradict each other or would do nothing, and files that cannot be written."""
+        for option, excluded, why in EXCLUDED:
+            if getattr(self, option) is not None and getattr(self, excluded) not in (None, ()):
+                raise InputError(f"--{option}", getattr(self, option), why)
+        for option in OF_RANDOM:
+            if getattr(self, option) is not None and self.random is None:
+                raise InputError(f"--{option}", getattr(self, option), "is of random linkages; say --random N too")
+        for form, path in self.forms.items():
+            if path is not None:
+                if self.against is None and form != "junit":
+                    raise InputError(f"--{form}", str(path), "tells differences; say --against BASELINE too")
+                if self.out.exists() or path.parent != self.out:  # a folder that the run will make
+                    require_file(path, *self.scenes)
+        if self.against is not None:
+            open_run(find_baseline(self.against), "--against")
 
 
 def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[str, ...]) -> None:
@@ -44,23 +96,21 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
 )
 @click.option("--engines", metavar="NAMES", help="Comma-separated engines, of engines.toml too; left out: all of ours.")
-@click.option("--error", "wanted", type=float, metavar="E", help="Simulate no more precisely than this relative error.")
-@click.option("--suite", "named", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
-@click.option("--random", "count", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
-@click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Of the random linkages; left out: 0.")
+@click.option("--error", type=float, metavar="E", help="Simulate no more precisely than this relative error.")
+@click.option("--suite", metavar="hard|FILE", help="Judge the hard cases, or the scenes that FILE lists.")
+@click.option("--random", type=click.IntRange(min=1), help="Judge this many random linkages instead.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="S", help="Seed of the random linkages; left out: 0.")
 @click.option(
     "--type",
-    "types",
     metavar="TYPES",
-    help=f"Of the random linkages, comma-separated: {ALL_TYPES} (all); or uneven: with every ratio over ten decades "
-    "and every effect but loaded friction, for exact engines.",
+    help=f"Types of the random linkages, comma-separated: {ALL_TYPES} (all); or uneven: with every ratio over ten "
+    "decades and every effect but loaded friction, for exact engines.",
 )
-@click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Processes.")
+@click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Number of processes.")
 @click.option("--scheduler", metavar="ADDRESS", help="Spread over the workers of this Dask scheduler.")
 @click.option("--against", metavar="BASELINE", help="Compare with an accepted name or an earlier run's folder.")
 @click.option(
     "--witness",
-    "adapters",
     metavar="MODULE:CLASS|COMMAND",
     multiple=True,
     help="An engine of your own, a class or a program, to judge with the others (docs/protocol.md).",
@@ -73,7 +123,6 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
 )
 @click.option(
     "--sample-shipped",
-    "sample",
     type=click.IntRange(min=0),
     default=SAMPLE,
     show_default=True,
@@ -84,92 +133,128 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
 @click.option("--no-pictures", is_flag=True, help="Draw nothing and measure no observed order; no verdict changes.")
 @click.option("--mjcf", "--name", multiple=True, hidden=True, expose_value=False, is_eager=True, callback=refuse_moved)
 @add_output_options
-def command(
-    scenes: tuple[Path, ...],
-    out: Path,
-    engines: str | None,
-    wanted: float | None,
-    named: str | None,
-    count: int | None,
-    seed: int | None,
-    types: str | None,
-    workers: int,
-    scheduler: str | None,
-    against: str | None,
-    adapters: tuple[str, ...],
-    time_limit: float | None,
-    sample: int,
-    verbose: bool,
-    no_pictures: bool,
-    **forms: Path | None,
-) -> int:
+def command(**stated: Any) -> int:
     """Judge scenes (default: models/ and capabilities/); write results.csv, timings.csv, report.md, report.html."""
     from fourbar_validation.report.terminal import print_table
 
-    of_random: dict[str, Any] = {"--random": count, "--seed": seed, "--type": types}
-    refuse_combinations({"scenes": scenes or None, "--suite": named} | of_random)
-    for form, path in forms.items():
-        if path is not None:
-            if against is None and form != "junit":
-                raise InputError(f"--{form}", str(path), "tells differences; say --against BASELINE too")
-            if out.exists() or path.parent != out:  # a folder that the run will make
-                require_file(path, *scenes)
-    if against is not None:
-        open_run(find_baseline(against), "--against")  # before anything runs
-    suite, witnesses = select_scenes(scenes, named, count, seed or 0, types or ALL_TYPES, adapters, time_limit)
-    if wanted is not None:
+    request = Request(**stated)
+    request.require_consistent()
+    suite, witnesses = select_scenes(request)
+    if request.error is not None:
         from fourbar_validation.engines.mujoco.required_error import adjust_witnesses
 
-        witnesses = adjust_witnesses(witnesses, wanted)
-    chosen = choose_witnesses(engines, witnesses, [path.parent for path in scenes], time_limit)
-    present, missing = find_askable(chosen, by_name=engines is not None)
-    options = RunOptions(workers, scheduler, drawn=not no_pictures, sample=sample)
-    result = show_progress(len(suite), run(suite, out, present, options, missing))
-    print_table(result, out, verbose=verbose)
-    worse = _report_differences(against, out, forms, result.verdict)
-    if result.counts[FAILS] or worse:
+        witnesses = adjust_witnesses(witnesses, request.error)
+    folders = [path.parent for path in request.scenes]
+    chosen = choose_witnesses(request.engines, witnesses, folders, request.time_limit)
+    present, missing = find_askable(chosen, by_name=request.engines is not None)
+    options = RunOptions(request.workers, request.scheduler, not request.no_pictures, request.sample_shipped)
+    with ShownProgress(len(suite)) as progress:
+        summary = run(suite, request.out, present, options, missing, progress)
+    print_table(summary, request.out, verbose=request.verbose)
+    worse = False
+    if request.against is not None:
+        worse = bool(report_differences(find_baseline(request.against), request.out, request.forms))
+    elif request.junit is not None:
+        write_text(request.junit, write_document(summary.verdict, list_cases(read_columns(request.out / COLUMNS))))
+    if summary.counts[FAILS] or worse:
         return FAILED
     if missing:
-        there = ",".join(witness.name for witness in present)
-        raise DependencyError(f"{missing[0][1]}, or say --engines {there} where those are all that is wanted")
-    return result.counts.status
+        names = ",".join(witness.name for witness in present)
+        raise DependencyError(f"{missing[0][1]}, or say --engines {names} where those are all that is wanted")
+    return summary.counts.status
 
 
-def refuse_combinations(given: dict[str, Any]) -> None:
-    """Refuse options that contradict each other, or that would do nothing."""
-    for option, other, why in EXCLUDED:
-        if given[option] is not None and given[other] is not None:
-            raise InputError(option, given[option], why)
-    for option in OF_RANDOM:
-        if given[option] is not None and given["--random"] is None:
-            raise InputError(option, given[option], "is of random linkages; say --random N too")
+def select_scenes(request: Request) -> tuple[Suite, tuple[Witness, ...]]:
+    """Select the scenes, and all engines that may answer there: of the harness, further ones, and guests."""
+    witnesses: tuple[Witness, ...] = (*WITNESSES, *FURTHER)
+    if hard := request.suite == "hard":
+        witnesses = (*HARD_WITNESSES, *map(hold_fully, FURTHER))
+    guests: tuple[Witness, ...] = read_guests(
+        request.witness, [witness.name for witness in witnesses], request.time_limit
+    )
+    suite: Suite
+    if hard:
+        suite, guests = Hard(), tuple(map(hold_fully, guests))
+    elif request.suite is not None:
+        suite = read_suite(Path(request.suite))
+    elif request.random is not None:
+        suite = Random(request.random, request.seed or 0, read_linkage_types(request.type or ALL_TYPES))
+    else:
+        suite = read_scene_files(request.scenes) if request.scenes else read_default_suite()
+    return suite, (*witnesses, *guests)
 
 
-def _report_differences(against: str | None, out: Path, forms: dict[str, Path | None], verdict: str) -> int:
-    """Report what differs from an earlier run; where there is none the run's own comparisons as JUnit, if wanted."""
-    if against is not None:
-        return report_differences(find_baseline(against), out, forms)
-    if (xml := forms["junit"]) is not None:
-        write_text(xml, write_document(verdict, list_cases(read_columns(out / "results.parquet"))))
-    return HOLDS
+def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
+    """Read the types named in a comma-separated list; none for uneven linkages."""
+    if text == UNEVEN_TYPE:
+        return ()
+    try:
+        return tuple(DrawnType(name.strip()) for name in text.split(","))
+    except ValueError:
+        allowed = ALL_TYPES.replace(",", ", ")
+        raise InputError("--type", text, f"must be {UNEVEN_TYPE} or a comma-separated list of {allowed}") from None
 
 
-def show_progress(scenes: int, steps: Iterable[int | str | Summary]) -> Summary:
-    """Show the progress of a run, and give the summary at its end."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+def choose_witnesses(
+    engines: str | None,
+    witnesses: tuple[Witness, ...] = WITNESSES,
+    folders: Sequence[Path] = (),
+    seconds: float | None = None,
+) -> tuple[Witness, ...]:
+    """Choose the engines named in a comma-separated list, and the guests, which are named by being given.
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    step: int | str | Summary = 0
-    with Progress(*columns, console=Console(stderr=True)) as progress:
-        tasks: dict[type, TaskID] = {}
-        for step in steps:
-            if isinstance(step, str):
-                progress.console.print(step, markup=False, highlight=False)
-            elif isinstance(step, int):
-                kind = type(step)
-                if kind not in tasks:
-                    tasks[kind] = progress.add_task(STAGES[kind], total=None if kind is Pictured else scenes)
-                progress.advance(tasks[kind], step)
-    assert isinstance(step, Summary)
-    return step
+    Without a list these are all but those that need not be installed. A name that is no witness's is sought in the
+    engines.toml of these folders and of the package; `seconds`: in which such an engine must answer.
+    """
+    if engines is None:
+        further = {witness.name for witness in FURTHER}
+        return tuple(witness for witness in witnesses if witness.name not in further or not witness.missing())
+    offered = {witness.name: witness for witness in witnesses}
+    names = [name.strip() for name in engines.split(",") if name.strip()]
+    described = read_engines(folders)
+    for name in names or [engines]:
+        if name not in offered and name not in described:
+            raise InputError("--engines", name, "must be among " + ", ".join([*offered, *described]))
+    chosen = tuple(witness for name, witness in offered.items() if name in names or isinstance(witness, Guest))
+    return (*chosen, *start_engines([described[name] for name in names if name not in offered], witnesses, seconds))
+
+
+def find_askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:
+    """Find those that can answer here, and the others with the reason; DependencyError where those were named."""
+    missing = [(witness.name, reason) for witness in witnesses if (reason := witness.missing())]
+    if missing and by_name:
+        raise DependencyError("; ".join(f"{name}: {reason}" for name, reason in missing))
+    return tuple(witness for witness in witnesses if not witness.missing()), missing
+
+
+class ShownProgress(Progress):
+    """Progress of a run on standard error: a bar for each stage, and the notes above them."""
+
+    def __init__(self, scenes: int) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bars
+
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        self.bars, self.scenes, self.tasks = Bars(*columns, console=Console(stderr=True)), scenes, dict[str, Any]()
+
+    def __enter__(self) -> "ShownProgress":
+        """Begin to show."""
+        self.bars.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Leave the bars as they are."""
+        self.bars.stop()
+
+    def note(self, line: str) -> None:
+        """Print the line above the bars."""
+        self.bars.console.print(line, markup=False, highlight=False)
+
+    def advance(self, stage: str, scenes: int) -> None:
+        """Move the bar of the stage; how many scenes are drawn is not told before."""
+        if stage not in self.tasks:
+            self.tasks[stage] = self.bars.add_task(stage, total=None if stage == DRAWING else self.scenes)
+        self.bars.advance(self.tasks[stage], scenes)

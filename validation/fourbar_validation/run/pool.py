@@ -40,7 +40,7 @@ def make_jobs(
 ) -> list[Job]:
     """Make the jobs of some scenes; one of a file carries its own text alone.
 
-    `sample`: of so many scenes of the suite, evenly chosen, what else is shipped is judged too.
+    `sample`: number of scenes of the suite, evenly chosen, in which what else is shipped is judged too.
     """
     jobs = []
     for i in scenes:
@@ -53,11 +53,6 @@ def make_jobs(
     return jobs
 
 
-def find_longest(suite: Suite) -> float:
-    """Give the seconds after which a scene of the suite is taken to hang."""
-    return processes.SECONDS + SECONDS_PER_POSITION * (suite.positions if isinstance(suite, Files) else 0)
-
-
 def judge_job(job: Job) -> Record:
     """Judge one scene; runs in a worker."""
     scene = job.suite.scene(job.scene)
@@ -67,32 +62,27 @@ def judge_job(job: Job) -> Record:
 def judge_by_engine(job: Job, _: Exception, attempt: processes.Attempt) -> Record:
     """Judge a scene that broke down one engine at a time; those at fault have a row that says of what."""
     record: Record | None = None
-    failed = []
-    for who in ([], *([witness] for witness in job.witnesses)):
-        result = attempt(replace(job, witnesses=who))
-        if isinstance(result, Record):
-            record = result if record is None else record.joined(result)
+    breakdowns = []
+    for witnesses in ([], *([witness] for witness in job.witnesses)):
+        outcome = attempt(replace(job, witnesses=witnesses))
+        if isinstance(outcome, Record):
+            record = outcome if record is None else record.joined(outcome)
         else:
-            failed.append(make_breakdown(job.name, who[0].name if who else "formulas", result))
+            breakdowns.append(make_breakdown(job.name, witnesses[0].name if witnesses else "formulas", outcome))
     record = record or Record(job.name)
-    return replace(record, rows=[*record.rows, *failed])
+    return replace(record, rows=[*record.rows, *breakdowns])
+
+
+def find_time_limit(suite: Suite, witnesses: Iterable[Witness]) -> float:
+    """Return the seconds after which a scene of the suite is taken to hang; guests have limits of their own besides."""
+    limit = processes.SECONDS + SECONDS_PER_POSITION * (suite.positions if isinstance(suite, Files) else 0)
+    return limit + QUESTIONS * sum(guest.seconds or limit for guest in witnesses if isinstance(guest, Guest))
 
 
 def judge_chunks(
-    suite: Suite,
-    chunks: Iterable[tuple[int, range]],
-    witnesses: Sequence[Witness],
-    draw: bool,
-    workers: int,
-    seconds: float | None = None,
-    cluster: "Cluster | None" = None,
-    sample: int = 0,
+    chunks: Iterable[tuple[int, list[Job]]], limit: float, workers: int, cluster: "Cluster | None" = None
 ) -> Iterator[tuple[int, list[Record]]]:
-    """Judge chunks of scenes, each as it is done; `seconds`: after which a scene is taken to hang."""
-    made = ((number, make_jobs(suite, scenes, witnesses, draw, sample)) for number, scenes in chunks)
-    seconds = find_longest(suite) if seconds is None else seconds
-    guests = [guest.seconds or find_longest(suite) for guest in witnesses if isinstance(guest, Guest)]
-    seconds += QUESTIONS * sum(guests)  # each of their questions has a limit of its own
+    """Judge numbered chunks of jobs, each as it is done; a job that takes longer than `limit` (s) hangs."""
     if cluster is not None:
-        return cluster.over(judge_job, made, seconds, judge_by_engine)
-    return processes.apply_over_processes(judge_job, made, workers, seconds=seconds, instead=judge_by_engine)
+        return cluster.over(judge_job, chunks, limit, judge_by_engine)
+    return processes.apply_over_processes(judge_job, chunks, workers, seconds=limit, instead=judge_by_engine)

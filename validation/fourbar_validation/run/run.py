@@ -1,19 +1,22 @@
-"""The run: every scene judged, the results streamed to disk, the report written."""
+"""The run: every scene judged, the results streamed to disk, the pictures drawn, the report written."""
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
+from fourbar.errors import FourBarError
+from fourbar.mjcf import write_mjcf
 from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.columns import Columns, read_columns
 from fourbar_validation.compare.rows import FAILS, FORMULAS, Row, make_plain, write_csv
 from fourbar_validation.compare.tolerance import IDENTITY
 from fourbar_validation.engines.guests import Guest, list_numbers
 from fourbar_validation.engines.hard_suite import Hard
+from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.regression.record import ABOUT, COLUMNS, TABLE, describe_run, write_about
 from fourbar_validation.regression.scenes import describe_scenes
@@ -26,7 +29,6 @@ from fourbar_validation.report.summary import PICTURED, Summary
 from fourbar_validation.run import pool
 from fourbar_validation.run.judge import OUTPUT
 from fourbar_validation.run.machines import Cluster
-from fourbar_validation.run.pictures import draw_scenes, picture_models
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.suites import Files, Suite
 
@@ -39,19 +41,11 @@ CHUNK = {True: 1, False: 20}
 MOST_PARTS = 10_000
 """Files that a run keeps while it goes on: of a million scenes a hundred stand in each."""
 TIMINGS = ("scene", "engine", "setting", "positions", "seconds", "times_formulas")
-
-
-class Collected(int):
-    """Scenes that were read back for the report."""
-
-
-class Pictured(int):
-    """Scenes of a long suite that were drawn."""
-
-
 OUTCOME = (TABLE, COLUMNS, ABOUT, "timings.csv", "report.md", "report.html", OUTPUT)
 """Files that a run ends with. A run first removes those of an earlier run, so that none passes for its own if it ends
 early."""
+JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
+"""Stages of a run, as its progress is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +56,23 @@ class RunOptions:
     """Processes of this machine."""
     scheduler: str | None = None
     """Address of a Dask scheduler, whose workers are used instead."""
-    seconds: float | None = None
-    """Seconds after which a scene counts as hanging."""
     drawn: bool = True
     """True for pictures; a long suite has them at the end, of the scenes that fail or come nearest to failing."""
     sample: int = SAMPLE
-    """Scenes, evenly chosen, of which what else is shipped is judged."""
+    """Scenes, evenly chosen, in which what else is shipped is judged."""
+
+
+class Progress:
+    """Listener to a run; this one ignores what it is told."""
+
+    def note(self, line: str) -> None:
+        """Hear why a part of an earlier run is made again."""
+
+    def advance(self, stage: str, scenes: int) -> None:
+        """Hear that a stage has done so many scenes more."""
+
+
+UNHEARD = Progress()
 
 
 def run(
@@ -76,80 +81,111 @@ def run(
     witnesses: tuple[Witness, ...],
     options: RunOptions = RunOptions(),
     missing: Sequence[tuple[str, str]] = (),
-) -> Iterator[int | str | Summary]:
-    """Judge a suite into a folder; yields the number of scenes done as they come, then collected, at last the summary.
+    progress: Progress = UNHEARD,
+) -> Summary:
+    """Judge a suite into a folder, which keeps what an interrupted run of the same suite, engines and versions left.
 
-    What of an earlier run is not kept is yielded as a line of text.
-
-    `missing` are the witnesses that cannot answer here, each with the reason.
-
-    What an interrupted run of the same suite with the same engines and versions left is kept.
+    `missing`: the engines that cannot answer here, each with the reason.
     """
-    generated = any(witness.generated for witness in witnesses)
-    workers, seconds = options.workers, options.seconds
-    plain = len(suite.not_drawn) if isinstance(suite, Files) else 0
-    draw = options.drawn and len(suite) - plain <= PICTURED
-    size = max(CHUNK[draw or any(witness.through_time for witness in witnesses)], math.ceil(len(suite) / MOST_PARTS))
+    without_pictures = len(suite.not_drawn) if isinstance(suite, Files) else 0
+    draw_at_once = options.drawn and len(suite) - without_pictures <= PICTURED
+    simulated = any(witness.through_time for witness in witnesses)
+    size = max(CHUNK[draw_at_once or simulated], math.ceil(len(suite) / MOST_PARTS))
     chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     identity = {
         "scenes": suite.fingerprint(),
         "witnesses": [witness.fingerprint() for witness in witnesses],
         **name_code(),
-        "draw": draw,
+        "draw": draw_at_once,
         "sample": options.sample,
-        "time limit": seconds,
     }
+    summary = Summary()
+    summary.tolerances = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
+    summary.missing = missing
+    summary.stated = {guest.name: guest.version for guest in witnesses if isinstance(guest, Guest)}
     with Store(out, identity, OUTCOME).held() as store:
         for name in OUTCOME:
             (out / name).unlink(missing_ok=True)
         done = store.done()
-        yield from store.notes
-        yield sum(len(chunks[number]) for number in done)
-        todo = [(number, scenes) for number, scenes in enumerate(chunks) if number not in done]
+        for line in store.notes:
+            progress.note(line)
+        progress.advance(JUDGING, sum(len(chunks[number]) for number in done))
         cluster = None if options.scheduler is None else Cluster(options.scheduler)
-        judged = pool.judge_chunks(suite, todo, witnesses, draw, workers, seconds, cluster, options.sample)
-        for number, records in judged:
+        todo = (number for number in range(len(chunks)) if number not in done)
+        jobs = ((n, pool.make_jobs(suite, chunks[n], witnesses, draw_at_once, options.sample)) for n in todo)
+        limit = pool.find_time_limit(suite, witnesses)
+        for number, records in pool.judge_chunks(jobs, limit, options.workers, cluster):
             store.put(number, [record.kept_all() for record in records])
-            yield len(records)
-        summary = Summary()
-        summary.tolerances = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
-        summary.missing = missing
-        summary.stated = {guest.name: guest.version for guest in witnesses if isinstance(guest, Guest)}
-        with Columns(out) as columns, draft_file(out / OUTPUT) as output, draft_file(out / "timings.csv") as times:
-            times.write(write_csv(TIMINGS, []))
-            for number, scenes in enumerate(chunks):
-                records = [Record.restore(kept) for kept in store.read(number)]
-                for scene, each in zip(scenes, records, strict=True):
-                    name = make_plain(suite.name(scene))
-                    each.rows = each.rows or [Row.unmeasured(name, FORMULAS, "", "all", FAILS, "nothing was judged")]
-                    summary.add(each)
-                    times.write(write_csv((), list_timings(each)))
-                    output.writelines(f"{each.name}: {engine}\n{text}\n\n" for engine, text in each.output.items())
-                columns.add([row for each in records for row in each.rows])
-                yield Collected(len(scenes))
+            progress.advance(JUDGING, len(records))
+        first_lines = _collect(suite, chunks, store, summary, progress)
         pictured = {record.name for record in summary.pictured} if options.drawn else set()
-        places = [index for index in range(len(suite)) if make_plain(suite.name(index)) in pictured]
-        if options.drawn and not draw:
-            for shown in draw_scenes(suite, places, summary.pictured, witnesses, workers, seconds):
-                summary.picture(shown)
-                yield Pictured(1)
-        record = describe_run(witnesses, suite.fingerprint(), describe_scenes(suite))
+        shown = [index for index in range(len(suite)) if make_plain(suite.name(index)) in pictured]
+        if shown and not draw_at_once:
+            jobs = ((index, [_redraw(suite, index, summary, witnesses)]) for index in shown)
+            for _, records in pool.judge_chunks(jobs, limit, options.workers):
+                summary.picture(*records)
+                progress.advance(DRAWING, 1)
+        about = describe_run(witnesses, suite.fingerprint(), describe_scenes(suite))
         if cluster is not None:
-            record.settings["machines"] = cluster.machines
-        write_about(record, out)
+            about.settings["machines"] = cluster.machines
+        write_about(about, out)
         write_text(out / "report.md", write_markdown(summary))
-        models, why_not = picture_models(suite, places) if places and generated else ({}, "")
-        more = collect_sections(read_columns(out / "results.parquet") if isinstance(suite, Hard) else None, out)
+        generated = any(witness.generated for witness in witnesses)
+        models, why_not = picture_models(suite, shown) if generated else ({}, "")
+        sections = collect_sections(read_columns(out / COLUMNS) if isinstance(suite, Hard) else None, out)
         NUMBERS.update(list_numbers(witnesses))
-        page = write_html(summary, columns.first_lines, pictures=models, no_pictures=why_not, sections=more)
+        page = write_html(summary, first_lines, pictures=models, no_pictures=why_not, sections=sections)
         write_text(out / "report.html", page)
         store.finish()
-    yield summary
+    return summary
+
+
+def _collect(
+    suite: Suite, chunks: Sequence[range], store: Store, summary: Summary, progress: Progress
+) -> dict[str, int]:
+    """Write the tables from the parts of the store, add each scene to the summary; return each scene's first line."""
+    out = store.folder
+    with Columns(out) as columns, draft_file(out / OUTPUT) as output, draft_file(out / "timings.csv") as times:
+        times.write(write_csv(TIMINGS, []))
+        for number, scenes in enumerate(chunks):
+            records = [Record.restore(kept) for kept in store.read(number)]
+            for scene, record in zip(scenes, records, strict=True):
+                name = make_plain(suite.name(scene))
+                record.rows = record.rows or [Row.unmeasured(name, FORMULAS, "", "all", FAILS, "nothing was judged")]
+                summary.add(record)
+                times.write(write_csv((), list_timings(record)))
+                output.writelines(f"{record.name}: {engine}\n{text}\n\n" for engine, text in record.output.items())
+            columns.add([row for record in records for row in record.rows])
+            progress.advance(COLLECTING, len(scenes))
+    return columns.first_lines
+
+
+def _redraw(suite: Suite, scene: int, summary: Summary, witnesses: Sequence[Witness]) -> pool.Job:
+    """Make the job of judging a scene once more, now with its pictures: its answers were not kept.
+
+    An engine that broke down, or hung, in the scene is not started in it again.
+    """
+    name = make_plain(suite.name(scene))
+    rows = next(record.rows for record in summary.pictured if record.name == name)
+    broken = {row.engine for row in rows if row.failed and row.quantity == "all"}
+    (job,) = pool.make_jobs(suite, [scene], [one for one in witnesses if one.name not in broken], draw=True)
+    return job
+
+
+def picture_models(suite: Suite, scenes: Iterable[int]) -> tuple[dict[str, str], str]:
+    """Picture the MJCF of some scenes by MuJoCo: base64 PNGs by name, and the reason where there are none."""
+    texts = {}
+    for index in scenes:
+        try:
+            texts[suite.name(index)] = write_mjcf(suite.scene(index))
+        except FourBarError:  # bars without mass, a motion law: the engines' own rows say so
+            continue
+    return render_pictures(texts)
 
 
 @contextmanager
 def draft_file(path: Path) -> Iterator[TextIO]:
-    """Write a text file line by line: in place once it is complete, and not there where it is empty."""
+    """Write a text file line by line: in place once it is complete, and removed where it is empty."""
     draft = path.with_name(f".{path.name}.part")
     with name_file(path):
         try:
@@ -163,6 +199,7 @@ def draft_file(path: Path) -> Iterator[TextIO]:
 
 def list_timings(record: Record) -> Iterator[list[str]]:
     """Give the seconds per answer, and their ratio to the formulas' on the same scene in the same process."""
-    for t in record.timings:
-        ratio = t.seconds / record.timings[0].seconds
-        yield [t.scene, t.engine, t.setting, str(t.positions), f"{t.seconds:.6f}", f"{ratio:.1f}"]
+    for timing in record.timings:
+        ratio = timing.seconds / record.timings[0].seconds
+        numbers = (str(timing.positions), f"{timing.seconds:.6f}", f"{ratio:.1f}")
+        yield [timing.scene, timing.engine, timing.setting, *numbers]
