@@ -26,6 +26,7 @@ MEANINGS = {quantity.name: quantity for quantity in QUANTITIES}
 METHODS = {
     "Solution": ("status", "assembled", "evaluated", "to_csv", "to_pandas"),
     "Bar": ("moment_of_inertia",),
+    "Motion": ("replace",),
     "Scene": ("plot",),
     "Sensitivity": ("of", "value", "to_pandas"),
 }
@@ -52,6 +53,11 @@ def signature(thing: Any) -> str:
     """The arguments as the source has them, without "self"; of a description its fields."""
     thing = thing.fget if isinstance(thing, property) else thing
     node: Any = ast.parse(textwrap.dedent(inspect.getsource(thing))).body[0]
+    constructor = [each for each in getattr(node, "body", ()) if getattr(each, "name", "") == "__init__"]
+    if hasattr(thing, "__dataclass_fields__") and constructor:
+        taken, defaults = constructor[0].args.args[1:], constructor[0].args.defaults
+        pairs = zip(taken, defaults, strict=True)
+        return f"({', '.join(f'{ast.unparse(name)} = {ast.unparse(default)}' for name, default in pairs)})"
     if isinstance(node, ast.ClassDef):
         taken = [
             ast.unparse(each).replace("field(default_factory=", "(")

@@ -26,9 +26,9 @@ from fourbar.scene import Scene as Scene
 from fourbar.scene import command as command
 from fourbar.scene.motion import Free as Free
 from fourbar.scene.motion import FromLimit as FromLimit
+from fourbar.scene.motion import Law as Law
 from fourbar.scene.motion import Motion as Motion
 from fourbar.scene.motion import Sweep as Sweep
-from fourbar.scene.motion_law import Law as Law
 from fourbar.scene.numbers import Tolerance as Tolerance
 from fourbar.scene.point import Point as Point
 from fourbar.solution import Solution as Solution

@@ -24,7 +24,7 @@ from fourbar.quantities import (
     UNITS,
 )
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.motion_law import COMMANDS
+from fourbar.scene.motion import COMMANDS
 from fourbar.scene.point import OF_POINTS
 from fourbar.scene.scene import Independent
 from fourbar.solution import Array, Solution, unwrap

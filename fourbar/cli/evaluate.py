@@ -155,7 +155,7 @@ def analyze(
         solution = solve(described, find_last_stage(described))
     if not solution.assembled.any():
         raise NotAssembledError(
-            f"{scene}: motion.{described.motion.names[0]}: the linkage assembles at none of the positions requested"
+            f"{scene}: motion.{described.motion.commanded}: the linkage assembles at none of the positions requested"
         )
     given.print_to(_write_solution(described, solution, form, shown, bore, out), out)
 
@@ -199,7 +199,7 @@ def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
         found = sensitivity(stated)
     if not found.solution.assembled.any():
         raise NotAssembledError(
-            f"{scene}: motion.{stated.motion.names[0]}: the linkage assembles at none of the positions"
+            f"{scene}: motion.{stated.motion.commanded}: the linkage assembles at none of the positions"
         )
     given.print_to((write_sensitivity_json if as_json else write_sensitivity)(found), out)
 
@@ -225,7 +225,7 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units:
         found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
     if (found.without == found.samples).all():
         raise NotAssembledError(
-            f"{scene}: motion.{stated.motion.names[0]}: the linkage assembles at none of the positions"
+            f"{scene}: motion.{stated.motion.commanded}: the linkage assembles at none of the positions"
         )
     if out is not None:
         draw_tolerances(found, out, units)

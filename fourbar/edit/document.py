@@ -15,13 +15,13 @@ from fourbar.errors import InputError
 from fourbar.files.scene_file import THROUGH
 from fourbar.files.scene_text import BRANCHES
 from fourbar.linkage import PINS, Bar
-from fourbar.scene.motion_law import ENDS
+from fourbar.scene.motion import SPLINES
 from fourbar.scene.point import Point
 from fourbar.scene.stroke import SIDES
 
 Path = Sequence[str | int]
 WORDS = {
-    **{"branch": [*BRANCHES], "through": [*THROUGH], "side": [*SIDES], "ends": [*ENDS]},
+    **{"branch": [*BRANCHES], "through": [*THROUGH], "side": [*SIDES], "ends": [*SPLINES]},
     "frame": ["world", "bar"],
 }
 """Entries that are one of a few words."""

@@ -27,8 +27,7 @@ from fourbar.files.scene_text import BRANCHES, write_new_scene
 from fourbar.linkage import BAR_NAMES
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Scene
-from fourbar.scene.motion import OF_STROKE, require_steps
-from fourbar.scene.motion_law import COMMANDS
+from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, require_steps
 from fourbar.scene.stroke import SIDES
 from fourbar.show.units import suit_units, units
 from fourbar.solution import Conversion
@@ -299,7 +298,7 @@ def _choose_units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
 def _command(session: Session, asked: dict[str, Any]) -> None:
     """Command another bar, or the cylinder, over what the present motion covers of it without turning back."""
     place = str(asked["command"])
-    names = {**{names[0]: names for names in COMMANDS.values()}, OF_STROKE[0]: OF_STROKE}
+    names = {**{names[0]: names for names in COMMANDS.values()}, STROKE_COMMAND[0]: STROKE_COMMAND}
     if place not in names:
         raise InputError("command", place, "must be one of " + ", ".join(names))
     scene, document = session.now.scene, SceneDocument(session.now.text)

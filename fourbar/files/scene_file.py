@@ -21,8 +21,7 @@ from fourbar.files.pictures import Picture
 from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
 from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, Free, FromLimit, Motion, Sweep
-from fourbar.scene.motion_law import COMMANDS, ENDS, Law
+from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, SPLINES, STROKE_COMMAND, Free, FromLimit, Law, Motion, Sweep
 from fourbar.scene.numbers import Tolerance
 from fourbar.scene.point import Point
 from fourbar.solution import Array
@@ -166,16 +165,16 @@ def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
 
 def _read_motion(read: Reader, value: object) -> Motion:
     numbers = [name for names in COMMANDS.values() for name in names]
-    entry = read.table("motion", value, (*numbers, *OF_STROKE, "side", "branch", "through", "free", "law"))
+    entry = read.table("motion", value, (*numbers, *STROKE_COMMAND, "side", "branch", "through", "free", "law"))
     stated = [name for name in numbers if name in entry]
     given: dict[str, Any] = {
         "branch": BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
         "through": read.choice("motion.through", entry.get("through", "sign"), THROUGH),
     }
-    if of_stroke := [name for name in (*OF_STROKE, "side") if name in entry]:
+    if of_stroke := [name for name in (*STROKE_COMMAND, "side") if name in entry]:
         for name in (*stated, *(name for name in ("free", "law") if name in entry)):
             raise read.refuse(f"motion.{name}", entry[name], f"{of_stroke[0]} commands a cylinder, and nothing else is")
-        (place, speed, acceleration), unit = OF_STROKE, "m"
+        (place, speed, acceleration), unit = STROKE_COMMAND, "m"
         given["side"] = read.choice("motion.side", entry.get("side"), ("left", "right"))
     else:
         bar = int(stated[0][-1]) if stated else 2
@@ -206,7 +205,7 @@ def _read_law(read: Reader, value: object) -> Law:
     return Law(
         read.quantities(f"{key}.time", entry.get("time"), "s"),
         steps=read.whole(f"{key}.steps", entry.get("steps", DEFAULT_STEPS), 1, MOST_STEPS),
-        ends=read.choice(f"{key}.ends", entry.get("ends", "free"), ENDS),
+        ends=read.choice(f"{key}.ends", entry.get("ends", "free"), SPLINES),
         **{name: read.quantities(f"{key}.{name}", entry.get(name), "rad") for name in stated},
     )
 

@@ -17,8 +17,7 @@ from fourbar.files.effects import write_effect, write_ends
 from fourbar.files.fields import Reader, convert_to_polar, write_numbers, write_polar, write_quantity
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Motion, Sweep
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Law, Motion, Sweep
 from fourbar.studies.keys import list_entries
 from fourbar.writing import write_text
 

@@ -193,7 +193,7 @@ def compute_mass_ratio(linkage: FourBar) -> float:
 
 def _compute_quickness(scene: Scene) -> float:
     """Return the greater of omega_2^2 and |alpha_2|: by it the accelerations of all bars scale, rad/s^2."""
-    return max((scene.motion.omega_2 or AT_REST) ** 2, abs(scene.motion.alpha_2))
+    return float(max((scene.motion.omega_2 or AT_REST) ** 2, abs(scene.motion.alpha_2)))
 
 
 def _sum_inertia(linkage: FourBar) -> float:

@@ -2,23 +2,43 @@
 
 import math
 import sys
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, ClassVar
 
 import numpy as np
 
-from fourbar.errors import InputError, expect
-from fourbar.linkage import A_BRANCH, POSITIVE, require, require_numbers, require_whole
+from fourbar.errors import DependencyError, InputError, expect, say_install
+from fourbar.linkage import (
+    A_BRANCH,
+    MOST_STEPS,
+    MOVING_BARS,
+    POSITIVE,
+    Declared,
+    require,
+    require_numbers,
+    require_whole,
+)
 from fourbar.quantities import Array
-from fourbar.scene.motion_law import COMMANDS, STEPS, Law, find_bar
 
 OPEN, CROSSED = 1, -1
 BRANCH_NAMES = {OPEN: "open", CROSSED: "crossed"}
 FASTEST = math.sqrt(sys.float_info.max)
 """rad/s. The square of any greater speed is beyond the range of a double, and with it every acceleration."""
-OF_STROKE = ("stroke", "stroke_speed", "stroke_acceleration")
+COMMANDS = {bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS}
+"""Names of the commanded angle, speed and acceleration by bar."""
+STROKE_COMMAND = ("stroke", "stroke_speed", "stroke_acceleration")
 """Names of the commanded stroke, speed and acceleration of a cylinder."""
 DEFAULT_STEPS = 360
 """Number of steps of the default range, which is swept if a motion names no angle."""
+STEPS = (range(1, MOST_STEPS + 1), f"must be a whole number from 1 to {MOST_STEPS}")
+"""Allowed numbers of intervals of any motion, and how an error says so."""
+SPLINES = {"free": "not-a-knot", "rest": "clamped", "periodic": "periodic"}
+"""End conditions of a law's spline: none, at rest, or one period of a motion that goes on."""
+FEWEST_POINTS = {"free": 4, "rest": 2, "periodic": 3}
+"""Number of points that determine the cubic pieces."""
+MOST_POINTS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +85,107 @@ class Free:
         object.__setattr__(self, "steps", require_whole("motion.free.steps", self.steps, *STEPS))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+def find_bar(key: str, numbers: Mapping[int, tuple[Any, ...]]) -> int | None:
+    """Return the bar of which numbers (angle, speed, acceleration) are stated, or None; InputError for two bars."""
+    stated = [
+        bar
+        for bar, (angle, speed, acceleration) in numbers.items()
+        if not (angle is None and speed is None and type(acceleration) is float and acceleration == 0.0)
+    ]
+    if len(stated) > 1:
+        bars = " and ".join(f"of bar {bar}" for bar in stated)
+        raise InputError(key, bars, "is the command of one bar: theta, omega and alpha of bar 2, 3 or 4")
+    return stated[0] if stated else None
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """theta_2(t) through the points of a table: piecewise cubic, its acceleration continuous.
+
+    Parameters
+    ----------
+    time : rising, s.
+    theta_2, theta_3, theta_4 : one angle of the commanded bar for each time, rad; the others are left out.
+    steps : the law is evaluated at the ends of so many equal intervals of time.
+    ends : "free", "rest" (speed 0 at both ends) or "periodic" (the speed and acceleration at the end
+        are those at the start; the angle may have gained whole turns).
+    """
+
+    time: tuple[float, ...]
+    theta_2: tuple[float, ...] | None = None
+    steps: int = 360
+    ends: str = "free"
+    theta_3: tuple[float, ...] | None = None
+    theta_4: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        key = "motion.law"
+        expect(f"{key}.ends", self.ends, str)
+        if self.ends not in SPLINES:
+            raise InputError(f"{key}.ends", self.ends, "must be one of " + ", ".join(SPLINES))
+        theta = f"theta_{self.bar}"
+        time, angles = (
+            tuple(require_numbers(f"{key}.{name}", getattr(self, name), unit=unit).ravel().tolist())
+            for name, unit in (("time", "s"), (theta, "rad"))
+        )
+        if len(time) != len(angles) or not FEWEST_POINTS[self.ends] <= len(time) <= MOST_POINTS:
+            allowed = f"needs {FEWEST_POINTS[self.ends]} to {MOST_POINTS} times and as many angles"
+            raise InputError(key, (len(time), len(angles)), allowed)
+        if any(b <= a for a, b in pairwise(time)):
+            raise InputError(f"{key}.time", time, "must rise")
+        object.__setattr__(self, "steps", require_whole(f"{key}.steps", self.steps, *STEPS))
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, theta, angles)
+
+    @property
+    def bar(self) -> int:
+        """Number of the bar whose angle the law gives: 2, 3 or 4."""
+        angles = {2: self.theta_2, 3: self.theta_3, 4: self.theta_4}
+        return find_bar("motion.law", {bar: (angle, None, 0.0) for bar, angle in angles.items()}) or 2
+
+    @property
+    def angle(self) -> tuple[float, ...]:
+        """Angles of the law's bar at its times, rad."""
+        angles: tuple[float, ...] = getattr(self, f"theta_{self.bar}")
+        return angles
+
+    def times(self) -> Array:
+        """Return the times at which the law is evaluated, (steps + 1,), s."""
+        return np.linspace(self.time[0], self.time[-1], self.steps + 1)
+
+    def at(self, time: Array) -> tuple[Array, Array, Array]:
+        """Compute angle, speed and acceleration of the law's bar at times within the table, each (n,).
+
+        Raises DependencyError where SciPy is not installed.
+        """
+        try:
+            from scipy.interpolate import CubicSpline
+        except ModuleNotFoundError:
+            raise DependencyError(f"SciPy is needed for a motion law: {say_install('studies')}") from None
+        time = require_numbers("time", time)
+        t, angle = np.array(self.time), np.array(self.angle)
+        mean = 0.0
+        if self.ends == "periodic":
+            # what is periodic is the departure from the mean speed
+            mean = (angle[-1] - angle[0]) / (t[-1] - t[0])
+            angle = angle - mean * (t - t[0])
+            angle[-1] = angle[0]
+        curve = CubicSpline(t, angle, bc_type=SPLINES[self.ends])
+        theta, omega, alpha = (np.asarray(curve(time, order)) for order in (0, 1, 2))
+        return theta + mean * (time - t[0]), omega + mean, alpha
+
+
+def _read_number(name: str, place: int) -> Any:
+    """Make the property that reads a number of the command by its name; None (an acceleration: 0) if it has another."""
+    field, otherwise = ("angle", "speed", "acceleration")[place], 0.0 if place == 2 else None
+
+    def read(motion: "Motion") -> Any:
+        return getattr(motion, field) if name == motion.names[place] else otherwise
+
+    return property(read, doc=f"The {field} if {name} is commanded, otherwise {otherwise}.")
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
 class Motion:
     """The command to one moving bar, the input unless numbers of bar 3 or 4 are stated.
 
@@ -88,111 +208,142 @@ class Motion:
         on the ground, seen towards that end, its end on the bar lies.
     """
 
-    theta_2: float | Array | Sweep | FromLimit | None = None
-    omega_2: float | None = None
-    alpha_2: float = 0.0
-    branch: int = OPEN
-    through: str = "sign"
-    free: Free | None = None
-    law: Law | None = None
-    theta_3: float | Array | Sweep | FromLimit | None = None
-    omega_3: float | None = None
-    alpha_3: float = 0.0
-    theta_4: float | Array | Sweep | FromLimit | None = None
-    omega_4: float | None = None
-    alpha_4: float = 0.0
-    stroke: float | Array | Sweep | None = None
-    stroke_speed: float | None = None
-    stroke_acceleration: float = 0.0
-    side: str | None = None
-    bar: int = field(default=2, init=False)
+    commanded: str
+    """Name of what is commanded: "theta_2", "theta_3", "theta_4" or "stroke"."""
+    bar: int
     """Number of the commanded bar, 2, 3 or 4; if a stroke is commanded, the scene's drive determines it."""
+    angle: float | Array | Sweep | FromLimit | None
+    """Commanded angle, rad, or stroke, m, as it is stated."""
+    speed: float | None
+    """Commanded speed, rad/s, or m/s of a stroke."""
+    acceleration: float
+    """Commanded acceleration, rad/s^2, or m/s^2 of a stroke."""
+    branch: int
+    through: str
+    free: Free | None
+    law: Law | None
+    side: str | None
+    numbers: ClassVar[dict[str, Declared]] = {
+        name: Declared(f"{unit}{per}")
+        for unit, commands in (("rad", COMMANDS.values()), ("m", [STROKE_COMMAND]))
+        for names in commands
+        for name, per in zip(names, ("", "/s", "/s^2"), strict=True)
+    }
+    theta_2, theta_3, theta_4, stroke = (_read_number(names[0], 0) for names in (*COMMANDS.values(), STROKE_COMMAND))
+    omega_2, omega_3, omega_4, stroke_speed = (
+        _read_number(names[1], 1) for names in (*COMMANDS.values(), STROKE_COMMAND)
+    )
+    alpha_2, alpha_3, alpha_4, stroke_acceleration = (
+        _read_number(names[2], 2) for names in (*COMMANDS.values(), STROKE_COMMAND)
+    )
 
-    def __post_init__(self) -> None:
-        expect("motion.law", self.law, Law, type(None))
-        stated = find_bar("motion", self, COMMANDS)
-        object.__setattr__(self, "bar", (stated or 2) if self.law is None else self.law.bar)
-        if self.stroke is not None or self.side is not None or self.stroke_speed is not None:
-            self._require_stroke(stated)
-        theta, omega, alpha = self.names
-        if self.law is not None and (stated is not None or self.free is not None):
-            allowed = f"stands alone: it gives {theta}, {omega} and {alpha}"
-            raise InputError("motion.law", self.law.ends, allowed)
-        unit = "rad" if self.stroke is None else "m"
-        if self.angle is not None and not isinstance(self.angle, (Sweep, FromLimit)):
-            angles = require_numbers(f"motion.{theta}", self.angle, "must be finite angles", unit)
-            if angles.size == 0:
-                raise InputError(f"motion.{theta}", self.angle, "must be one angle or more")
-            angles.flags.writeable = False
-            object.__setattr__(self, theta, float(angles) if angles.ndim == 0 else angles)
-        if self.speed is not None:
-            object.__setattr__(self, omega, speed := require(f"motion.{omega}", self.speed, f"{unit}/s"))
-            if not math.isfinite(speed * speed):
-                allowed = f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
-                raise InputError(f"motion.{omega}", speed, allowed)
-        object.__setattr__(self, alpha, require(f"motion.{alpha}", self.acceleration, f"{unit}/s^2"))
-        if isinstance(self.branch, str):
-            words = {name: number for number, name in BRANCH_NAMES.items()}
-            object.__setattr__(self, "branch", words.get(self.branch, self.branch))
-        for name, kinds in (("branch", (int, np.integer, str)), ("through", (str,))):
-            expect(f"motion.{name}", getattr(self, name), *kinds)
-        expect("motion.free", self.free, Free, type(None))
-        if self.branch not in (OPEN, CROSSED):
-            raise InputError("motion.branch", self.branch, A_BRANCH)
-        if self.through not in ("sign", "follow"):
-            raise InputError("motion.through", self.through, 'must be "sign" or "follow"')
+    def __init__(  # noqa: PLR0913 - the keywords of a command, of any bar
+        self,
+        theta_2: float | Array | Sweep | FromLimit | None = None,
+        omega_2: float | None = None,
+        alpha_2: float = 0.0,
+        branch: int = OPEN,
+        through: str = "sign",
+        free: Free | None = None,
+        law: Law | None = None,
+        theta_3: float | Array | Sweep | FromLimit | None = None,
+        omega_3: float | None = None,
+        alpha_3: float = 0.0,
+        theta_4: float | Array | Sweep | FromLimit | None = None,
+        omega_4: float | None = None,
+        alpha_4: float = 0.0,
+        stroke: float | Array | Sweep | None = None,
+        stroke_speed: float | None = None,
+        stroke_acceleration: float = 0.0,
+        side: str | None = None,
+    ) -> None:
+        expect("motion.law", law, Law, type(None))
+        angles = {2: (theta_2, omega_2, alpha_2), 3: (theta_3, omega_3, alpha_3), 4: (theta_4, omega_4, alpha_4)}
+        stated = find_bar("motion", angles)
+        bar = (stated or 2) if law is None else law.bar
+        names, numbers = COMMANDS[bar], angles[bar]
+        if stroke is not None or side is not None or stroke_speed is not None:
+            if stroke is None or stated is not None or law is not None or free is not None:
+                raise InputError("motion.stroke", stroke, "is commanded alone: no angle, law or release besides")
+            names, numbers = STROKE_COMMAND, (_require_strokes(stroke), stroke_speed, stroke_acceleration)
+            if side not in ("left", "right"):
+                raise InputError("motion.side", side, 'must be "left" or "right", as a stroke has two angles')
+        if law is not None and (stated is not None or free is not None):
+            raise InputError("motion.law", law.ends, f"stands alone: it gives {', '.join(names[:2])} and {names[2]}")
+        if isinstance(branch, str):
+            branch = {name: number for number, name in BRANCH_NAMES.items()}.get(branch, branch)
+        checked = _require_command(names, *numbers)
+        expect("motion.branch", branch, int, np.integer, str)
+        expect("motion.through", through, str)
+        expect("motion.free", free, Free, type(None))
+        if branch not in (OPEN, CROSSED):
+            raise InputError("motion.branch", branch, A_BRANCH)
+        if through not in ("sign", "follow"):
+            raise InputError("motion.through", through, 'must be "sign" or "follow"')
+        fields = zip(self.__slots__, (names[0], bar, *checked, branch, through, free, law, side), strict=True)
+        for name, value in fields:
+            object.__setattr__(self, name, value)  # the class is frozen; this is its constructor
+
+    def replace(self, **changes: Any) -> "Motion":
+        """Return a copy with other values of fields: angle, speed, acceleration, branch, through, free, law, side.
+
+        angle, speed and acceleration are those of what this motion commands, a bar or a stroke.
+        """
+        keywords = dict(zip(("angle", "speed", "acceleration"), self.names, strict=True))
+        keywords |= {name: name for name in ("branch", "through", "free", "law", "side")}
+        if foreign := changes.keys() - keywords:
+            raise TypeError(f"a motion has no field {min(foreign)!r} to replace; it has {', '.join(keywords)}")
+        return Motion(**{key: changes.get(name, getattr(self, name)) for name, key in keywords.items()})
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Motion):
             return NotImplemented
-        one, two = self.angle, other.angle
-        if isinstance(one, np.ndarray) or isinstance(two, np.ndarray):
-            return bool(np.array_equal(one, two)) and self._check_rest() == other._check_rest()  # type: ignore[arg-type]
-        return one == two and self._check_rest() == other._check_rest()
+        angles = self.angle, other.angle
+        same = np.array_equal(*angles) if any(isinstance(x, np.ndarray) for x in angles) else angles[0] == angles[1]  # type: ignore[arg-type]
+        return bool(same) and self._list_without_angle() == other._list_without_angle()
 
     def __hash__(self) -> int:
-        return hash(self._check_rest())
+        return hash(self._list_without_angle())
 
-    def _check_rest(self) -> tuple[object, ...]:
-        """Everything but the angles."""
+    def _list_without_angle(self) -> tuple[object, ...]:
+        """List what a hash can be made of: everything but the angle; the bar of a stroke is the scene's."""
         return (self.names, self.side, self.speed, self.acceleration, self.branch, self.through, self.free, self.law)
-
-    def _require_stroke(self, stated: int | None) -> None:
-        """InputError where the stroke is not what alone is commanded, or is none."""
-        if self.stroke is None or stated is not None or self.law is not None or self.free is not None:
-            raise InputError("motion.stroke", self.stroke, "is commanded alone: no angle, law or release besides")
-        if not isinstance(self.stroke, Sweep):
-            strokes = require_numbers("motion.stroke", self.stroke, "must be finite lengths", "m")
-            object.__setattr__(self, "stroke", strokes)
-        ends = (self.stroke.start, self.stroke.stop) if isinstance(self.stroke, Sweep) else self.stroke
-        if not np.all(np.asarray(ends) > 0.0):
-            raise InputError("motion.stroke", self.stroke, "must be above 0 m")
-        if self.side not in ("left", "right"):
-            raise InputError("motion.side", self.side, 'must be "left" or "right", as a stroke has two angles')
 
     @property
     def names(self) -> tuple[str, str, str]:
         """Names of the commanded position, speed and acceleration: of bar 2, 3 or 4, or of the stroke."""
-        return COMMANDS[self.bar] if self.stroke is None else OF_STROKE
+        return STROKE_COMMAND if self.commanded == "stroke" else COMMANDS[self.bar]
 
-    @property
-    def angle(self) -> float | Array | Sweep | FromLimit | None:
-        """Angle or stroke that is commanded, as it is stated."""
-        return getattr(self, self.names[0])  # type: ignore[no-any-return]
 
-    @property
-    def speed(self) -> float | None:
-        """Commanded speed, rad/s, or m/s for a stroke."""
-        return getattr(self, self.names[1])  # type: ignore[no-any-return]
+def _require_strokes(stroke: Any) -> Any:
+    """Return the strokes, checked; InputError for what is no length above zero."""
+    if not isinstance(stroke, Sweep):
+        stroke = require_numbers("motion.stroke", stroke, "must be finite lengths", "m")
+    ends = (stroke.start, stroke.stop) if isinstance(stroke, Sweep) else stroke
+    if not np.all(np.asarray(ends) > 0.0):
+        raise InputError("motion.stroke", stroke, "must be above 0 m")
+    return stroke
 
-    @property
-    def acceleration(self) -> float:
-        """Commanded acceleration, rad/s^2, or m/s^2 for a stroke."""
-        return getattr(self, self.names[2])  # type: ignore[no-any-return]
+
+def _require_command(names: tuple[str, str, str], angle: Any, speed: Any, acceleration: Any) -> tuple[Any, Any, float]:
+    """Return angle, speed and acceleration of the command of these names, checked."""
+    (theta, unit), (omega, per_second), (alpha, growth) = ((name, Motion.numbers[name].unit) for name in names)
+    if angle is not None and not isinstance(angle, (Sweep, FromLimit)):
+        angles = require_numbers(f"motion.{theta}", angle, "must be finite angles", unit)
+        if angles.size == 0:
+            raise InputError(f"motion.{theta}", angle, "must be one angle or more")
+        angles.flags.writeable = False
+        angle = float(angles) if angles.ndim == 0 else angles
+    if speed is not None:
+        speed = require(f"motion.{omega}", speed, per_second)
+        if not math.isfinite(speed * speed):
+            allowed = f"must be below {FASTEST:.4g} rad/s: every acceleration has its square"
+            raise InputError(f"motion.{omega}", speed, allowed)
+    return angle, speed, require(f"motion.{alpha}", acceleration, growth)
 
 
 def require_steps(motion: Motion, most: int, where: str, file: str) -> None:
     """Raise InputError for as many steps or more: of a sweep, a law or a release each is a position in the memory."""
-    for name, stated in ((motion.names[0], motion.angle), ("law", motion.law), ("free", motion.free)):
+    for name, stated in ((motion.commanded, motion.angle), ("law", motion.law), ("free", motion.free)):
         if isinstance(stated, (Sweep, Law, Free)) and stated.steps >= most:
             raise InputError(f"motion.{name}.steps", stated.steps, f"must be below {most} {where}", file)

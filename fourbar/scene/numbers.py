@@ -5,27 +5,20 @@ from dataclasses import dataclass
 
 from fourbar import effects
 from fourbar.errors import InputError, expect
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, POSITIVE, Bar, Declared, FourBar, require
-from fourbar.scene.motion import OF_STROKE
-from fourbar.scene.motion_law import COMMANDS
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar, require
+from fourbar.scene.motion import Motion
 from fourbar.scene.point import Point
 
 THREE_SIGMA = 3.0
 """Half width of a normal distribution in a worst case, in standard deviations."""
-OF_MOTION = {
-    name: Declared(f"{unit}{per}")
-    for unit, commands in (("rad", COMMANDS.values()), ("m", [OF_STROKE]))
-    for names in commands
-    for name, per in zip(names, ("", "/s", "/s^2"), strict=True)
-}
-"""Numbers of a motion: place, speed and acceleration of what is commanded."""
 LENGTHS = {**FourBar.numbers, **{BAR_NAMES[bar]: Bar.numbers["length"] for bar in MOVING_BARS}}
 
 
 def find_unit(key: str) -> str | None:
     """Return the unit of the number that a key of a scene file names; None where no scene has such a number."""
     table, *names = key.split(".")
-    numbers = {"lengths": LENGTHS, "bars": Bar.numbers, "motion": OF_MOTION, "points": Point.numbers}.get(table, {})
+    tables = {"lengths": LENGTHS, "bars": Bar.numbers, "motion": Motion.numbers, "points": Point.numbers}
+    numbers = tables.get(table, {})
     if table == "loads":
         numbers = effects.Load.numbers
     elif table == "drive":

@@ -1,6 +1,7 @@
 """A scene: linkage, motion, drive, loads and effects; `solve` evaluates only the stages requested."""
 
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,8 +13,7 @@ from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.mobility import MARGIN, choose_range, find_limit_angles, follow_smooth_path
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.quantities import Array
-from fourbar.scene.motion import DEFAULT_STEPS, OF_STROKE, FromLimit, Motion, Sweep
-from fourbar.scene.motion_law import COMMANDS
+from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, STROKE_COMMAND, FromLimit, Motion, Sweep
 from fourbar.scene.numbers import Tolerance
 from fourbar.scene.point import Point
 
@@ -67,7 +67,7 @@ class Scene:
         if self.motion.stroke is not None:
             from fourbar.scene.stroke import find_triangle
 
-            object.__setattr__(self, "motion", replace(self.motion))
+            object.__setattr__(self, "motion", copy(self.motion))
             object.__setattr__(self.motion, "bar", find_triangle(self.linkage, self.drive).bar)
         many = {"loads": Effect, "effects": Effect, "pictures": object, "points": Point, "tolerances": Tolerance}
         for name, each_kind in many.items():
@@ -184,7 +184,7 @@ class Command(NamedTuple):
     @property
     def commanded(self) -> str:
         """Name of what is commanded: the angle, or the stroke."""
-        return COMMANDS[self.bar][0] if self.stroke is None else OF_STROKE[0]
+        return COMMANDS[self.bar][0] if self.stroke is None else STROKE_COMMAND[0]
 
     @property
     def places(self) -> Array:
@@ -225,8 +225,8 @@ class Command(NamedTuple):
 
 def require_input(scene: Scene, what: str) -> None:
     """Raise a LimitError where what is asked for takes a command of the input alone, and another bar has it."""
-    if scene.motion.names[0] != "theta_2":
-        raise LimitError(f"motion.{scene.motion.names[0]}: {what} takes a command of theta_2 alone")
+    if scene.motion.commanded != "theta_2":
+        raise LimitError(f"motion.{scene.motion.commanded}: {what} takes a command of theta_2 alone")
 
 
 def default_places(scene: Scene, holding: float | None = None) -> Array:

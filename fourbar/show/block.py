@@ -101,7 +101,7 @@ class _Block:
         lengths = ", ".join(f"{name} {write_digits(factor * length)}" for name, length in bars)
         name = classify(scene.linkage).name
         title = f' "{clean_line(scene.title)}"' if scene.title else ""
-        of_bar = "" if scene.motion.bar == 2 else f" of the command {scene.motion.names[0]}"
+        of_bar = "" if scene.motion.bar == 2 else f" of the command {scene.motion.commanded}"
         head = f"{name[0].upper()}{name[1:]}{title}, {BRANCH_NAMES[scene.motion.branch]} branch{of_bar}:"
         lines = [f"{head} {lengths} {unit}"]
         if len(lines[0]) > WIDTH:

@@ -129,8 +129,7 @@ def collect_tolerances(
     A scene that has none of this (a free motion, SciPy not installed) gives the sentence that says so. `progress` is
     that of `tolerances`; left out, a line in the terminal.
     """
-    given: dict[str, Any] = {scene.motion.names[0]: np.array(places)}
-    positions = scene if scene.motion.law else replace(scene, motion=replace(scene.motion, **given))
+    positions = scene if scene.motion.law else replace(scene, motion=scene.motion.replace(angle=np.array(places)))
     quiet = progress is not None or scene.motion.free is not None
     shown = nullcontext(progress) if quiet else show_running("the samples of the tolerances are solved")
     try:

@@ -98,7 +98,7 @@ class CircuitCurve:
         number = find_circuit(linkage, at.theta_2, at.branch)
         if (number < 0).all():
             raise NotAssembledError(
-                f"motion.{scene.motion.names[0]}: the linkage assembles at none of the positions requested"
+                f"motion.{scene.motion.commanded}: the linkage assembles at none of the positions requested"
             )
         self.circuit = circuits(linkage)[number[number >= 0][0]]
         self.full = turns_fully(linkage)

@@ -19,7 +19,6 @@ from fourbar.formulas.position import HalfAngle, Position, compute_factors, find
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.numbers import OF_MOTION
 from fourbar.scene.point import OF_POINTS
 from fourbar.scene.stroke import find_triangle
 from fourbar.solution import Array, Solution, find_values, split_parts
@@ -175,7 +174,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     if not moving:  # positions depend on these alone
         of_positions = ("lengths", "points", "drive")
         known = {key: own for key, own in known.items() if key.startswith(of_positions) or ".centre." in key}
-    keys = {theta: SceneNumber((), OF_MOTION[scene.motion.names[0]].unit)} | known
+    keys = {theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)} | known
     most = np.nan if at.stroke is None else float(at.stroke.max())
     numbers = [most if key == theta else read_place(scene, entry.place) for key, entry in keys.items()]
     forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")

@@ -16,7 +16,6 @@ from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import namespace, polar
 from fourbar.linkage import ANY, AT_LEAST_ZERO, BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
-from fourbar.scene.numbers import OF_MOTION
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
@@ -96,8 +95,8 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     found = {"lengths.ground": of_ground["lengths.ground"], **lengths, **of_ground}
     found |= {f"bars.{name}{key}": number for name, numbers in bars.items() for key, number in numbers.items()}
     if scene.motion.law is None:
-        for name in scene.motion.names[1:]:
-            found[f"motion.{name}"] = SceneNumber(("motion", name), *OF_MOTION[name][:2])
+        for field, name in zip(("speed", "acceleration"), scene.motion.names[1:], strict=True):
+            found[f"motion.{name}"] = SceneNumber(("motion", field), scene.motion.numbers[name].unit)
     if scene.drive is not None:
         found |= _list_ends("drive", ("drive",))
     for index, load in enumerate(scene.loads):
@@ -112,7 +111,7 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
 
 def command_key(scene: Scene) -> str:
     """Return the key of what is commanded."""
-    return f"motion.{scene.motion.names[0]}"
+    return f"motion.{scene.motion.commanded}"
 
 
 def refuse_key(key: str, value: object, known: list[str]) -> InputError:

@@ -143,7 +143,7 @@ def make_denser(scene: Scene, times: int) -> Scene:
     """Divide the same motion into more positions."""
     sweep = scene.motion.theta_2
     assert isinstance(sweep, Sweep)
-    return replace(scene, motion=replace(scene.motion, theta_2=replace(sweep, steps=sweep.steps * times)))
+    return replace(scene, motion=scene.motion.replace(angle=replace(sweep, steps=sweep.steps * times)))
 
 
 def measure_case(seed: int, index: int, costs: dict[tuple[str, bool], float]) -> AdviceCase:

@@ -44,7 +44,7 @@ EVEN, UNEVEN = spread_masses(0.0), spread_masses(3.0)
 def put_at_angle(scene: Scene, theta_2: float) -> Scene:
     """Put the scene at theta_2 (rad from theta_1 on)."""
     angle = scene.linkage.ground_angle + theta_2
-    return replace(scene, motion=replace(scene.motion, theta_2=angle))
+    return replace(scene, motion=scene.motion.replace(angle=angle))
 
 
 def random(rng: np.random.Generator) -> Scene:
@@ -119,7 +119,7 @@ def speeds(rng: np.random.Generator) -> Scene:
     scene = random(rng)
     omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 6)) * bool(rng.random() < 0.9)
     alpha = float(rng.choice([0.0, rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 12)]))
-    return replace(scene, motion=replace(scene.motion, omega_2=omega, alpha_2=alpha))
+    return replace(scene, motion=scene.motion.replace(speed=omega, acceleration=alpha))
 
 
 def draw_deviation(rng: np.random.Generator) -> float:
@@ -187,7 +187,7 @@ def tables(rng: np.random.Generator) -> Scene:
     turned = (float(x) for x in rng.uniform(-3.0, 3.0, 2))
     frame, moment = str(rng.choice(["world", "bar"])), float(rng.choice([0.0, size]))
     load = Load(int(rng.choice(MOVING_BARS)), (size, next(turned)), (arm, next(turned)), moment, frame, table)
-    motion = replace(scene.motion, theta_2=angle + math.tau * turns)
+    motion = scene.motion.replace(angle=angle + math.tau * turns)
     return replace(scene, linkage=replace(linkage, ground_angle=0.0), loads=(load,), motion=motion)
 
 

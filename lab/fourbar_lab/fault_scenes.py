@@ -22,8 +22,7 @@ from fourbar.effects import (
 from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import PINS, Bar, FourBar, uniform
 from fourbar.scene import Scene
-from fourbar.scene.motion import CROSSED, Free, FromLimit, Motion, Sweep
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import CROSSED, Free, FromLimit, Law, Motion, Sweep
 from fourbar.scene.point import Point
 from fourbar_validation.scenes.suites import read_default_suite
 
@@ -47,11 +46,11 @@ POINTS = (Point("P", 3, (0.1, 0.7)), Point("Q", 4, (0.05, -0.3)), Point("R", 2, 
 CRANK_ROCKER = Scene(CRANK, TURN, 2, LOADS, (WEIGHT,), points=POINTS)
 FAULT_SCENES: dict[str, Scene] = {
     "crank-rocker": CRANK_ROCKER,
-    "coupler driven": replace(CRANK_ROCKER, motion=replace(TURN, branch=CROSSED), drive_bar=3),
+    "coupler driven": replace(CRANK_ROCKER, motion=TURN.replace(branch=CROSSED), drive_bar=3),
     "output driven": replace(CRANK_ROCKER, motion=Motion(Sweep(0.5, 1.5, 12), -10.0, 5.0), drive_bar=4),
     "cylinder": replace(
         CRANK_ROCKER,
-        motion=replace(TURN, branch=CROSSED),
+        motion=TURN.replace(branch=CROSSED),
         drive_bar=None,  # type: ignore[arg-type]
         drive=LinearDrive(SpringEnd(2, 0.17, -1.1), SpringEnd(4, 0.09, 0.7)),
     ),

@@ -95,7 +95,7 @@ def _draw(rng: np.random.Generator, hard: bool) -> Scene:
     scene = draw_scene(rng, lengths, RANGES[hard])
     psi = _draw_angles(rng, hard, lengths)
     alpha = float(rng.uniform(-10.0, 10.0)) if rng.random() < 1.0 / 3.0 else scene.motion.alpha_2
-    motion = replace(scene.motion, theta_2=scene.linkage.ground_angle + psi, alpha_2=alpha)
+    motion = scene.motion.replace(angle=scene.linkage.ground_angle + psi, acceleration=alpha)
     return replace(scene, motion=motion)
 
 

@@ -99,7 +99,7 @@ def evaluate(scene: Scene, library: str, *, derivatives: bool = False) -> dict[s
     own = make_alike(scene)
     scene = add_every_load(own) if own.loads or len(own.effects) > 1 else own
     numbers, places = list_numbers(scene), {str(k): str(scene.loads.index(load)) for k, load in enumerate(own.loads)}
-    scene = replace_place(scene, ("motion", scene.motion.names[0]), 0.0)
+    scene = replace_place(scene, ("motion", "angle"), 0.0)
     xp, doubles = load_library(library)
     with doubles:
         alike = replace_numbers(scene, dict.fromkeys(list_entries(scene).keys() & numbers, 1.0))

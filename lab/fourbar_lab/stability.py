@@ -42,7 +42,7 @@ def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
     """Solve one position with error bars; `solve` evaluates one in plain numbers, two in arrays."""
     times = 1 + hash(angle) % 2  # as good as random, and the same on every run
     commanded = np.full(times, angle)
-    scene = replace(scene, motion=replace(scene.motion, **{scene.motion.names[0]: commanded}))  # type: ignore[arg-type]
+    scene = replace(scene, motion=scene.motion.replace(angle=commanded))
     solution = solve(scene, "error")
     return {name: array[0] for name in UNITS if (array := getattr(solution, name)) is not None}
 
@@ -70,7 +70,7 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
     errors: dict[str, float] = {}
     for name in found:
         for component, index in list_components(name):
-            if component not in values or name == motion.names[0] or name.endswith("_error"):
+            if component not in values or name == motion.commanded or name.endswith("_error"):
                 continue
             own, rate = np.ravel(found[name])[index], sensitivity[component]
             if internal and name in PIN_FORCES:  # a component that the drive has no part in is left of larger ones

@@ -118,7 +118,7 @@ def test_speeds_are_the_derivative_of_the_angles(scene: Scene) -> None:
     """Central differences over theta_2: theta_k' and theta_k'' against omega_k and alpha_k."""
     h, w, alpha = 1e-4, scene.motion.omega_2, scene.motion.alpha_2
     at = float(scene.motion.theta_2)
-    motion = replace(scene.motion, theta_2=at + h * np.array([-1.0, 0.0, 1.0]))
+    motion = scene.motion.replace(angle=at + h * np.array([-1.0, 0.0, 1.0]))
     s = fourbar.solve(replace(scene, motion=motion), "acceleration")
     for bar in (3, 4):
         theta = getattr(s, f"theta_{bar}")
@@ -248,7 +248,7 @@ def test_length_mass_and_time_scale(scene: Scene, length: int, mass: int, time: 
     scaled = replace(
         scene,
         linkage=FourBar(link.ground * L, bar(link.input), bar(link.coupler), bar(link.output), link.ground_angle),
-        motion=replace(m, omega_2=m.omega_2 / T, alpha_2=m.alpha_2 / T**2),
+        motion=m.replace(speed=m.omega_2 / T, acceleration=m.alpha_2 / T**2),
         loads=tuple(
             replace(
                 load,
@@ -274,8 +274,8 @@ def test_length_mass_and_time_scale(scene: Scene, length: int, mass: int, time: 
 @given(scenes(effects=False), between(0.01, 100.0))
 def test_forces_go_as_the_speed_squared(scene: Scene, times: float) -> None:
     """No loads, no gravity, constant omega_2."""
-    slow = replace(scene, motion=replace(scene.motion, alpha_2=0.0))
-    fast = replace(slow, motion=replace(slow.motion, omega_2=times * slow.motion.omega_2))
+    slow = replace(scene, motion=scene.motion.replace(acceleration=0.0))
+    fast = replace(slow, motion=slow.motion.replace(speed=times * slow.motion.omega_2))
     ours, other = fourbar.solve(slow), fourbar.solve(fast)
     back = {name: value / times**2 for name, value in forces(other).items()}
     same_forces(slow, ours, back, float(other.torque[0]) / times**2)
@@ -286,7 +286,7 @@ def test_forces_go_as_the_speed_squared(scene: Scene, times: float) -> None:
 def test_time_reversal(scene: Scene) -> None:
     """Backwards through the same position: the same forces, without what depends on the sense of motion."""
     still = replace(scene, effects=tuple(e for e in scene.effects if isinstance(e, Gravity)))
-    back = replace(still, motion=replace(still.motion, omega_2=-still.motion.omega_2))
+    back = replace(still, motion=still.motion.replace(speed=-still.motion.omega_2))
     ours, other = fourbar.solve(still), fourbar.solve(back)
     same_forces(still, ours, forces(other), float(other.torque[0]))
     assert float(ours.omega_4[0]) == -float(other.omega_4[0])
@@ -300,7 +300,7 @@ def test_frame_rotation(scene: Scene, turn: float) -> None:
     turned = replace(
         scene,
         linkage=replace(link, ground_angle=link.ground_angle + turn),
-        motion=replace(m, theta_2=float(m.theta_2) + turn),
+        motion=m.replace(angle=float(m.theta_2) + turn),
         loads=tuple(
             load
             if load.frame == "bar"

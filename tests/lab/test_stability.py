@@ -131,10 +131,8 @@ def test_a_derivative_that_is_left_out_is_a_failure(monkeypatch: pytest.MonkeyPa
         return tally
 
     scene = draw_random(np.random.default_rng(0))
-    held = replace(
-        scene, motion=replace(scene.motion, omega_2=0.0), effects=(fourbar.effects.Friction.at(A=0.1, B=0.1),)
-    )
-    apart = replace(scene, linkage=fourbar.uniform(0.3, 0.2, 0.1, 0.1), motion=replace(scene.motion, theta_2=3.0))
+    held = replace(scene, motion=scene.motion.replace(speed=0.0), effects=(fourbar.effects.Friction.at(A=0.1, B=0.1),))
+    apart = replace(scene, linkage=fourbar.uniform(0.3, 0.2, 0.1, 0.1), motion=scene.motion.replace(angle=3.0))
     assert (judged(held).no_torque, judged(apart).not_assembled) == (1, 1) and judged(scene).holds()
     monkeypatch.setattr("fourbar_lab.slopes.sensitivity", lost)
     assert all(ratio == np.inf for ratio, _ in judged(scene).worst.values()) and judged(scene).worst

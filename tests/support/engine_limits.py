@@ -65,7 +65,7 @@ def _base() -> Scene:
 
 
 def _at_speed(omega_2: float) -> Scene:
-    return replace(_base(), motion=replace(_base().motion, omega_2=omega_2))
+    return replace(_base(), motion=_base().motion.replace(speed=omega_2))
 
 
 def _crank_acceleration(value: float) -> bool:

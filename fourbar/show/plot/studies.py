@@ -58,7 +58,7 @@ def draw_tolerances(found: Tolerances, path: str | Path, units: Conversion = SI)
     target = Path(path)
     kind = format_of(target)
     if len(found.theta_2) < 2:
-        raise InputError(f"motion.{found.scene.motion.names[0]}", "one position", "a picture of bands needs a sweep")
+        raise InputError(f"motion.{found.scene.motion.commanded}", "one position", "a picture of bands needs a sweep")
     with apply_style():
         from matplotlib.figure import Figure
 

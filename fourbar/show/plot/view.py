@@ -150,7 +150,7 @@ def choose_common_position(scenes: "list[Scene]") -> float | None:
 
 def set_branch(scene: Scene, branch: int) -> Scene:
     """Put the same scene on the given branch."""
-    return replace(scene, motion=replace(scene.motion, branch=branch))
+    return replace(scene, motion=scene.motion.replace(branch=branch))
 
 
 def make_view(scene: Scene, position: float | None = None) -> View:

@@ -155,8 +155,9 @@ def slopes(scene: Scene, name: str, answer: dict[str, Any]) -> list[Differentiat
     for each in answer.get("slopes", ()):
         line = Differentiated(name, answer["version"], str(each["how"]))
         if "by" in each:
-            stated = {key: each[key] for key in scene.motion.names}
-            ours = fourbar.sensitivity(replace(scene, motion=replace(scene.motion, **stated)))
+            angle, speed, acceleration = (each[key] for key in scene.motion.names)
+            motion = scene.motion.replace(angle=angle, speed=speed, acceleration=acceleration)
+            ours = fourbar.sensitivity(replace(scene, motion=motion))
             pairs = {"torque": (each["torque"], ours.value("torque"))}
             pairs |= {key: (theirs, ours.of("torque", key)) for key, theirs in each["by"].items()}
             line.errors = {

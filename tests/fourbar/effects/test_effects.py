@@ -12,8 +12,7 @@ from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Spri
 from fourbar.effects.pin_friction import MANY, NONE, ONE, solve_sliding
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene
-from fourbar.scene.motion import Motion, Sweep
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import Law, Motion, Sweep
 from fourbar.solve import solve
 from fourbar_validation.engines.effects import look_up
 from tests.support.scenes import crank_rocker
@@ -225,7 +224,7 @@ def test_at_rest_the_interval_is_that_of_beginning_to_move(friction: object) -> 
     """Its ends are the limits of the torque for slow motions in either sense; at rest itself it is their inside."""
     scene = alone(Gravity(), friction)
     rest = solve(scene)
-    slow = [solve(replace(scene, motion=replace(scene.motion, omega_2=speed))).torque for speed in (1e-9, -1e-9)]
+    slow = [solve(replace(scene, motion=scene.motion.replace(speed=speed))).torque for speed in (1e-9, -1e-9)]
     assert rest.torque_low is not None and rest.torque_high is not None and rest.torque is not None
     # (1e-9 rad/s)^2 of inertia is nothing against these torques
     assert rest.torque_high == pytest.approx(np.maximum(*slow), rel=1e-13)

@@ -400,7 +400,7 @@ def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(one:
         replace(
             scene,
             effects=(*scene.effects, fourbar.Friction.at(O2=0.05)),
-            motion=replace(motion, omega_2=0.0, alpha_2=0.0),
+            motion=motion.replace(speed=0.0, acceleration=0.0),
         )
     )
     wide = 0.05 / np.abs(bare.stroke_speed / 10.0)

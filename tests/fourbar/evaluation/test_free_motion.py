@@ -147,7 +147,7 @@ def test_a_release_is_computed_once_and_solved_as_any_command() -> None:
 
 @pytest.mark.parametrize(
     ("motion", "says"),
-    [(fourbar.Motion(1.0, 2.0), "motion.free"), (replace(SWING.motion, theta_2=np.array([1.0, 2.0])), "at one angle")],
+    [(fourbar.Motion(1.0, 2.0), "motion.free"), (SWING.motion.replace(angle=np.array([1.0, 2.0])), "at one angle")],
 )
 def test_what_is_not_released_is_refused(motion: fourbar.Motion, says: str) -> None:
     with pytest.raises(fourbar.InputError, match=says):
@@ -158,7 +158,7 @@ def test_what_is_not_released_is_refused(motion: fourbar.Motion, says: str) -> N
 def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPatch) -> None:
     """theta_2, omega_2, alpha_2 as doubles do not hold the forces there, the angle of bar 4 does."""
     motion = SWING.motion
-    halted = solve(replace(SWING, motion=replace(motion, through="sign")), "position")
+    halted = solve(replace(SWING, motion=motion.replace(through="sign")), "position")
     assert halted.stopped_at is not None and halted.stopped_at < 1.0
     distances = np.logspace(-14, -2, 49)
     evenly = np.linspace(0.0, 1.2, 121)

@@ -257,7 +257,7 @@ def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
     loads_and_gravity = replace(case, effects=case.effects[:1])
     s = fourbar.solve(replace(case, effects=(case.effects[0], fourbar.Friction.at(**couples))))
     free = fourbar.solve(loads_and_gravity)
-    turning = fourbar.solve(replace(loads_and_gravity, motion=replace(case.motion, omega_2=1.0)))
+    turning = fourbar.solve(replace(loads_and_gravity, motion=case.motion.replace(speed=1.0)))
     rate = {1: 0.0, 2: 1.0, 3: turning.omega_3, 4: turning.omega_4}
     pins = {"O2": (1, 2), "A": (2, 3), "B": (3, 4), "O4": (1, 4)}
     work = sum(f * np.abs(rate[j] - rate[i]) for (i, j), f in ((pins[pin], f) for pin, f in couples.items()))
@@ -265,7 +265,7 @@ def test_dry_friction_at_rest_holds_as_much_as_its_work(drive_bar: int) -> None:
     size = np.abs(free.torque) + half
     for end, side in ((s.torque_high, 1.0), (s.torque_low, -1.0)):
         assert np.all(np.abs(end - (free.torque + side * half)) <= SOLVED * size)
-    moving = fourbar.solve(replace(case, motion=replace(case.motion, omega_2=2.0)))
+    moving = fourbar.solve(replace(case, motion=case.motion.replace(speed=2.0)))
     assert np.array_equal(moving.torque_low, moving.torque) and np.array_equal(moving.torque_high, moving.torque)
 
 

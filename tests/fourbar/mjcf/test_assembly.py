@@ -185,7 +185,7 @@ def _genesis() -> Iterator[None]:
 def test_genesis_reads_as_the_comment_says(tmp_path: Path) -> None:
     assembled = float(fourbar.solve(KEPT, "position").theta_4[0]) - KEPT.linkage.ground_angle
     resting = replace(KEPT, effects=(*JOINTS, Torsion.at(O4=(0.5, assembled, 0.0))))
-    faster = replace(WHOLE, motion=replace(KEPT.motion, alpha_2=30.0))
+    faster = replace(WHOLE, motion=KEPT.motion.replace(acceleration=30.0))
     for scene, moves_as in ((KEPT, KEPT), (WHOLE, KEPT), (faster, KEPT), (STIFF, resting)):
         (file := tmp_path / "four_bar.xml").write_text(write_mjcf_for(scene, "genesis"))
         read = read_genesis(file, MIDWAY)

@@ -84,7 +84,7 @@ class Opened:
     def errors(self, answers: dict[str, Any], scene: Scene | None = None) -> dict[str, float]:
         """Against the formulas at the state that was last forwarded, by the greatest value in a turn."""
         d, scene = self.data, scene or self.driven
-        round_ = replace(scene, drive=None, drive_bar=2, motion=replace(scene.motion, free=None))  # without poles
+        round_ = replace(scene, drive=None, drive_bar=2, motion=scene.motion.replace(free=None))  # without poles
         at = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
         expected, turn = fourbar.solve(scene, "force", at=at), fourbar.solve(round_, "force")
         found = {}

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,7 +53,7 @@ def test_what_comes_out_fed_back_as_a_command_returns_itself(path: Path, bar: in
     scene = fourbar.load(path)
     compared = 0
     for branch in (1, -1):
-        scene = replace(scene, motion=replace(scene.motion, branch=branch))
+        scene = replace(scene, motion=scene.motion.replace(branch=branch))
         forth = solve(scene, "force")
         back = solve(scene, "force", at=of_bar(forth, bar))
         lost = np.minimum(np.abs(sine(forth, bar)), np.abs(forth.sin_mu))
@@ -217,6 +218,33 @@ coupler = "25 cm"
 output = "22 cm"
 [motion]
 """
+
+
+STROKE = Motion(stroke=0.3, stroke_speed=0.1, stroke_acceleration=0.2, side="left", branch=-1)
+
+
+@pytest.mark.parametrize(
+    ("motion", "changes", "same"),
+    [
+        (Motion(1.0, 2.0, 3.0, -1, "follow"), {"angle": 1.5, "branch": 1}, Motion(1.5, 2.0, 3.0, 1, "follow")),
+        (Motion(theta_4=1.0, omega_4=2.0), {"speed": 3.0}, Motion(theta_4=1.0, omega_4=3.0)),
+        (STROKE, {"acceleration": 0.0}, Motion(stroke=0.3, stroke_speed=0.1, side="left", branch=-1)),
+        (Motion(law=Law((0.0, 1.0, 2.0, 3.0), theta_3=(0.0, 1.0, 1.5, 1.0))), {"law": None}, Motion(theta_3=None)),
+        (Motion(1.0, free=Free(1.0, 2)), {"free": None}, Motion(1.0)),
+    ],
+    ids=str,
+)
+def test_a_motion_is_replaced_by_what_it_commands(motion: Motion, changes: dict[str, Any], same: Motion) -> None:
+    assert motion.replace() == motion != same == motion.replace(**changes)
+    with pytest.raises(TypeError, match="no field 'theta_2' to replace; it has angle, speed, acceleration"):
+        motion.replace(theta_2=1.0)
+
+
+def test_a_motion_reads_by_the_name_of_what_it_commands() -> None:
+    assert (STROKE.stroke, STROKE.stroke_speed, STROKE.stroke_acceleration, STROKE.theta_2) == (0.3, 0.1, 0.2, None)
+    output = Motion(theta_4=1.0, omega_4=2.0, alpha_4=3.0)
+    assert (output.theta_4, output.omega_4, output.alpha_4, output.bar) == (1.0, 2.0, 3.0, 4)
+    assert (output.theta_2, output.omega_2, output.alpha_2, output.stroke) == (None, None, 0.0, None)
 
 
 @pytest.mark.parametrize(

@@ -107,7 +107,7 @@ def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar: int, strokes: lis
     s = fourbar.solve(fourbar.vary(own, {"lengths.ground_angle": angles}), "error")
     assert (s.status_code == 0).all() and s.drive_force is not None and s.drive_force_error is not None
     for place, stroke in enumerate(strokes):
-        reference = compute_reference(replace(own, motion=replace(own.motion, stroke=stroke)), 1, stroke)
+        reference = compute_reference(replace(own, motion=own.motion.replace(angle=stroke)), 1, stroke)
         assert reference is not None
         exact = reference[0]["drive_force"]
         error = np.array([abs(float((force - exact).mid())) for force in s.drive_force[:, place].tolist()])

@@ -18,7 +18,7 @@ import pytest
 import fourbar
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.files.pictures import LARGEST
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import Law
 from fourbar.show import animate
 from tests.support.scenes import crank_rocker, thesis
 
@@ -53,7 +53,7 @@ def test_embedded_numbers_are_those_of_solve_on_both_branches() -> None:
     scene = crank_rocker()
     data = embedded(animate.write_page(scene))
     for sign in (1, -1):
-        solution = fourbar.solve(replace(scene, motion=replace(scene.motion, branch=sign)))
+        solution = fourbar.solve(replace(scene, motion=scene.motion.replace(branch=sign)))
         columns = data["branches"][str(sign)]
         for name in ("theta_3", "theta_4", "omega_3", "alpha_4", "torque", "F12", "F32", "F43", "F14"):
             np.testing.assert_array_equal(np.array(columns[name]), getattr(solution, name))  # to the last bit

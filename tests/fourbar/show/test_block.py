@@ -11,7 +11,7 @@ import pytest
 import fourbar
 from fourbar.cli import status
 from fourbar.effects import SpringEnd
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import Law
 from fourbar.show.block import WIDTH, write_block
 from fourbar.show.summary import summarize
 from fourbar.show.units import suit_units
@@ -67,7 +67,7 @@ def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar() -> None:
 
 
 def test_peaks_and_means_are_those_of_much_finer_steps() -> None:
-    fine = fourbar.solve(replace(TURN, motion=replace(TURN.motion, theta_2=fourbar.Sweep(0.0, math.tau, 36000))))
+    fine = fourbar.solve(replace(TURN, motion=TURN.motion.replace(angle=fourbar.Sweep(0.0, math.tau, 36000))))
     text = block(TURN)
     worst = int(np.argmax(np.abs(fine.torque)))
     place, torque = math.degrees(fine.theta_2[worst]), 1e3 * fine.torque[worst]
@@ -142,7 +142,7 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
     bore = 1e3 * math.sqrt(4.0 * np.nanmax(s.drive_force) / (math.pi * 210e5))
     assert f"bore at least {bore:.4g} mm to push {np.nanmax(s.drive_force):.4g} N" in text and "to pull" in text
     assert "cylinder from bar 1 (ground) to bar 2 (input), 0.2 m/s" in text and "motor" not in text
-    right = replace(scene, motion=replace(motion, side="right"))
+    right = replace(scene, motion=motion.replace(side="right"))
     assert summarize(right, fourbar.solve(right)).strokes == pytest.approx((0.16, 0.34), abs=1e-6)
 
 

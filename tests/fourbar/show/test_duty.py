@@ -91,7 +91,7 @@ def test_a_study_has_what_each_of_its_members_has() -> None:
     for member in range(3):
         d, angle = (float(array[member]) for array in values.values())
         linkage = replace(scene.linkage, ground=d, ground_angle=angle)
-        alone = fourbar.solve(replace(scene, linkage=linkage, motion=replace(scene.motion, theta_2=theta_2[member])))
+        alone = fourbar.solve(replace(scene, linkage=linkage, motion=scene.motion.replace(angle=theta_2[member])))
         assert moment[member] == pytest.approx(shaking_moment(alone), rel=1e-12, abs=1e-12)
         assert force[member] == pytest.approx(shaking_force(alone), rel=1e-12, abs=1e-12)
         for of_study, one in ((duty, motor_duty(alone)), (load, bearing_load(alone, "A"))):

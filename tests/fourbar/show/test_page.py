@@ -226,7 +226,7 @@ def test_the_page_replays_the_positions_speeds_and_accelerations_of_fourbar(brow
     assert driver.find_element("id", "type").text == fourbar.classify(scene.linkage).name
     for sign in (1, -1):
         driver.execute_script("chooseBranch(arguments[0])", sign)
-        s = fourbar.solve(replace(scene, motion=replace(scene.motion, branch=sign)))
+        s = fourbar.solve(replace(scene, motion=scene.motion.replace(branch=sign)))
         drawn = state_of(driver, "grid.map((_, i) => at(i) && [at(i).A, at(i).B])")
         assert [pair is not None for pair in drawn] == s.assembled.tolist()
         here = np.flatnonzero(s.assembled)
@@ -290,7 +290,7 @@ def test_the_branch_switches_the_picture_and_the_numbers(browse) -> None:
     scene = crank_rocker()
     driver = browse(animate.write_page(scene))
     driver.execute_script("chooseBranch(-1)")
-    s = fourbar.solve(replace(scene, motion=replace(scene.motion, branch=-1)))
+    s = fourbar.solve(replace(scene, motion=scene.motion.replace(branch=-1)))
     assert shown(driver, "torque", "F32_y") == pytest.approx([s.torque[0], s.F32[0, 1]], rel=PRINTED)
     drawn = pins(driver)
     np.testing.assert_allclose(drawn["B"], np.hypot(*drawn["O4"]) / 0.3 * s.B[0], atol=PIXEL)

@@ -13,7 +13,7 @@ import pytest
 import fourbar
 from fourbar.effects import SpringEnd
 from fourbar.scene import Command
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import Law
 from fourbar.show.summary import list_sizes, locate_between
 from tests.support.scenes import crank_rocker, thesis
 
@@ -50,7 +50,7 @@ FINE = fourbar.Sweep(0.0, math.tau, 36000)
 
 
 def swept(scene: fourbar.Scene, steps: int) -> fourbar.Scene:
-    return replace(scene, motion=replace(scene.motion, theta_2=fourbar.Sweep(0.0, math.tau, steps)))
+    return replace(scene, motion=scene.motion.replace(angle=fourbar.Sweep(0.0, math.tau, steps)))
 
 
 @pytest.mark.parametrize("steps", (72, 97, 360))
@@ -79,7 +79,7 @@ def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
     coarse = swept(crank_rocker(), 24)
     found = locate_between(coarse, fourbar.solve(coarse))
     assert not found.growing and not found.reversals
-    fine = list_sizes(fourbar.solve(replace(coarse, motion=replace(coarse.motion, theta_2=FINE))))
+    fine = list_sizes(fourbar.solve(replace(coarse, motion=coarse.motion.replace(angle=FINE))))
     for name, size in list_sizes(found.solution).items():
         assert size.max() == pytest.approx(fine[name].max(), rel=PEAK), name
     own = np.isin(found.solution.theta_2, fourbar.solve(coarse).theta_2)

@@ -169,16 +169,16 @@ COMMANDS = [
 
 
 @pytest.mark.parametrize("drive_bar", [2, 3, 4])
-@pytest.mark.parametrize("motion", COMMANDS, ids=lambda motion: motion.names[0])
+@pytest.mark.parametrize("motion", COMMANDS, ids=lambda motion: motion.commanded)
 def test_power_and_condition_are_those_of_the_definitions(motion: Motion, drive_bar: int) -> None:
     """Torque times the speed of the driven bar; the sine between the two bars that are not commanded."""
     scene = replace(LOADED, motion=motion, drive_bar=drive_bar, loads=())
     names = ["power", "condition", "torque", "theta_2", "theta_3", "theta_4", *(f"omega_{bar}" for bar in (2, 3, 4))]
     found = function(scene, ["lengths.output"], names)(0.22)
-    one, other = (found[f"theta_{bar}"] for bar in (2, 3, 4) if f"theta_{bar}" != motion.names[0])
+    one, other = (found[f"theta_{bar}"] for bar in (2, 3, 4) if f"theta_{bar}" != motion.commanded)
     assert found["condition"] == pytest.approx(abs(np.sin(other - one)), rel=1e-13)
     assert found["power"] == pytest.approx(found["torque"] * found[f"omega_{drive_bar}"], rel=1e-13)
-    assert found[motion.names[0]] == motion.angle
+    assert found[motion.commanded] == motion.angle
 
 
 def test_power_and_condition_of_a_cylinder_are_those_of_the_definitions() -> None:

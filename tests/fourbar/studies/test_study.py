@@ -23,8 +23,7 @@ from fourbar.effects import (
 )
 from fourbar.quantities import VECTORS
 from fourbar.scene import command
-from fourbar.scene.motion import Free, FromLimit
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import Free, FromLimit, Law
 from fourbar.scene.point import Point
 from fourbar.studies.keys import list_entries, replace_place
 from fourbar.studies.study import Study, vary

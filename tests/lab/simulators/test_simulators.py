@@ -64,7 +64,7 @@ def test_a_subject_starts_from_its_own_assembly_without_the_formulas() -> None:
         assert "fourbar.solve" not in path.read_text(), path
     for branch in (1, -1):
         scene = fourbar.load(PROBLEM)
-        scene = replace(scene, motion=replace(scene.motion, branch=branch, omega_2=-10.0 * branch))
+        scene = replace(scene, motion=scene.motion.replace(branch=branch, speed=-10.0 * branch))
         begin = motion.start(scene)
         assert write_mjcf(scene, start=begin).count("<key ") == 1 and "coupler" in write_sdf(scene, "drake", begin)
         theta = (begin.qpos[0], begin.qpos[0] + begin.qpos[1], begin.qpos[2])
@@ -74,7 +74,7 @@ def test_a_subject_starts_from_its_own_assembly_without_the_formulas() -> None:
 
 def test_a_subject_is_judged_on_the_branch_of_its_scene() -> None:
     scene = fourbar.load(PROBLEM)
-    scene = replace(scene, motion=replace(scene.motion, branch=-1))
+    scene = replace(scene, motion=scene.motion.replace(branch=-1))
     found = FreeBody().answer(scene, command(scene)).quantities
     reading = {"theta": np.column_stack([command(scene).theta_2, found["theta_3"], found["theta_4"]]).tolist()}
     reading |= {"omega_2": [10.0] * 25, "alpha_2": [0.0] * 25, "torque": found["torque"].tolist()}

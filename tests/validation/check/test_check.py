@@ -15,7 +15,7 @@ import fourbar
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar.quantities import OF_LINE, OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import Law
 from fourbar.solve import solve
 from fourbar_validation.check.judge import Allowance
 from fourbar_validation.check.judgement import Judgement, judge_table
@@ -579,7 +579,7 @@ def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(tm
     speed, acceleration = np.linspace(2.0, 9.0, 12), np.linspace(-30.0, 40.0, 12)
     log = right(scene, omega_2=speed, alpha_2=acceleration) | {"omega_2": speed, "alpha_2": acceleration}
     table = write(tmp_path / "log.csv", log, ("omega_2", "alpha_2", *ALL))
-    still = replace(scene, motion=replace(scene.motion, omega_2=None, alpha_2=0.0))
+    still = replace(scene, motion=scene.motion.replace(speed=None, acceleration=0.0))
     assert judge_table(scene, read_table(table)).status == FAILED  # at the scene's one speed
     judgement = judge_table(still, read_table(table))
     assert judgement.status == HOLDS and {f.quantity for f in judgement.findings} == {*ALL}

@@ -35,7 +35,7 @@ def test_every_pair_of_bars_agrees_with_thirteen_equations(one: int, other: int)
     for effects in ((fourbar.Gravity(), fourbar.Viscous.at(B=0.02)), (fourbar.Gravity(), PINS)):
         for branch in (1, -1):
             scene = driven(one, other, effects=effects)
-            rows = judge("", replace(scene, motion=replace(scene.motion, branch=branch)), FREE_BODY).rows
+            rows = judge("", replace(scene, motion=scene.motion.replace(branch=branch)), FREE_BODY).rows
             assert not [row for row in rows if row.failed]
             known = {row.quantity for row in rows if row.engine == "free-body" and row.verdict == AGREES}
             assert known >= {"drive_force", "stroke", "drive_line", "stroke_speed", "drive_condition", "F12"}
@@ -72,14 +72,14 @@ def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(witness: W
 
 def test_positions_alone_have_a_stroke_that_is_judged() -> None:
     scene = driven(3, 4)
-    rows = judge("", replace(scene, motion=replace(scene.motion, omega_2=None)), FREE_BODY).rows
+    rows = judge("", replace(scene, motion=scene.motion.replace(speed=None)), FREE_BODY).rows
     assert not [row for row in rows if row.failed]
     assert {"stroke", "drive_line"} <= {row.quantity for row in rows if row.verdict == AGREES}
 
 
 def test_statics_and_friction_at_rest_agree_too() -> None:
     scene = driven(1, 3, effects=(fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02)))
-    rows = judge("", replace(scene, motion=replace(scene.motion, omega_2=0.0, alpha_2=0.0)), FREE_BODY).rows
+    rows = judge("", replace(scene, motion=scene.motion.replace(speed=0.0, acceleration=0.0)), FREE_BODY).rows
     assert not [row for row in rows if row.failed]
     assert {"drive_force_low", "drive_force_high"} <= {row.quantity for row in rows if row.verdict == AGREES}
 

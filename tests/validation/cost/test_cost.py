@@ -178,7 +178,7 @@ def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
     ours["torque"][3], ours["F12"][2, 1] = math.nan, math.nan
     found = formulas.compare_with_reference(scene, at, ours, {**exact, "F14": [(None, None)] * 9})
     assert found.torque == found.F12 == found.F14 == math.inf and found.F43 < 1e-13
-    still = replace(scene, motion=replace(scene.motion, omega_2=0.0), drive_bar=4)
+    still = replace(scene, motion=scene.motion.replace(speed=0.0), drive_bar=4)
     solution = fourbar.solve(still, "force")
     assert (
         compute_errors(still, command(still), {name: getattr(solution, name) for name in QUANTITIES}).torque == math.inf

@@ -124,14 +124,14 @@ def test_the_simulation_agrees_on_pairs(pair: tuple[str, str]) -> None:
 @pytest.mark.parametrize("branch", [1, -1])
 def test_all_at_once_on_every_drive_and_branch(drive: int, branch: int) -> None:
     posed = scene(*ACTING)
-    motion = replace(posed.motion, branch=branch, omega_2=-7.0)
+    motion = posed.motion.replace(branch=branch, speed=-7.0)
     assert failing(replace(posed, drive_bar=drive, motion=motion), EXACT) == []
 
 
 def test_a_turned_frame_turns_gravity_with_it() -> None:
     """Ground, input and gravity turned by one angle: the same torque and the same forces, turned."""
     posed, by = scene("gravity"), 0.7
-    motion = replace(posed.motion, theta_2=fourbar.Sweep(0.13 + by, 0.13 + by + 2 * np.pi, 12))
+    motion = posed.motion.replace(angle=fourbar.Sweep(0.13 + by, 0.13 + by + 2 * np.pi, 12))
     turned = replace(
         posed,
         linkage=replace(posed.linkage, ground_angle=posed.linkage.ground_angle + by),

@@ -134,7 +134,7 @@ def test_each_load_and_effect(name: str) -> None:
     case = scene(*ACTING)
     for drive in (2, 3, 4):
         for branch in (1, -1):
-            motion = replace(case.motion, branch=branch, omega_2=-7.0)
+            motion = case.motion.replace(branch=branch, speed=-7.0)
             assert failures(name, replace(case, drive_bar=drive, motion=motion)) == [], (drive, branch)
 
 

@@ -58,7 +58,7 @@ def test_a_scene_of_each_family_holds(family: Family) -> None:
 def _fewer(scene: Scene, steps: int = 12) -> Scene:
     sweep = scene.motion.theta_2
     assert isinstance(sweep, fourbar.Sweep)
-    return replace(scene, motion=replace(scene.motion, theta_2=replace(sweep, steps=steps)))
+    return replace(scene, motion=scene.motion.replace(angle=replace(sweep, steps=steps)))
 
 
 def test_beyond_a_toggle_no_engine_finds_a_position() -> None:

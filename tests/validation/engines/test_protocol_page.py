@@ -56,7 +56,7 @@ def test_the_page_s_engine_answers_what_the_formulas_do(engine: Path, file: Path
     gravity = tuple(effect for effect in scene.effects if isinstance(effect, Gravity))
     motion = scene.motion if scene.motion.free is None else fourbar.Motion(omega_2=1.0, branch=scene.motion.branch)
     if motion.speed is None:
-        motion = replace(motion, omega_2=1.0)
+        motion = motion.replace(speed=1.0)
     scene = replace(scene, motion=motion, loads=(), effects=gravity, drive_bar=2)
     at = list_positions(scene)
     question = {"scene": protocol.scene_to_json(scene), "command": protocol.command_to_json(scene, at)}

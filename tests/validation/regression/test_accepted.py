@@ -35,7 +35,7 @@ def test_a_row_states_the_condition_that_its_allowance_comes_from(turns: int) ->
     """By which a move is distinguished from round-off: one limit position has 7 digits, the next 13."""
     name, scene = next((name, scene) for name, scene in SCENES if name == "triple_rocker")
     if turns:
-        motion = replace(scene.motion, theta_2=np.array([2.0, 3.0]) + turns * 2.0 * np.pi)
+        motion = scene.motion.replace(angle=np.array([2.0, 3.0]) + turns * 2.0 * np.pi)
         scene = replace(scene, motion=motion)
     apart = {"torque_error", "force_error", "undecided", "status"}  # bars against their errors, and counts
     rows = [row for row in judge(name, scene, EXACT).rows if row.allowed > 0.0 and row.quantity not in apart]

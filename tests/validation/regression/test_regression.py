@@ -493,7 +493,7 @@ def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None
 
 
 def test_more_positions_and_other_settings_are_named_so() -> None:
-    finer = replace(SCENE, motion=replace(SCENE.motion, theta_2=fourbar.Sweep(0.0, 2.0 * math.pi, 720)))
+    finer = replace(SCENE, motion=SCENE.motion.replace(angle=fourbar.Sweep(0.0, 2.0 * math.pi, 720)))
     worse = replace(ROW, error=1e-9, allowed=1e-8)
     found = compare_rows(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
     assert found.not_compared == ["scene scene has other positions (1 rows)"] and not found.regressed

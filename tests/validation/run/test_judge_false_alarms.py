@@ -60,7 +60,7 @@ def test_a_free_motion_near_a_limit_raises_no_alarm(monkeypatch: pytest.MonkeyPa
     """The engines get theta_2, omega_2 and alpha_2 of the independent theta_4, rounded: what that costs is computed."""
     monkeypatch.setattr(released, "ENGINES", {})
     scene = FAULT_SCENES["double rocker released"]
-    often = replace(scene, motion=replace(scene.motion, free=Free(1.0, 1000)))  # nearer to its limits
+    often = replace(scene, motion=scene.motion.replace(free=Free(1.0, 1000)))  # nearer to its limits
     rows = judge("released", often, BY_ITSELF).rows
     assert not [row for row in rows if row.failed] and DEGRADED in {row.verdict for row in rows}
 

@@ -96,7 +96,7 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are() -> 
     scene = replace(falling(), effects=(), loads=(fourbar.Load(4, moment=0.1),))
     for steps in (20, 200):  # 10 and 1 ms apart
         released = fourbar.Free(0.2, steps)
-        rows = judge("pushed", replace(scene, motion=replace(scene.motion, free=released))).rows
+        rows = judge("pushed", replace(scene, motion=scene.motion.replace(free=released))).rows
         assert not any(row.failed for row in rows)
         energy = row(rows, "mujoco-forward", "energy")
         assert energy.verdict == DEGRADED and energy.error < 1e-3, energy

@@ -27,7 +27,7 @@ def scenes() -> list[Scene]:
 def uses(scene: Scene) -> Iterator[Any]:
     motion, drive = scene.motion, scene.drive
     yield from (effect.key for effect in scene.effects)
-    yield f"command of {motion.names[0]}"
+    yield f"command of {motion.commanded}"
     yield "drive", (drive.start.bar, drive.end.bar) if drive else scene.drive_bar
     yield from (f"load in {load.frame} axes" for load in scene.loads)
     if any(load.table for load in scene.loads):

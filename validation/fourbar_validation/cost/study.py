@@ -128,7 +128,7 @@ class CostStudy:
             scene = self.scene
             if slow:
                 sign = math.copysign(1.0, scene.motion.omega_2 or 1.0)
-                scene = replace(scene, motion=replace(scene.motion, omega_2=sign * SLOW, alpha_2=0.0))
+                scene = replace(scene, motion=scene.motion.replace(speed=sign * SLOW, acceleration=0.0))
             if bare:
                 scene = replace(scene, loads=(), effects=())
             at = command(scene)

@@ -19,8 +19,7 @@ from fourbar.files.scene_text import describe
 from fourbar.formulas.many_digits import DIGITS
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import OF_STROKE, Free, Motion
-from fourbar.scene.motion_law import COMMANDS
+from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, Free, Motion
 from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer, WitnessError
 from fourbar_validation.compare.rows import write_one_line
 
@@ -30,7 +29,7 @@ FURTHEST = 0.1
 """rad, and part of the greatest speed and acceleration: a motion that ends further from the command than this answers
 another question."""
 TABLES = ("lengths", "bars", "drive", "loads", "effects")
-KINDS_OF_COMMAND = (*COMMANDS.values(), OF_STROKE)
+KINDS_OF_COMMAND = (*COMMANDS.values(), STROKE_COMMAND)
 OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
 
 
@@ -78,7 +77,7 @@ def command_to_json(scene: Scene, at: Command) -> dict[str, Any]:
     if at.stroke is None:
         (place, speed, acceleration), values = COMMANDS[at.bar], (at.angle, at.speed, at.acceleration)
     else:
-        (place, speed, acceleration), values = OF_STROKE, (at.stroke, at.stroke_speed, scene.motion.acceleration)
+        (place, speed, acceleration), values = STROKE_COMMAND, (at.stroke, at.stroke_speed, scene.motion.acceleration)
     data = {place: _write_numbers(values[0])}
     if values[1] is not None:
         data |= {speed: _write_numbers(values[1]), acceleration: _write_numbers(values[2])}
@@ -384,7 +383,7 @@ def release_to_json(scene: Scene) -> dict[str, Any]:
     """Write the start and the times of a released motion."""
     motion, free = scene.motion, scene.motion.free
     assert free is not None
-    start = {"theta_2": float(motion.theta_2), "omega_2": motion.omega_2 or 0.0}  # type: ignore[arg-type]
+    start = {"theta_2": float(motion.theta_2), "omega_2": motion.omega_2 or 0.0}
     command = {**start, "branch": motion.branch, "through": motion.through}
     return {"command": command, "times": np.linspace(0.0, free.duration, free.steps + 1).tolist()}
 

@@ -156,7 +156,7 @@ def _compare_forces(question: Question) -> Iterator[Row]:
     assert solution.omega_2 is not None and solution.alpha_2 is not None and none is not None
     what = "a released linkage has no drive"
     yield Row.judged((name, FORMULAS, "exact"), "torque", np.abs(none), 0.0, what, solution.theta_2)
-    held = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0), drive_bar=2, drive=None)
+    held = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0), drive_bar=2, drive=None)
     at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
     driven_ones = [
         (Question(name, own, select_positions(at, where), output=question.output), take_member(solution, where))

@@ -107,12 +107,12 @@ def miss_grashof(*, gaps: tuple[float, ...] = (1e-3, 1e-6, 1e-9, 1e-12), steps: 
             d, a, b = 0.4, 0.1, 0.25
             scene = dress((d, a, b, d + a - b + sign * gap))
             sweep = Sweep(scene.linkage.ground_angle, scene.linkage.ground_angle + 2 * math.pi, steps)
-            yield f"{sign * gap:+.0e}", replace(scene, motion=replace(scene.motion, theta_2=sweep, alpha_2=0.0))
+            yield f"{sign * gap:+.0e}", replace(scene, motion=scene.motion.replace(angle=sweep, acceleration=0.0))
 
 
 def sweep_turn(scene: Scene, steps: int = 36) -> Scene:
     """Sweep through one turn of the input."""
-    return replace(scene, motion=replace(scene.motion, theta_2=Sweep(0.1, 0.1 + 2 * math.pi, steps), alpha_2=0.0))
+    return replace(scene, motion=scene.motion.replace(angle=Sweep(0.1, 0.1 + 2 * math.pi, steps), acceleration=0.0))
 
 
 def shorten_crank(*, exponents: range = range(-6, 0)) -> Scenes:
@@ -158,7 +158,7 @@ def scale_speeds(*, exponents: tuple[int, ...] = (-6, -3, 0, 3, 6)) -> Scenes:
     base = sweep_turn(dress(PLAIN))
     for k in exponents:
         for sign, name in ((1.0, "+"), (-1.0, "-")):
-            yield f"{name}1e{k:+d}", replace(base, motion=replace(base.motion, omega_2=sign * 10.0**k))
+            yield f"{name}1e{k:+d}", replace(base, motion=base.motion.replace(speed=sign * 10.0**k))
 
 
 def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:

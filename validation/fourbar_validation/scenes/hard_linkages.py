@@ -43,7 +43,7 @@ def dress(lengths: Lengths, seed: int = 0) -> Scene:
 def set_angles(scene: Scene, psi: object, branch: int = 1, **changes: object) -> Scene:
     """Set the scene to angles psi = theta_2 - theta_1 (rad) on a branch."""
     theta_2 = scene.linkage.ground_angle + np.atleast_1d(np.asarray(psi, dtype=float))
-    motion = replace(scene.motion, theta_2=theta_2, branch=branch)
+    motion = scene.motion.replace(angle=theta_2, branch=branch)
     return replace(scene, motion=motion, **changes)  # type: ignore[arg-type]
 
 

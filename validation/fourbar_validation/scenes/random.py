@@ -219,7 +219,7 @@ def draw_uneven_scene(seed: int, index: int) -> Scene:
     size = 10.0 ** rng.uniform(-3.0, 3.0)
     scene = draw_scene(rng, [size * x for x in lengths], UNEVEN)
     theta_2 = scene.linkage.ground_angle + psi + np.array([0.0, 1e-3, rng.uniform(-3.0, 3.0)])
-    return replace(scene, motion=replace(scene.motion, theta_2=theta_2), title=f"uneven {index}")
+    return replace(scene, motion=scene.motion.replace(angle=theta_2), title=f"uneven {index}")
 
 
 MACHINES = Ranges(
@@ -246,4 +246,4 @@ def draw_random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Sc
     size = 10.0 ** rng.uniform(-1.5, 1.0)
     scene = draw_scene(rng, [size * x for x in draw_lengths(rng, kind)], MACHINES)
     sweep = Sweep(*choose_range(scene.linkage), POSITIONS - 1)
-    return replace(scene, motion=replace(scene.motion, theta_2=sweep), title=f"{kind.value} {index}")
+    return replace(scene, motion=scene.motion.replace(angle=sweep), title=f"{kind.value} {index}")

@@ -12,8 +12,7 @@ from typing import Protocol
 from fourbar.errors import InputError
 from fourbar.files import loads, read_text, reading
 from fourbar.scene import Scene
-from fourbar.scene.motion import DEFAULT_STEPS, Free, Sweep, require_steps
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import DEFAULT_STEPS, Free, Law, Sweep, require_steps
 from fourbar_validation.compare.rows import make_plain
 from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene

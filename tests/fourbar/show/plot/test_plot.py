@@ -21,7 +21,7 @@ from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.formulas.mobility import find_intervals
 from fourbar.formulas.path import compute_state
 from fourbar.formulas.torque import inertia
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import Law
 from fourbar.show import plot
 from fourbar.show.duty import compute_energies
 from fourbar.show.plot.curves import break_at_poles, choose_limit, find_free_place, find_poles
@@ -234,7 +234,7 @@ def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     assert len(marks["dead centre"]) == 1
     assert min(abs(marks["dead centre"][0] - e) for e in expected) < 1e-9
     other = thesis(FULL_TURN)
-    other = replace(other, motion=replace(other.motion, branch=-1))
+    other = replace(other, motion=other.motion.replace(branch=-1))
     panel = composed(other, "transmission").axes[0]
     crossed = next(line.get_xdata()[0] for line in panel.lines if line.get_marker() == "D")
     assert crossed + marks["dead centre"][0] == pytest.approx(sum(expected))  # its mirror image in the ground's line
@@ -534,7 +534,7 @@ def commanding(motion: fourbar.Motion) -> fourbar.Scene:
 @pytest.mark.parametrize("label", COMMANDS)
 def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
     scene = commanding(COMMANDS[label])
-    s, name = fourbar.solve(scene), scene.motion.names[0]
+    s, name = fourbar.solve(scene), scene.motion.commanded
     over = getattr(s, name) * (1000.0 if name == "stroke" else 180.0 / math.pi)
     panels = [axes for axes in composed(scene, "overview").axes if axes.get_xlabel() != "$x$ (mm)"]
     assert len(panels) == 7 and {axes.get_xlabel() for axes in panels} == {label}
@@ -567,7 +567,7 @@ def test_a_film_goes_along_what_is_commanded_and_back(label: str) -> None:
 
 
 def test_one_position_of_another_command_stands_in_its_range() -> None:
-    single = replace(COMMANDS["stroke (mm)"], stroke=0.3)
+    single = COMMANDS["stroke (mm)"].replace(angle=0.3)
     shown = make_view(commanding(single))
     triangle = 0.34, 0.16  # the cylinder's longest and shortest stroke
     places = shown.sweep.at.places

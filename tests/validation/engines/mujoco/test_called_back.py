@@ -12,7 +12,7 @@ import pytest
 import fourbar
 from fourbar.effects import Friction, Gravity, Load, Table
 from fourbar.scene import Scene
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import Law
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.engines.mujoco import motions, simulate
 from fourbar_validation.engines.mujoco.called_back import OVERRUN, clip_angles

@@ -84,7 +84,7 @@ def test_within_1e_5_of_the_scale(name: str) -> None:
 def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     """One pass of Newton's method is all they get; under loads the closure must be the stiffer for it."""
     drawn = draw_random_scene(7, index, tuple(DrawnType))
-    slow = replace(drawn, motion=replace(drawn.motion, omega_2=0.001 if loaded else 0.01, alpha_2=0.0), drive_bar=2)
+    slow = replace(drawn, motion=drawn.motion.replace(speed=0.001 if loaded else 0.01, acceleration=0.0), drive_bar=2)
     posed = slow if loaded else replace(slow, loads=(), effects=())
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     rows = Comparison("", posed, answer, fourbar.solve(posed, at=answer.at), SIMULATED, UNKNOWNS).rows()

@@ -153,7 +153,7 @@ def test_right_equilibria_hold_where_they_are_hard_to_judge(name: str) -> None:
 @pytest.mark.parametrize("engine", ["equilibria", "study", "sensitivity"])
 def test_where_nothing_assembles_nothing_is_asked(engine: str) -> None:
     scene = FAULT_SCENES["shipped, limited"]
-    scene = replace(scene, motion=replace(scene.motion, theta_2=fourbar.Sweep(3.0, 3.1, 4)))
+    scene = replace(scene, motion=scene.motion.replace(angle=fourbar.Sweep(3.0, 3.1, 4)))
     with pytest.raises(NotAskedError):
         rows_of(scene, engine)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fourbar.mjcf import Settings, choose_run
 from fourbar.mjcf.settings import FULL_TURN
 from fourbar.scene import Command
-from fourbar.scene.motion_law import Law
+from fourbar.scene.motion import Law
 from fourbar_validation.compare.answer import Array
 
 LOOKED_AT = 2000

@@ -35,7 +35,7 @@ class MujocoForward:
         interval = float(times[1] - times[0])  # the times are evenly spaced; the step divides the interval
         timestep = interval / math.ceil(interval / self.step - 1e-6)
         settings = replace(RECIPE, flywheel=0.0, timestep=timestep, time_constant_steps=TIME_CONSTANT_STEPS, pad=None)
-        bare = replace(scene, motion=replace(scene.motion, free=None, alpha_2=0.0))
+        bare = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0))
         try:
             loop = ClosedLoop(write_mjcf(bare, settings, keyframe=False))
         except InputError as error:

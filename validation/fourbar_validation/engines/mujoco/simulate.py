@@ -14,8 +14,7 @@ from fourbar.mjcf.document import compute_mass_ratio
 from fourbar.mjcf.effects import unwind
 from fourbar.mjcf.model import CYLINDER
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import Motion
-from fourbar.scene.motion_law import COMMANDS
+from fourbar.scene.motion import COMMANDS, Motion
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.description import list_speeds, list_unknowns, name_driving
 from fourbar_validation.engines.limits import NEAREST_TOGGLE, compute_least_sine, find_exceeded
@@ -126,7 +125,7 @@ def make_run_scene(scene: Scene, command: Command) -> Scene:
         motion = Motion(command.theta_2, omega, alpha, scene.motion.branch, scene.motion.through)
         return replace(scene, motion=motion)
     omega, alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
-    return replace(scene, motion=replace(scene.motion, theta_2=command.theta_2, omega_2=omega, alpha_2=alpha))
+    return replace(scene, motion=scene.motion.replace(angle=command.theta_2, speed=omega, acceleration=alpha))
 
 
 class _Simulation:

@@ -86,7 +86,7 @@ class TrialSetup:
         if scene.drive is not None:
             raise LimitError("settings are tried for a couple on a bar, not for a linear drive (drive.from, drive.to)")
         self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
-        motion = replace(scene.motion, theta_2=command.theta_2, omega_2=self.omega, alpha_2=self.alpha)
+        motion = scene.motion.replace(angle=command.theta_2, speed=self.omega, acceleration=self.alpha)
         self.scene, self.command = replace(scene, motion=motion), command
         order = order_in_time(command.theta_2, None, self.omega)
         position = Assembler(ClosedLoop(write_mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))

@@ -54,7 +54,7 @@ def extremes(question: Question) -> list[Row]:
         [*(np.linspace(low, high, POSITIONS) for low, high in result.parts), [each.theta_2 for each in ends]]
     )
     reach = {each.key: each.reach for each in scene.tolerances[:MOST]}
-    bare = replace(scene, tolerances=(), motion=replace(scene.motion, theta_2=theta_2, through="sign"))
+    bare = replace(scene, tolerances=(), motion=scene.motion.replace(angle=theta_2, through="sign"))
     corners = [dict(zip(reach, signs, strict=True)) for signs in product((-INSIDE, INSIDE), repeat=len(reach))]
     values = np.array(
         [

@@ -64,7 +64,7 @@ def _judge_file(question: Question, engine: str, read: Callable[[Scene], Content
     """Compare a file at its own position and at some more; loads are what a simulator adds."""
     scene = replace(take_few(question), loads=(), points=())
     theta_2 = np.asarray(scene.motion.theta_2)
-    opened = replace(scene, motion=replace(scene.motion, theta_2=theta_2[:1]))
+    opened = replace(scene, motion=scene.motion.replace(angle=theta_2[:1]))
     try:
         held = read(opened)
     except (LimitError, InputError) as limit:
@@ -72,7 +72,7 @@ def _judge_file(question: Question, engine: str, read: Callable[[Scene], Content
     theirs, rows = build_scene(held, opened), []
     with np.errstate(all="ignore"):
         for turns in held.turns:
-            answer = ask_free_bodies(replace(theirs, motion=replace(scene.motion, theta_2=np.array([turns["input"]]))))
+            answer = ask_free_bodies(replace(theirs, motion=scene.motion.replace(angle=np.array([turns["input"]]))))
             answer.quantities |= {f"theta_{BARS[bar]}": np.array([turns[bar]]) for bar in ("coupler", "output")}
             rows += hold_to(question, engine, opened, solve(opened), answer)
         more = ask_free_bodies(replace(theirs, motion=scene.motion))

@@ -64,8 +64,7 @@ def take_few(question: Question) -> Scene:
 
 def at_places(scene: Scene, places: Array) -> Scene:
     """Command other angles or strokes."""
-    given: dict[str, Any] = {scene.motion.names[0]: places}
-    return replace(scene, motion=replace(scene.motion, **given))
+    return replace(scene, motion=scene.motion.replace(angle=places))
 
 
 class FileNumber(NamedTuple):
