@@ -1,6 +1,7 @@
-"""Writes what docs/benchmark.md says of each problem, its figures and its matrix. `python docs/benchmark.py`
+"""Writes the blocks of docs/benchmark.md and docs/findings.md between comments, and figures. `python docs/benchmark.py`
 
-Data and figures come from models/problems, letters from docs/examples/benchmark.csv; the sentences are written by hand.
+Data and figures of problems come from models/problems, letters and errors from docs/examples/*.csv, findings from the
+docstrings of docs/findings/*.py. The sentences around them are written by hand.
 """
 
 import csv
@@ -8,6 +9,7 @@ import io
 import json
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +24,16 @@ from fourbar.show.plot.linkage import draw_mechanism, draw_support, locate_pins,
 from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, apply_style
 from fourbar.show.plot.view import make_view
 from fourbar.writing import write_text
+from fourbar_lab.simulators.findings import read_findings
+from fourbar_lab.simulators.standing import write_size
 from fourbar_validation.check.problem import GROUPS, LEVELS, MISSING, WORSE
 from fourbar_validation.report.svg import COORDINATES, LONG_NUMBER
 
-TARGET = Path(__file__).with_suffix(".md")
-FIGURES = TARGET.with_suffix("")
-PROBLEMS = TARGET.parents[1] / "models" / "problems"
-LETTERS = TARGET.parent / "examples" / "benchmark.csv"
+DOCS = Path(__file__).parent
+PAGES = ("benchmark.md", "findings.md")
+FIGURES = DOCS / "benchmark"
+PROBLEMS = DOCS.parent / "models" / "problems"
+LETTERS, STANDING = DOCS / "examples" / "benchmark.csv", DOCS / "examples" / "standing.csv"
 BLOCK = re.compile(r"<!-- data (\w+) -->\n.*?<!-- end -->\n", re.DOTALL)
 SHOWN_AT = {"change_point": math.radians(40.0), "pinocchio_2729": math.radians(110.0)}
 """Positions of figures, rad, where the position that the project's figures choose shows little."""
@@ -148,6 +153,37 @@ def write_letters(levels: dict[str, str]) -> str:
     return levels.get("reactions", MISSING) + levels.get("torque", levels.get("motion", MISSING))
 
 
+def write_findings(*, known: bool) -> list[str]:
+    """Write an entry for each finding: those that its project knows or documents, or the others."""
+    lines = []
+    for finding in read_findings():
+        fields = finding.fields
+        if fields["Reported"].startswith(("known", "stated")) == known:
+            dates = " ".join(f"*{name}:* {fields[name]}." for name in ("Since", "Until", "Reported"))
+            script = finding.script.name
+            entry = f"- **{finding.engine[0]}**: {finding.sentence} {fields['Found']} {dates}"
+            lines.append(f"{entry} [{script}](findings/{script})")
+    return lines
+
+
+def write_standing() -> list[str]:
+    """Write the worst error of torque and forces for each setting of each simulator: single states, and finest turn."""
+    settings: dict[tuple[str, str], list[dict[str, str]]] = {}
+    with STANDING.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            settings.setdefault((f"{row['subject']} {row['version']}", row["setting"]), []).append(row)
+    rows = [["simulator", "setting", "pin forces", "states", "turn", "steps", "s/s"], ["---"] * 3 + ["---:"] * 4]
+    for (simulator, setting), lines in settings.items():
+        pins = [pin for pin in PIN_FORCES if lines[0][pin]]
+        worst = [max(float(line[name]) for name in ("torque", *pins)) for line in lines]
+        states = [write_size(error) for error, line in zip(worst, lines, strict=True) if not line["steps"]]
+        cost = float(f"{float(lines[-1]['cpu_s_per_s']):.2g}")
+        turn = [write_size(worst[-1]), lines[-1]["steps"], f"{cost:g}"]
+        read = "all" if len(pins) == len(PIN_FORCES) else ", ".join(pins)
+        rows.append([simulator, setting, read, *(states or [""]), *turn])
+    return [f"|{'|'.join(row)}|" for row in rows]
+
+
 def draw_problem(name: str) -> str:
     """Draw a problem's mechanism to scale, as SVG."""
     with apply_style():
@@ -201,27 +237,35 @@ def draw_slider_crank(axes: Any, problem: dict[str, Any], labels: Labels) -> Non
                       arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.4})  # fmt: skip
 
 
-def text() -> str:
-    """Return the page with its blocks written anew."""
-    page = TARGET.read_text(encoding="utf-8")
-    names = [name for name in BLOCK.findall(page) if name != "matrix"]
+def text(page: str) -> str:
+    """Return a page with its blocks written anew."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    names = [name for name in BLOCK.findall(text) if name not in WRITERS]
 
     def write_block(block: re.Match[str]) -> str:
         name = block.group(1)
-        if name == "matrix":
-            lines = write_matrix(names)
+        if name in WRITERS:
+            lines = WRITERS[name](names)
         else:
             problem = read_problem(name)
             figure = f"![{problem['title']}]({FIGURES.name}/{name}.svg)"
             lines = [figure, "", *write_data(problem), "", write_question(name, problem)]
         return "\n".join((f"<!-- data {name} -->", "", *lines, "", "<!-- end -->", ""))
 
-    return BLOCK.sub(write_block, page)
+    return BLOCK.sub(write_block, text)
+
+
+WRITERS: dict[str, Callable[[list[str]], list[str]]] = {
+    "matrix": write_matrix,
+    "findings": lambda _: write_findings(known=False),
+    "limits": lambda _: write_findings(known=True),
+    "standing": lambda _: write_standing(),
+}
+"""Writers of the blocks that are no problem's, by name; each is given the names of the page's problems."""
 
 
 if __name__ == "__main__":
-    FIGURES.mkdir(exist_ok=True)
-    write_text(TARGET, text())
-    for problem_name in BLOCK.findall(TARGET.read_text(encoding="utf-8")):
-        if problem_name != "matrix":
-            write_text(FIGURES / f"{problem_name}.svg", draw_problem(problem_name))
+    for page_name in PAGES:
+        write_text(DOCS / page_name, text(page_name))
+    for file in PROBLEMS.glob("*.json"):
+        write_text(FIGURES / f"{file.stem}.svg", draw_problem(file.stem))

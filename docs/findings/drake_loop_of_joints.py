@@ -3,9 +3,9 @@
 Engine: drake (pydrake)
 Expected: a four-bar written as four links and four revolute joints is simulated, or the error names the option that
   takes it.
-Found: RuntimeError from Finalize(), which advises a constraint. With plant.SetEnableLoopTopology(True), marked
-  "internal use only for now", the same text finalizes with one loop constraint and four velocities, and its motion
-  and forces are those of the ball constraint.
+Found: Finalize() raises a RuntimeError that advises a constraint. With plant.SetEnableLoopTopology(True), marked
+  "internal use only for now", the same text finalizes with one loop constraint and four velocities, and its motion and
+  forces are those of the ball constraint.
 Since: 1.40.0 or before; SetEnableLoopTopology came with 1.57.0
 Until: still in 1.58.0, by default
 Reported: known and being worked on, RobotLocomotion/drake #9566, #24864, #24917, #24976, #24978

@@ -4,8 +4,9 @@ Engine: genesis-world (genesis)
 With: torch
 Expected: a pendulum of 0.08 kg m^2 about its pin, read from MJCF with armature="0", falls from the horizontal at
   m g r/I = 12.2625 rad/s^2, as in MuJoCo.
-Found: 5.45 rad/s^2: by default the MJCF morph gives the joint an armature of 0.1 kg m^2. With default_armature=None or
-  RigidOptions(enable_mujoco_compatibility=True) it falls as expected. The documentation states the default.
+Found: A pendulum that should fall at 12.26 rad/s^2 falls at 5.45: by default the MJCF morph gives the joint an armature
+  of 0.1 kg m^2. With default_armature=None or RigidOptions(enable_mujoco_compatibility=True) it falls as expected. The
+  documentation states the default.
 Since: 1.4.1; 1.0.0 to 1.4.0 keep an armature stated as 0
 Until: still in 1.4.5
 Reported: known, Genesis-Embodied-AI/genesis-world #3051 and #3072; a default relative to the inertia is proposed in

@@ -4,9 +4,9 @@ Engine: mujoco-mjx (mujoco.mjx)
 With: mujoco=={version}
 Expected: at one state of a turning four-bar, in double precision, the closing force of mjx.forward is that of
   mujoco.mj_forward.
-Found: 0.250 N in place of 0.206 N; of this project's four-bar 65 % of the greatest force in a turn. aref in
-  mjx/_src/constraint.py is made of position and velocity alone. MuJoCo C has (dJ/dt) v since 3.7.0 (commit 412cee2),
-  MuJoCo Warp since #1294.
+Found: The force is 0.250 N in place of 0.206 N; in this project's four-bar it is off by 65 % of the largest force in a
+  turn. aref in mjx/_src/constraint.py is made of position and velocity alone. MuJoCo C has (dJ/dt) v since 3.7.0
+  (commit 412cee2), MuJoCo Warp since #1294.
 Since: 3.7.0, when MuJoCo C got the term (3.6.0 agrees with it)
 Until: still in 3.17.0
 Reported: not reported yet

@@ -2,10 +2,9 @@
 
 Engine: pybullet (pybullet)
 Expected: a motor's torque converges as the timestep falls.
-Found: of a parallelogram that turns at 1 rad/s under its weight, the torque with the default differs from that with
+Found: In a parallelogram that turns at 1 rad/s under its weight, the torque with the default differs from that with
   solverResidualThreshold=0 over 100 times more at a step of 10 us than at 100 us. The guide says that the solver stops
-  where the speeds of all constraints miss by less than the threshold; over a step of 10 us this is an acceleration of
-  0.01.
+  when the speeds of all constraints miss by less than the threshold; over 10 us this is an acceleration of 0.01.
 Since: 3.2.7 or before
 Until: still in 3.2.7
 Reported: not reported yet; the threshold became one of speed in bulletphysics/bullet3 #1798

@@ -3,10 +3,10 @@
 Engine: pybullet (pybullet)
 Expected: enableJointForceTorqueSensor gives the force that Newton's law asks for: mass times acceleration of what hangs
   on the joint, with the accelerations that the same step found.
-Found: two bars in series in the plane, no loop, gravity or motor, at 0.3 and 0.7 rad: with speeds of 2 and -3 rad/s
-  the second joint is said to carry 6.14 N where the mass centre's acceleration asks for 2.62 N. It is exact where
-  either joint stands: a term of the product of both speeds is in question. gz-physics' bullet-featherstone plugin uses
-  the same code.
+Found: Two bars in series in the plane, without loop, gravity or motor, stand at 0.3 and 0.7 rad and turn at 2 and -3
+  rad/s. The second joint is said to carry 6.14 N where Newton's law asks for 2.62 N. It is exact when either joint
+  stands still: a term with the product of both speeds is in question. gz-physics' bullet-featherstone plugin uses the
+  same code.
 Since: 3.2.7 or before
 Until: still in 3.2.7
 Reported: not reported yet; bulletphysics/bullet3 #4451 and #4462 mended another term

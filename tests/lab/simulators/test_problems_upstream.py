@@ -51,4 +51,4 @@ def test_a_file_for_another_project_states_our_answers(path: Path) -> None:
 
 def test_each_project_has_its_file() -> None:
     assert {path.parent.name for path in FILES} == {"drake", "genesis", "mujoco_warp", "newton", "pinocchio"}
-    assert all(path.parent.name in (ROOT / "docs/upstream/README.md").read_text() for path in FILES)
+    assert all(path.parent.name in (ROOT / "docs/findings.md").read_text() for path in FILES)
