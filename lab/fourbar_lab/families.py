@@ -1,4 +1,4 @@
-"""Families of hard positions, each a generator of scenes of one position from a random generator alone."""
+"""Families of hard positions: one position of a random scene, drawn from a random generator alone."""
 
 import cmath
 import math
@@ -14,11 +14,13 @@ from fourbar.scene.motion import Motion
 from fourbar.scene.point import Point
 from fourbar.solve import solve
 from fourbar_validation.scenes.random import (
+    Place,
+    RandomFamily,
     Ranges,
+    command_angle,
     draw_chance,
     draw_decades,
     draw_product,
-    draw_scene,
     draw_uneven_lengths,
     draw_uniform,
 )
@@ -41,13 +43,7 @@ def spread_masses(spread: float) -> Ranges:
 EVEN, UNEVEN = spread_masses(0.0), spread_masses(3.0)
 
 
-def put_at_angle(scene: Scene, theta_2: float) -> Scene:
-    """Put the scene at theta_2 (rad from theta_1 on)."""
-    angle = scene.linkage.ground_angle + theta_2
-    return replace(scene, motion=scene.motion.replace(angle=angle))
-
-
-def random(rng: np.random.Generator) -> Scene:
+def _draw_anywhere(rng: np.random.Generator) -> Place:
     """Draw lengths within a factor of ten, theta_2 anywhere it assembles."""
     while True:
         d, a = rng.uniform(0.1, 1.0, 2)
@@ -55,10 +51,10 @@ def random(rng: np.random.Generator) -> Scene:
         diagonal = abs(d - a * complex(math.cos(angle), math.sin(angle)))
         b, c = rng.uniform(0.1, 1.0, 2)
         if abs(b - c) < diagonal < b + c:
-            return put_at_angle(draw_scene(rng, (d, a, b, c), EVEN), angle)
+            return (d, a, b, c), command_angle(angle)
 
 
-def limit(rng: np.random.Generator) -> Scene:
+def _draw_near_limit(rng: np.random.Generator) -> Place:
     """Draw a position within 1e-12..1e-2 rad of a limit of the input."""
     while True:
         d, a, b, c = rng.uniform(0.1, 1.0, 4)
@@ -67,10 +63,10 @@ def limit(rng: np.random.Generator) -> Scene:
         if abs(cosine) < 0.999:
             offset = 10.0 ** rng.uniform(-12, -2) * (1.0 if folded else -1.0)
             angle = float(rng.choice([-1.0, 1.0])) * (math.acos(cosine) + offset)
-            return put_at_angle(draw_scene(rng, (d, a, b, c), EVEN), angle)
+            return (d, a, b, c), command_angle(angle)
 
 
-def change_point(rng: np.random.Generator) -> Scene:
+def _draw_near_change_point(rng: np.random.Generator) -> Place:
     """Draw within 1e-8..1 rad of a change point: parallelograms, kites, any s + l = p + q, some off by as little."""
     x, y = rng.uniform(0.1, 1.0, 2)
     kind = rng.integers(0, 4)
@@ -91,18 +87,21 @@ def change_point(rng: np.random.Generator) -> Scene:
     if rng.random() < 0.3:
         k = int(rng.integers(0, 4))
         lengths = tuple(v * (1.0 + 0.1 * distance**2) if i == k else v for i, v in enumerate(lengths))
-    return put_at_angle(draw_scene(rng, lengths, EVEN), straight + distance)
+    return lengths, command_angle(straight + distance)
 
 
-def ratios(rng: np.random.Generator) -> Scene:
+def _draw_with_ratios(rng: np.random.Generator) -> Place:
     """Draw crank to ground, coupler to diagonal, and masses, each in ratios from 1e-6 to 1e6."""
     lengths, angle = draw_uneven_lengths(rng, draw_decades(-6.0, 6.0), draw_decades(-1.0, 1.0))
-    return put_at_angle(draw_scene(rng, lengths, UNEVEN), angle)
+    return lengths, command_angle(angle)
+
+
+ANYWHERE = RandomFamily(_draw_anywhere, EVEN)
 
 
 def scales(rng: np.random.Generator) -> Scene:
     """Multiply all lengths by 1e-9..1e9."""
-    scene = random(rng)
+    scene = ANYWHERE.draw(rng)
     link, k = scene.linkage, float(10.0 ** rng.uniform(-9, 9))
     bars = []
     for number in MOVING_BARS:
@@ -116,7 +115,7 @@ def scales(rng: np.random.Generator) -> Scene:
 
 def speeds(rng: np.random.Generator) -> Scene:
     """Draw omega_2 up to 1e6 rad/s, alpha_2 up to 1e12 rad/s^2, and the static case."""
-    scene = random(rng)
+    scene = ANYWHERE.draw(rng)
     omega = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 6)) * bool(rng.random() < 0.9)
     alpha = float(rng.choice([0.0, rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 12)]))
     return replace(scene, motion=scene.motion.replace(speed=omega, acceleration=alpha))
@@ -129,7 +128,7 @@ def draw_deviation(rng: np.random.Generator) -> float:
 
 def massless(rng: np.random.Generator) -> Scene:
     """Draw a linkage of the random family without masses, loads and effects: only what is added makes forces."""
-    scene = random(rng)
+    scene = ANYWHERE.draw(rng)
     d, a, b, c = scene.linkage.lengths
     return replace(scene, linkage=FourBar(d, Bar(a), Bar(b), Bar(c), scene.linkage.ground_angle), loads=(), effects=())
 
@@ -193,13 +192,13 @@ def tables(rng: np.random.Generator) -> Scene:
 
 def drives(rng: np.random.Generator) -> Scene:
     """Draw a cylinder between any two bars."""
-    return _put_cylinder(random(rng), rng, *rng.choice((1, *MOVING_BARS), 2, replace=False).tolist())
+    return _put_cylinder(ANYWHERE.draw(rng), rng, *rng.choice((1, *MOVING_BARS), 2, replace=False).tolist())
 
 
 def strokes(rng: np.random.Generator) -> Scene:
     """Command the stroke of a cylinder from the ground to bar 2 or 4, as it comes out where the input is."""
     bar = int(rng.choice([2, 4]))
-    scene = _put_cylinder(random(rng), rng, 1, bar)
+    scene = _put_cylinder(ANYWHERE.draw(rng), rng, 1, bar)
     found = solve(scene, "acceleration")
     assert found.stroke is not None and found.stroke_speed is not None
     assert found.theta_3 is not None and found.theta_4 is not None and found.omega_4 is not None
@@ -241,16 +240,16 @@ def near_pins(rng: np.random.Generator) -> Scene:
         linkage = FourBar(scene.linkage.ground, bars[2], bars[3], bars[4], scene.linkage.ground_angle)
         return replace(scene, linkage=linkage, loads=(Load(near, force, (distance, angle), 0.0, frame),))
     if kind == 1:
-        return replace(random(rng), drive_bar=None, drive=LinearDrive(start, end))  # type: ignore[arg-type]
+        return replace(ANYWHERE.draw(rng), drive_bar=None, drive=LinearDrive(start, end))  # type: ignore[arg-type]
     stiffness, length = float(rng.uniform(10.0, 1000.0)), float(rng.uniform(0.0, 2.0))
     return replace(scene, effects=(Springs((Spring(start, end, stiffness, length),)),))
 
 
 FAMILIES: dict[str, Callable[[np.random.Generator], Scene]] = {
-    "random": random,
-    "limit": limit,
-    "change_point": change_point,
-    "ratios": ratios,
+    "random": ANYWHERE.draw,
+    "limit": RandomFamily(_draw_near_limit, EVEN).draw,
+    "change_point": RandomFamily(_draw_near_change_point, EVEN).draw,
+    "ratios": RandomFamily(_draw_with_ratios, UNEVEN).draw,
     "scales": scales,
     "speeds": speeds,
     "springs": springs,

@@ -33,7 +33,15 @@ from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.store import Store
-from fourbar_validation.scenes.random import Ranges, draw_chance, draw_decades, draw_product, draw_scene, draw_uniform
+from fourbar_validation.scenes.random import (
+    Place,
+    RandomFamily,
+    Ranges,
+    draw_chance,
+    draw_decades,
+    draw_product,
+    draw_uniform,
+)
 
 POSITIONS = 2
 SIZES = {False: draw_decades(-0.7, 0.7), True: draw_decades(-6.0, 6.0)}
@@ -84,19 +92,21 @@ def draw_fuzz_scene(seed: int, index: int) -> Scene:
     rng = np.random.default_rng([seed, index])
     while True:
         try:
-            return _draw(rng, index % 2 == 1)
+            scene = FAMILIES[index % 2 == 1].draw(rng)
         except InputError:
             continue
+        alpha = float(rng.uniform(-10.0, 10.0)) if rng.random() < 1.0 / 3.0 else scene.motion.alpha_2
+        return replace(scene, motion=scene.motion.replace(acceleration=alpha))
 
 
-def _draw(rng: np.random.Generator, hard: bool) -> Scene:
+def _draw_place(hard: bool, rng: np.random.Generator) -> Place:
     size = SIZES[hard](rng)
     lengths = tuple(float(x * size) for x in _draw_lengths(rng, hard))
-    scene = draw_scene(rng, lengths, RANGES[hard])
-    psi = _draw_angles(rng, hard, lengths)
-    alpha = float(rng.uniform(-10.0, 10.0)) if rng.random() < 1.0 / 3.0 else scene.motion.alpha_2
-    motion = scene.motion.replace(angle=scene.linkage.ground_angle + psi, acceleration=alpha)
-    return replace(scene, motion=motion)
+    return lengths, lambda rng, linkage: linkage.ground_angle + _draw_angles(rng, hard, lengths)
+
+
+FAMILIES = {hard: RandomFamily(partial(_draw_place, hard), RANGES[hard]) for hard in (False, True)}
+"""Families of the scenes: ordinary, adversarial."""
 
 
 def _draw_lengths(rng: np.random.Generator, hard: bool) -> Any:

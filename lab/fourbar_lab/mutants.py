@@ -131,8 +131,7 @@ class HangError(Exception):
 
 def choose_scenes() -> list[Scene]:
     """Choose random linkages of every type, drive and branch, and a parallelogram near its change point."""
-    from fourbar_validation.scenes.hard_families import approach_change_point, sweep_turn
-    from fourbar_validation.scenes.hard_linkages import dress
+    from fourbar_validation.scenes.hard_families import approach_change_point, dress, sweep_turn
     from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 
     chosen = [draw_random_scene(0, index, tuple(DrawnType)) for index in range(SCENES)]

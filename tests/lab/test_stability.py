@@ -9,8 +9,7 @@ import pytest
 
 import fourbar
 from fourbar.show.block import write_block
-from fourbar_lab.families import FAMILIES
-from fourbar_lab.families import random as draw_random
+from fourbar_lab.families import ANYWHERE, FAMILIES
 from fourbar_lab.slopes import judge_slopes
 from fourbar_lab.stability import run
 from fourbar_lab.tally import CHANCE, TOO_SMALL, USELESS, Tally, is_by_chance
@@ -130,7 +129,7 @@ def test_a_derivative_that_is_left_out_is_a_failure(monkeypatch: pytest.MonkeyPa
         judge_slopes(scene, tally := Tally(), "", "numpy")
         return tally
 
-    scene = draw_random(np.random.default_rng(0))
+    scene = ANYWHERE.draw(np.random.default_rng(0))
     held = replace(scene, motion=scene.motion.replace(speed=0.0), effects=(fourbar.effects.Friction.at(A=0.1, B=0.1),))
     apart = replace(scene, linkage=fourbar.uniform(0.3, 0.2, 0.1, 0.1), motion=scene.motion.replace(angle=3.0))
     assert (judged(held).no_torque, judged(apart).not_assembled) == (1, 1) and judged(scene).holds()

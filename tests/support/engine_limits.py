@@ -32,8 +32,14 @@ from fourbar_validation.engines.limits import (
 from fourbar_validation.engines.mujoco import simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.inverse import MujocoTree
-from fourbar_validation.scenes.hard_families import scale_loads, sweep_turn
-from fourbar_validation.scenes.hard_linkages import draw_linkage, dress, replace_bars, set_angles
+from fourbar_validation.scenes.hard_families import (
+    draw_linkage,
+    dress,
+    replace_bars,
+    scale_loads,
+    set_angles,
+    sweep_turn,
+)
 from fourbar_validation.scenes.random import DrawnType
 
 

@@ -50,7 +50,7 @@ JUDGED_BY = {
     "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
     "validation/engines/test_guests.py": "validation: engine; validation/engines: keeper output processes workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects free_body_stroke",
-    "validation/engines/test_hard_suite.py": "validation/scenes: hard_families hard_linkages; "
+    "validation/engines/test_hard_suite.py": "validation/scenes: hard_families; "
     "validation/engines: exact; validation/engines/mujoco: shipped",
     "validation/report/test_sections.py": "validation/report: hard_picture",
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives led monitor motions runner",

@@ -26,8 +26,16 @@ from fourbar_validation.engines.witnesses import Predictor, Witness, make_nearby
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.released import make_pendulum
 from fourbar_validation.scenes import hard_families as families
-from fourbar_validation.scenes.hard_families import FAMILIES, TOGGLE, Family, toggle
-from fourbar_validation.scenes.hard_linkages import draw_linkage, dress, find_collinear_3_4, set_angles
+from fourbar_validation.scenes.hard_families import (
+    FAMILIES,
+    TOGGLE,
+    Family,
+    draw_linkage,
+    dress,
+    find_collinear_3_4,
+    set_angles,
+    toggle,
+)
 from fourbar_validation.scenes.random import DrawnType
 from tests.support.engine_limits import MEASURED, Measured
 from tests.support.scenes import crank_rocker

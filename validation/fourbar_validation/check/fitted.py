@@ -21,7 +21,7 @@ from fourbar.solve import solve
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import Array, name_quantity
 from fourbar_validation.compare.tolerance import compute_difference, replace_zero_size
-from fourbar_validation.scenes.hard_linkages import replace_bars
+from fourbar_validation.scenes.hard_families import replace_bars
 
 OTHER_UNITS = {
     "rad": ("rad", "deg"),

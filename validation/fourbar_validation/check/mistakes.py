@@ -17,7 +17,7 @@ from fourbar.solve import solve
 from fourbar_validation.check.fitted import ENOUGH, find_fitted
 from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import Array
-from fourbar_validation.scenes.hard_linkages import list_moving, replace_bars
+from fourbar_validation.scenes.hard_families import list_moving, replace_bars
 
 SHOWN = 5
 """Explanations that are printed."""

@@ -16,8 +16,10 @@ from fourbar_validation.engines.prediction import predict_in_world_axes
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.report.colours import choose_style
 from fourbar_validation.report.svg import write_svg
-from fourbar_validation.scenes.hard_families import CHANGE_POINTS, CRANK, ROCKER
-from fourbar_validation.scenes.hard_linkages import (
+from fourbar_validation.scenes.hard_families import (
+    CHANGE_POINTS,
+    CRANK,
+    ROCKER,
     draw_linkage,
     dress,
     find_collinear_2_3,

@@ -1,9 +1,10 @@
-"""Random linkages and scenes, from stated types and ranges and a random generator alone."""
+"""Random scenes: a family is data, and every scene follows from its family and a random generator alone."""
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,17 +25,17 @@ def draw_uniform(low: float, high: float) -> Draw:
 
 
 def draw_decades(low: float, high: float) -> Draw:
-    """Ten to a power between two numbers."""
+    """Return a draw of ten to a power between two numbers."""
     return lambda rng: float(10.0 ** rng.uniform(low, high))
 
 
 def draw_chance(share: float, draw: Draw, otherwise: float = 0.0) -> Draw:
-    """Drawn in this share of all cases."""
+    """Return a draw that is made in this share of all cases."""
     return lambda rng: draw(rng) if rng.random() < share else otherwise
 
 
 def draw_product(*draws: Draw) -> Draw:
-    """Draw the product of several draws."""
+    """Return a draw of the product of several draws."""
     return lambda rng: math.prod(draw(rng) for draw in draws)
 
 
@@ -74,6 +75,95 @@ class Ranges:
     """True if the mass is per metre."""
 
 
+Angles = Callable[[np.random.Generator, FourBar], Any]
+"""Commanded theta_2, rad, of a linkage whose bars are drawn."""
+Place = tuple[Sequence[float], Angles]
+"""Lengths (ground, input, coupler, output), m, and the angles that are commanded of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class RandomFamily:
+    """Random scenes of one kind."""
+
+    draw_place: Callable[[np.random.Generator], Place]
+    ranges: Ranges
+
+    def draw(self, rng: np.random.Generator) -> Scene:
+        """Draw a scene."""
+        lengths, draw_angles = self.draw_place(rng)
+        scene = draw_scene(rng, lengths, self.ranges)
+        return replace(scene, motion=scene.motion.replace(angle=draw_angles(rng, scene.linkage)))
+
+
+def command_angle(psi: float) -> Angles:
+    """Command the angle theta_2 - theta_1, rad."""
+    return lambda _, linkage: linkage.ground_angle + psi
+
+
+def draw_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> list[Bar]:
+    """Draw bars 2, 3, 4 of these lengths (m)."""
+    bars = []
+    for length in lengths:
+        mass = ranges.mass(rng) * (length if ranges.by_length else 1.0)
+        centre = (length * ranges.centre(rng), ranges.centre_angle(rng))
+        bars.append(Bar(length, mass, mass * length**2 * ranges.inertia(rng), centre))
+    return bars
+
+
+def draw_scene(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> Scene:
+    """Draw a scene on (ground, input, coupler, output), m, at theta_2 = 0."""
+    d, *moving = (float(length) for length in lengths)
+    bars = draw_bars(rng, moving, ranges)
+    linkage = FourBar(d, bars[0], bars[1], bars[2], ranges.ground_angle(rng))
+    weight = 9.81 * (math.fsum(bar.mass for bar in bars) or 1.0)
+    loads = tuple(_draw_load(rng, linkage, weight, ranges) for _ in range(int(rng.integers(0, 3))))
+    effects: list[Any] = [Gravity()] if rng.random() < ranges.gravity else []
+    couple = 0.1 * weight * max(moving)
+    for kind, share in ((Viscous, ranges.viscous), (Friction, ranges.friction)):
+        if rng.random() < share:
+            effects.append(kind.at(**{pin: couple * float(rng.random()) for pin in PINS if rng.random() < 0.5}))
+    effects += _draw_springs(rng, linkage, weight, ranges) if ranges.sprung else []
+    omega = float(rng.choice([-1.0, 1.0])) * ranges.speed(rng)
+    alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
+    motion = Motion(0.0, omega, alpha, OPEN if rng.random() < 0.5 else CROSSED)
+    return Scene(linkage, motion, int(rng.choice(MOVING_BARS)), loads, tuple(effects))
+
+
+def _draw_load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> Load:
+    """Draw a force and a moment, or one of them, on any bar."""
+    bar = int(rng.choice(MOVING_BARS))
+    length, size = linkage.bar(bar).length, weight * ranges.load(rng)
+    force = None if rng.random() < ranges.without_force else (size, ANY_ANGLE(rng))
+    at = (length * ranges.arm(rng), ANY_ANGLE(rng))
+    moment = float(rng.choice([0.0, size * length * EITHER_SIGN(rng)]))
+    return Load(bar, force, at, moment, "bar" if rng.random() < 0.5 else "world")
+
+
+def _draw_springs(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> list[Any]:
+    """Draw springs, torsion springs and flywheels that carry the weights about as they are loaded."""
+    effects: list[Any] = []
+    size = weight * abs(ranges.load(rng))
+    if rng.random() < ranges.sprung:
+        one, other = (int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False))
+        start, end = (
+            SpringEnd(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, other)
+        )
+        length = max(linkage.lengths)
+        effects.append(
+            Springs((Spring(start, end, (size or 1.0) / length, length * ANY_PART(rng), size * EITHER_SIGN(rng)),))
+        )
+    if rng.random() < ranges.sprung:
+        couple = size * max(linkage.lengths[1:])
+        effects.append(
+            Torsion.at(**{str(rng.choice(list(PINS))): (couple or 1.0, ANY_ANGLE(rng), couple * EITHER_SIGN(rng))})
+        )
+    if rng.random() < ranges.sprung:
+        bar = int(rng.choice([2, 4]))
+        inertia = (linkage.bar(bar).mass or 1.0) * linkage.bar(bar).length ** 2
+        effects.append(Flywheel(inertia * ranges.inertia(rng), bar))
+    return effects
+
+
 class DrawnType(Enum):
     """Type of a linkage by the motion of its input and output."""
 
@@ -92,7 +182,7 @@ SHORTEST = {
 }
 """Index in (ground, input, coupler, output) of the shortest bar of a Grashof linkage of each type."""
 UNEVEN_TYPE = "uneven"
-"""Named in place of types: see `draw_uneven_scene`."""
+"""Name that stands for the family `UNEVEN_FAMILY` in place of types."""
 POSITIONS = 37
 CLEARANCE = 0.02
 """A random linkage keeps this part of its longest bar away from the change-point equality s + l = p + q."""
@@ -114,70 +204,6 @@ def draw_lengths(rng: np.random.Generator, kind: DrawnType) -> tuple[float, floa
             others = list(rng.permutation(lengths[1:]))
             others.insert(SHORTEST[kind], shortest)
             return tuple(float(x) for x in others)  # type: ignore[return-value]
-
-
-def draw_bars(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> list[Bar]:
-    """Draw bars 2, 3, 4 of these lengths (m)."""
-    bars = []
-    for length in lengths:
-        mass = ranges.mass(rng) * (length if ranges.by_length else 1.0)
-        centre = (length * ranges.centre(rng), ranges.centre_angle(rng))
-        bars.append(Bar(length, mass, mass * length**2 * ranges.inertia(rng), centre))
-    return bars
-
-
-def draw_scene(rng: np.random.Generator, lengths: Sequence[float], ranges: Ranges) -> Scene:
-    """Draw a scene on (ground, input, coupler, output), m, at theta_2 = 0."""
-    d, *moving = (float(length) for length in lengths)
-    bars = draw_bars(rng, moving, ranges)
-    linkage = FourBar(d, bars[0], bars[1], bars[2], ranges.ground_angle(rng))
-    weight = 9.81 * (math.fsum(bar.mass for bar in bars) or 1.0)
-    loads = tuple(_load(rng, linkage, weight, ranges) for _ in range(int(rng.integers(0, 3))))
-    effects: list[Any] = [Gravity()] if rng.random() < ranges.gravity else []
-    couple = 0.1 * weight * max(moving)
-    for kind, share in ((Viscous, ranges.viscous), (Friction, ranges.friction)):
-        if rng.random() < share:
-            effects.append(kind.at(**{pin: couple * float(rng.random()) for pin in PINS if rng.random() < 0.5}))
-    effects += _draw_springs(rng, linkage, weight, ranges) if ranges.sprung else []
-    omega = float(rng.choice([-1.0, 1.0])) * ranges.speed(rng)
-    alpha = float(rng.choice([0.0, omega**2 * ranges.acceleration(rng)]))
-    motion = Motion(0.0, omega, alpha, OPEN if rng.random() < 0.5 else CROSSED)
-    return Scene(linkage, motion, int(rng.choice(MOVING_BARS)), loads, tuple(effects))
-
-
-def _load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> Load:
-    """Draw a force and a moment, or one of them, on any bar."""
-    bar = int(rng.choice(MOVING_BARS))
-    length, size = linkage.bar(bar).length, weight * ranges.load(rng)
-    force = None if rng.random() < ranges.without_force else (size, ANY_ANGLE(rng))
-    at = (length * ranges.arm(rng), ANY_ANGLE(rng))
-    moment = float(rng.choice([0.0, size * length * EITHER_SIGN(rng)]))
-    return Load(bar, force, at, moment, "bar" if rng.random() < 0.5 else "world")
-
-
-def _draw_springs(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> list[Any]:
-    """Springs, torsion springs and flywheels that carry the weights about as they are loaded."""
-    result: list[Any] = []
-    size = weight * abs(ranges.load(rng))
-    if rng.random() < ranges.sprung:
-        one, other = (int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False))
-        start, end = (
-            SpringEnd(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, other)
-        )
-        length = max(linkage.lengths)
-        result.append(
-            Springs((Spring(start, end, (size or 1.0) / length, length * ANY_PART(rng), size * EITHER_SIGN(rng)),))
-        )
-    if rng.random() < ranges.sprung:
-        couple = size * max(linkage.lengths[1:])
-        result.append(
-            Torsion.at(**{str(rng.choice(list(PINS))): (couple or 1.0, ANY_ANGLE(rng), couple * EITHER_SIGN(rng))})
-        )
-    if rng.random() < ranges.sprung:
-        bar = int(rng.choice([2, 4]))
-        inertia = (linkage.bar(bar).mass or 1.0) * linkage.bar(bar).length ** 2
-        result.append(Flywheel(inertia * ranges.inertia(rng), bar))
-    return result
 
 
 def draw_uneven_lengths(rng: np.random.Generator, crank: Draw, coupler: Draw) -> tuple[Sequence[float], float]:
@@ -212,14 +238,18 @@ UNEVEN = Ranges(
 """Masses, inertias, arms, loads and speeds each over ten decades."""
 
 
-def draw_uneven_scene(seed: int, index: int) -> Scene:
-    """Draw a linkage whose lengths, masses, arms and loads are in ratios of 1e-5 to 1e5, with every kind of effect."""
-    rng = np.random.default_rng([seed, index])
+def _draw_uneven_place(rng: np.random.Generator) -> Place:
     lengths, psi = draw_uneven_lengths(rng, TEN_DECADES, TEN_DECADES)
     size = 10.0 ** rng.uniform(-3.0, 3.0)
-    scene = draw_scene(rng, [size * x for x in lengths], UNEVEN)
-    theta_2 = scene.linkage.ground_angle + psi + np.array([0.0, 1e-3, rng.uniform(-3.0, 3.0)])
-    return replace(scene, motion=scene.motion.replace(angle=theta_2), title=f"uneven {index}")
+
+    def draw_angles(rng: np.random.Generator, linkage: FourBar) -> Any:
+        return linkage.ground_angle + psi + np.array([0.0, 1e-3, rng.uniform(-3.0, 3.0)])
+
+    return [size * x for x in lengths], draw_angles
+
+
+UNEVEN_FAMILY = RandomFamily(_draw_uneven_place, UNEVEN)
+"""Linkages whose lengths, masses, arms and loads are in ratios of 1e-5 to 1e5, with every kind of effect."""
 
 
 MACHINES = Ranges(
@@ -234,16 +264,21 @@ MACHINES = Ranges(
 """Bars as machines have them."""
 
 
-def draw_random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
-    """Draw random bars, loads, gravity and drive, at POSITIONS positions over the range the linkage can move.
-
-    `types`: taken in turn; none of them: an uneven one.
-    """
-    if not types:
-        return draw_uneven_scene(seed, index)
-    rng = np.random.default_rng([seed, index])
-    kind = types[index % len(types)]
+def _draw_machine_place(kind: DrawnType, rng: np.random.Generator) -> Place:
+    """Draw a linkage of a type, with POSITIONS angles over the range in which it can move."""
     size = 10.0 ** rng.uniform(-1.5, 1.0)
-    scene = draw_scene(rng, [size * x for x in draw_lengths(rng, kind)], MACHINES)
-    sweep = Sweep(*choose_range(scene.linkage), POSITIONS - 1)
-    return replace(scene, motion=scene.motion.replace(angle=sweep), title=f"{kind.value} {index}")
+    lengths = [size * x for x in draw_lengths(rng, kind)]
+    return lengths, lambda _, linkage: Sweep(*choose_range(linkage), POSITIONS - 1)
+
+
+MACHINE_FAMILIES = {kind: RandomFamily(partial(_draw_machine_place, kind), MACHINES) for kind in DrawnType}
+
+
+def draw_random_scene(seed: int, index: int, types: tuple[DrawnType, ...]) -> Scene:
+    """Draw a scene of one of the types, taken in turn; without types an uneven one."""
+    rng = np.random.default_rng([seed, index])
+    family, name = UNEVEN_FAMILY, UNEVEN_TYPE
+    if types:
+        kind = types[index % len(types)]
+        family, name = MACHINE_FAMILIES[kind], kind.value
+    return replace(family.draw(rng), title=f"{name} {index}")
