@@ -20,7 +20,7 @@ JUDGED_BY = {
     # what a command reads, does and prints is tested through the command
     "fourbar/cli/test_cli.py": "fourbar/cli: evaluate export given; fourbar/show: tables",
     "whole/test_exits.py": "fourbar: errors; validation: cli; validation/report: terminal; lab: cli fuzz_files",
-    "whole/test_kills.py": "validation/run: pool run selection store",
+    "whole/test_kills.py": "validation/run: pool run store",
     "whole/test_results_format.py": "validation/compare: columns",
     "whole/test_package.py": "validation: places",
     # one table or one evaluation, whose rows are no use alone
@@ -41,7 +41,7 @@ JUDGED_BY = {
     "studies style symbols view",
     # a comparison is tested by witnesses with given answers
     "validation/run/test_judge.py": "validation/compare: answer compare effects rows; "
-    "validation/run: answers command identities pictures question run",
+    "validation/run: answers command identities question run",
     "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limit_positions "
     "transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
