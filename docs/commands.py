@@ -29,8 +29,8 @@ branch: open
 TAIL = """\
 ## What analyze prints
 
-One block, the same on a terminal and in a pipe ([an example](tutorial.md#2-its-torque-and-pin-forces)). Positions
-are given by what is commanded: an angle, a stroke or the time.
+It prints one block ([an example](tutorial.md#2-its-torque-and-pin-forces)). Positions are given by what is commanded:
+an angle, a stroke or the time.
 
 | motion | the block shows |
 |---|---|
@@ -42,17 +42,17 @@ are given by what is commanded: an angle, a stroke or the time.
 | a cylinder drives | force, speed, stroke and the range over which it assembles; the bore with `--pressure` |
 | dry friction at rest | the range of torque or force that holds |
 
-Peaks of a sweep or a motion law are located between the positions, as are the reversals of dry friction. Towards a
-pole there is no largest value, and the block says so.
+Peaks of a sweep or a motion law are located between the positions. Towards a pole there is no largest value, and the
+block says so.
 
-Block and `classify` use imperial units where `lengths.ground` is in inches or feet, otherwise SI with prefixes.
+The block and `classify` use imperial units where `lengths.ground` is in inches or feet, otherwise SI with prefixes.
 `--units` takes `SI`, `imperial` or a list such as `"mm N N.mm deg rpm kW"`.
 
 ## JSON and CSV
 
-Both hold SI units and radians with every digit. The CSV has one line per position with every quantity; the JSON
-adds the object `motor` with the numbers of the block. Where there is no value there is `null` or an empty cell, and
-`status` says why:
+Both hold SI units and radians with every digit. The CSV has one line per position with every
+[quantity](results.md#the-quantities); the JSON adds the object `motor` with the numbers of the block. A missing value
+is `null` or an empty cell, and `status` says why:
 
 | status | meaning |
 |---|---|
@@ -67,18 +67,6 @@ adds the object `motor` with the numbers of the block. Where there is no value t
 | `overflow` | a number is beyond the range of doubles |
 | `invalid` | a member of a study has numbers that a scene refuses |
 
-## Models for simulators
-
-The MJCF opens assembled and moving in MuJoCo's viewer, `python -m mujoco.viewer --mjcf=crank_rocker.xml`. Its
-comments name the numbers that hold the torque and the pin forces, and the instant to which they belong. A heavy
-flywheel keeps the speed; with `--drive motor` the driven bar has a motor, or the cylinder an actuator, whose `ctrl`
-is its couple in N m or its force in N. SDF and USD hold no loads: `--without-loads` leaves them to your program.
-
-## Rest
-
-`fourbar equilibrium SCENE` lists where the linkage stays without a drive, stable or not, and how fast it swings
-there: [an example](guide-designer.md#does-it-stay).
-
 ## Exit status
 
 | status | meaning |
@@ -89,11 +77,16 @@ there: [an example](guide-designer.md#does-it-stay).
 | 3 | the environment or the program failed |
 | 130 | interrupted |
 
-Files are written atomically. Completion in the shell: `eval "$(_FOURBAR_COMPLETE=bash_source fourbar)"`
-(`zsh_source`, `fish_source` likewise).
+Files are written atomically. Shell completion: `eval "$(_FOURBAR_COMPLETE=bash_source fourbar)"` (`zsh_source`,
+`fish_source` likewise).
 
 *`python docs/commands.py` writes this page.*
 """
+
+
+def list_rows(command: click.Command) -> list[str]:
+    """Return the rows of a command's options."""
+    return [describe(option) for option in command.params if isinstance(option, click.Option)]
 
 
 def describe(option: click.Option) -> str:
@@ -102,23 +95,37 @@ def describe(option: click.Option) -> str:
     names = ", ".join((*option.opts, *option.secondary_opts))
     takes = choices or option.metavar or ("" if option.is_flag else str(option.type.name).upper())
     words = " ".join((names, takes)).strip().replace("|", "\\|")
-    return f"| `{words}` | {option.help or 'Write to FILE.'} |"
+    return f"| `{words}` | {option.help} |"
+
+
+def write_table(rows: list[str], last: str = "") -> str:
+    """Write rows of options as a table, with a third column of this heading if there is one."""
+    head = f"| option | meaning |{last and f' {last} |'}"
+    return "\n".join((head, "|---|---|" + ("---|" if last else ""), *rows)) + "\n"
 
 
 def text() -> str:
-    """Return the page."""
+    """Return the page; a row that several commands share stands once, in front."""
     context = click.Context(group)
-    parts = [HEAD]
-    for name in group.list_commands(context):
-        command = group.get_command(context, name)
+    commands = {name: group.get_command(context, name) for name in group.list_commands(context)}
+    rows = {name: list_rows(command) for name, command in commands.items() if command is not None}
+    users: dict[str, list[str]] = {}
+    for name, command_rows in rows.items():
+        for row in command_rows:
+            users.setdefault(row, []).append(f"`{name}`")
+    shared = {row: f"{row} {', '.join(names)} |" for row, names in users.items() if len(names) > 2}
+    parts = [HEAD, "## Options of several commands\n", write_table([*shared.values()], "commands")]
+    for name, command in commands.items():
         assert command is not None
-        options = [option for option in command.params if isinstance(option, click.Option)]
-        required = [f"{option.opts[0]} {option.metavar}" for option in options if option.required]
+        required = [
+            f"{option.opts[0]} {option.metavar}"
+            for option in command.params
+            if isinstance(option, click.Option) and option.required
+        ]
         usage = " ".join((*command.collect_usage_pieces(click.Context(command))[1:], *required))
         parts.append(f"## {name}\n\n`fourbar {name} {usage}`: {command.get_short_help_str(500)}\n")
-        rows = [describe(option) for option in options]
-        if rows:
-            parts.append("\n".join(("| option | meaning |", "|---|---|", *rows)) + "\n")
+        if special := [row for row in rows[name] if row not in shared]:
+            parts.append(write_table(special))
     return "\n".join((*parts, TAIL))
 
 

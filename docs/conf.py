@@ -4,9 +4,12 @@ Formulas become MathML, which browsers draw by themselves: the site has no scrip
 """
 
 import re
+import runpy
+from pathlib import Path
 
 from docutils.nodes import SkipNode
 from latex2mathml.converter import convert
+from pygments.lexers.special import TextLexer
 
 import fourbar
 
@@ -23,11 +26,17 @@ html_math_renderer = "mathml"
 html_show_copyright = False
 exclude_patterns = ["ci"]
 SPACE = '<mspace width="0.17em" />'
-"""On both sides of a function's name, as TeX has it."""
+"""Space on both sides of a function's name, as in TeX."""
+
+
+def append_reference(app, page, source):
+    """Append signatures and docstrings to the page of the API."""
+    if page == "api":
+        source[0] += "\n" + runpy.run_path(str(Path(__file__).with_name("api.py")))["text"]()
 
 
 def setup(app):
-    """Let formulas be written as MathML, in the line or below it."""
+    """Write formulas as MathML, in the line or below it, and complete the page of the API."""
 
     def written(display):
         def write(page, node):
@@ -40,3 +49,5 @@ def setup(app):
         return write, None
 
     app.add_html_math_renderer("mathml", written("inline"), written("block"))
+    app.add_lexer("csv", TextLexer)
+    app.connect("source-read", append_reference)

@@ -136,7 +136,14 @@ def mjcf(
 
 @click.command()
 @given.scene_argument
-@click.option("--for", "reader", type=click.Choice(["gazebo", "drake"]), default="gazebo", show_default=True)
+@click.option(
+    "--for",
+    "reader",
+    type=click.Choice(["gazebo", "drake"]),
+    default="gazebo",
+    show_default=True,
+    help="Simulator that will load the file.",
+)
 @without_loads_option
 @given.text_option(".sdf", ".world", ".xml", required=True)
 def sdf(scene: Path, reader: str, without_loads: bool, out: Path) -> None:

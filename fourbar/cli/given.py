@@ -26,7 +26,7 @@ def _read_units(context: click.Context, parameter: click.Parameter, text: str | 
 
 
 scene_argument = click.argument("scene", type=FILE)
-out_option = click.option("-o", "--out", type=FILE, required=True, metavar="FILE")
+out_option = click.option("-o", "--out", type=FILE, required=True, metavar="FILE", help="Write to FILE.")
 TABLES = (".txt", ".json")
 units_option = click.option(
     "--units",
@@ -51,7 +51,7 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
             raise InputError("path", str(out), f"what is written ends in {', '.join(endings)}, or has no ending")
         return out
 
-    told = None if required else "Write it to FILE instead of printing it."
+    told = "Write to FILE." if required else "Write to FILE instead of printing."
     return click.option("-o", "--out", type=FILE, required=required, callback=require_ending, metavar="FILE", help=told)
 
 

@@ -1,6 +1,6 @@
 """The effects a scene can call for, one per file; what a scene does not name does not exist.
 
-An effect is a frozen subclass of `Effect` and holds physics alone; docs/adding-an-effect.md shows one
+An effect is a frozen subclass of `Effect` and holds physics alone; docs/extending.md shows one
 being added. Each file is imported when its effect is first named.
 """
 
