@@ -65,8 +65,7 @@ JUDGED_BY = {
     "ladder thesis_dynamics thesis_positions thirteen",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "
     "record render scenes; validation/report: junit",
-    "validation/report/test_report.py": "validation/report: colours costs figures machine record summary svg "
-    "templating",
+    "validation/report/test_report.py": "validation/report: figures machine record summary svg templating",
     # studies: each through its command
     "lab/test_bench.py": "lab: contenders",
     "lab/test_stability.py": "lab: families slopes tally",

@@ -8,6 +8,7 @@ import math
 import re
 from dataclasses import replace
 from functools import cache
+from html import unescape
 from importlib import import_module
 from pathlib import Path
 
@@ -15,17 +16,15 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar_validation.compare.rows import AGREES, FAILS, Row, write_rows
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_rows
 from fourbar_validation.engines import guests
 from fourbar_validation.engines.further import FURTHER
-from fourbar_validation.engines.witnesses import WITNESSES
-from fourbar_validation.report import colours
-from fourbar_validation.report.colours import choose_style
-from fourbar_validation.report.costs import collect_cost_points
+from fourbar_validation.engines.witnesses import WITNESSES, WORK
+from fourbar_validation.report import svg
 from fourbar_validation.report.figures import STRETCHES, find_worst_of_segments
 from fourbar_validation.report.html import ALL_OPEN, Section, write_html, write_markdown
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.summary import Summary
+from fourbar_validation.report.summary import OWN, Summary
 from fourbar_validation.report.svg import FLOOR
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.judge import judge_for_report
@@ -154,14 +153,23 @@ def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
     assert len(find_worst_of_segments(np.array([FLOOR]), 0.5)) == 1
 
 
-def test_costs_are_those_of_the_run() -> None:
-    points, formulas = collect_cost_points([demo()])
-    timings = {timing.engine: timing for timing in demo().timings}
-    errors = {row.engine: row.error for row in demo().rows if row.quantity == "torque"}
-    assert formulas == [1e6 * timings["formulas"].seconds / 37]
-    timed = {name: error for name, error in errors.items() if name in timings}  # what is shipped besides is not timed
-    assert points == {name: [(1e6 * timings[name].seconds / 37, error)] for name, error in timed.items()}
-    assert set(points) == {"pinocchio-inverse", "mujoco-inverse", "free-body"}
+def test_the_times_of_engines_are_those_of_the_run() -> None:
+    """The median over scenes; of an engine that refused none, and beside our own consistency that of the formulas."""
+    scenes = []
+    for k in (1.0, 2.0, 8.0):
+        timings = [replace(timing, seconds=k * timing.seconds) for timing in demo().timings]
+        scenes.append(replace(demo(draw=False), timings=timings))
+    lines = {line.name: line for line in summary_of(scenes).engines}
+    of_one = {timing.engine: timing for timing in demo().timings}
+    assert set(of_one) == {"formulas", "pinocchio-inverse", "mujoco-inverse", "free-body"}
+    for engine, timing in of_one.items():
+        line = lines[OWN if engine == "formulas" else engine]
+        assert line.microseconds == pytest.approx(2.0 * 1e6 * timing.seconds / 37, rel=1e-12)
+        assert line.times_formulas == pytest.approx(timing.seconds / of_one["formulas"].seconds, rel=1e-12)
+        assert WORK[engine] in unescape(report(scenes)[1]) and line.work == WORK[engine]
+    refused = replace(demo().rows[0], engine="free-body", verdict=REFUSES)
+    silent = summary_of([replace(demo(draw=False), rows=[*demo().rows, refused])])
+    assert math.isnan(next(line for line in silent.engines if line.name == "free-body").microseconds)
 
 
 @pytest.mark.slow
@@ -204,7 +212,6 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.Monkey
     assert [w.row.scene for w in summary.worst[:2]] == ["scene-099", "scene-098"]
     assert {scene.name for scene in summary.shown} == {f"scene-0{number}" for number in range(80, 100)}
     assert summary.refusals == [("mujoco-simulated", "falls to 0.0e+00; below 0.05 it is not simulated", 100)]
-    assert [cost.setting for cost in summary.costs if cost.engine == "sim"] == ["RK4 628/rev to 727/rev"]
     assert summary.orders[0][0] == "scene-000"
     assert f"the 80 of {summary.judged} scenes and engines" in write_markdown(summary) and summary.judged > 1000
     assert write_markdown(summary).count("\n") < 160
@@ -214,19 +221,19 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.Monkey
 @pytest.mark.slow
 def test_every_witness_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever is drawn first, and in whatever process: the witness says its number."""
-    monkeypatch.setattr(colours, "NUMBERS", {})
+    monkeypatch.setattr(svg, "NUMBERS", {})
     classes = "tests.support.hostile_class:"
     witnesses = guests.read_guests(
         [f"{classes}Right", f"{classes}Leaves"], [each.name for each in (*WITNESSES, *FURTHER)]
     )
     names = [each.name for each in (*WITNESSES, *FURTHER, *witnesses)]
-    colours.NUMBERS.update(guests.list_numbers(witnesses))
-    marks = {name: (choose_style(name).symbol, choose_style(name).marker) for name in names}
+    svg.NUMBERS.update(guests.list_numbers(witnesses))
+    marks = {name: (svg.choose_style(name).symbol, svg.choose_style(name).marker) for name in names}
     assert len({mark for mark, _ in marks.values()}) == len({marker for _, marker in marks.values()}) == len(names)
-    colours.NUMBERS.clear()
-    colours.NUMBERS.update(guests.list_numbers(witnesses[1:]))  # a scene in which the first broke down
-    assert choose_style(names[-1]).symbol == marks[names[-1]][0]
-    assert all(choose_style(name).colour in colours.VARIABLES for name in names)
+    svg.NUMBERS.clear()
+    svg.NUMBERS.update(guests.list_numbers(witnesses[1:]))  # a scene in which the first broke down
+    assert svg.choose_style(names[-1]).symbol == marks[names[-1]][0]
+    assert all(svg.choose_style(name).variable in svg.LIGHT for name in names)
 
 
 def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(

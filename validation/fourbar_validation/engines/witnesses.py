@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from importlib import import_module
-from typing import NamedTuple
 
 import numpy as np
 
@@ -95,43 +94,21 @@ def _find_broken(library: str, error: BaseException) -> str:
     return f"{library} is installed, but does not load: {say_error(error)}"
 
 
-class Work(NamedTuple):
-    """Work that takes the time of an answer."""
-
-    short: str
-    """Words for a legend."""
-    full: str
-    """Words for a table."""
-
-
 ONE_BY_ONE = (
     "each position by itself, in Python: Newton on its own gap, its own speeds and accelerations, then inverse "
     "dynamics with the loop's multipliers: pin forces and torque"
 )
 WORK = {
-    "formulas": Work(
-        "forces and torque, all positions at once",
-        "all positions in one call on arrays: angles, speeds, accelerations, pin forces and torque",
+    "formulas": "all positions in one call on arrays: angles, speeds, accelerations, pin forces and torque",
+    **dict.fromkeys(
+        ("pinocchio-inverse", "mujoco-inverse", "exudyn-constraints", "opensim-constraints", "drake-inverse"),
+        ONE_BY_ONE,
     ),
-    "pinocchio-inverse": Work("assembly, forces and torque, one by one", ONE_BY_ONE),
-    "mujoco-inverse": Work("assembly, forces and torque, one by one", ONE_BY_ONE),
-    "mujoco-simulated": Work(
-        "steps from position to position, forces and torque",
-        "one motion: every position assembled, the model compiled, Runge-Kutta steps from position to position (the "
-        "fewer positions, the dearer each), then pin forces and torque read",
-    ),
-    "exudyn-constraints": Work("assembly, constraints and multipliers, one by one", ONE_BY_ONE),
-    "opensim-constraints": Work("assembly, constrained dynamics, one by one", ONE_BY_ONE),
-    "drake-inverse": Work("assembly, forces and torque, one by one", ONE_BY_ONE),
-    "free-body": Work(
-        "thirteen equations, all positions at once",
-        "all positions in one call on arrays: Newton on the closure, speeds and accelerations, thirteen equations each "
-        "for pin forces and torque",
-    ),
-    "ball-arithmetic": Work(
-        "forces and torque in many digits, one by one",
-        "each position by itself, in Python, in many digits with an error bound: pin forces and torque",
-    ),
+    "mujoco-simulated": "one motion: every position assembled, the model compiled, Runge-Kutta steps from position to "
+    "position (the fewer positions, the dearer each), then pin forces and torque read",
+    "free-body": "all positions in one call on arrays: Newton on the closure, speeds and accelerations, thirteen "
+    "equations each for pin forces and torque",
+    "ball-arithmetic": "each position by itself, in Python, in many digits with an error bound: pin forces and torque",
 }
 """Work of each engine, by its name: the times that are compared are not for the same work."""
 OF_A_POSITION = tuple(name for name in COMPARED if STAGE_OF[name] == "position")

@@ -17,9 +17,8 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.reversals import Reversal, break_curve
 from fourbar_validation.compare.scales import scale_of
 from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, find_condition, find_error, magnitude
-from fourbar_validation.report.colours import ALLOWED, BAND, INK, PAPER, choose_style
 from fourbar_validation.report.record import Record
-from fourbar_validation.report.svg import FLOOR, set_frame, write_svg
+from fourbar_validation.report.svg import ALLOWED, BAND, FLOOR, INK, PAPER, choose_style, set_frame, write_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,8 +14,7 @@ from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, divide, find_
 from fourbar_validation.engines.hard_suite import HARD_WITNESSES
 from fourbar_validation.engines.prediction import predict_in_world_axes
 from fourbar_validation.engines.witnesses import Witness
-from fourbar_validation.report.colours import choose_style
-from fourbar_validation.report.svg import write_svg
+from fourbar_validation.report.svg import choose_style, write_svg
 from fourbar_validation.scenes.hard_families import (
     CHANGE_POINTS,
     CRANK,

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 from fourbar.quantities import LINE, UNKNOWNS
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sort_rows, write_rows
-from fourbar_validation.report.costs import draw_costs
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import OWN, OWN_ENGINES, STATEMENT, Summary, compute_shares
 from fourbar_validation.report.templating import count_or_size, render, write_number, write_share
@@ -62,8 +61,6 @@ class Section:
     """(words, file next to the report)."""
     numbers: tuple[int, int] = (0, 0)
     """The columns that hold numbers: from, up to."""
-    under: str = ""
-    """Key of the section of the report that it belongs under; nothing: it stands by itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +107,6 @@ def write_html(
     csv = base64.b64encode(write_rows(cell.row for view in views for cell in view.cells).encode("utf-8"))
     engines = _list_engines(cell.row for view in views for cell in view.cells)
     failing = sorted((cell for view in views for cell in view.cells if cell.row.failed), key=lambda c: c.line)
-    costs = draw_costs(summary.shown)
     return render(
         "fourbar_validation.report",
         "report.html.j2",
@@ -122,7 +118,6 @@ def write_html(
         failing=failing,
         lazy=len(views) > ALL_OPEN,
         figures={scene.name: Markup(scene.figure) for scene in summary.shown if scene.figure},  # drawn by our own code
-        cost_figure=Markup(costs) if costs else None,
         no_pictures=no_pictures,
         sections=sections,
         independence=[(engine, *texts) for engine, texts in sorted(summary.independence.items())],

@@ -104,6 +104,4 @@ def _read_study(folder: Path) -> Section:
         "what is stepped runs through it once and reads nothing, what is exact answers each of the scene's positions. "
     )
     links = [(name, f"{COST}/{folder.name}/{name}") for name in ("cost.md", "cost.csv")]
-    return Section(
-        f"cost-{folder.name}", f"The study of {folder.name}", text, figures=figures, links=links, under="cost"
-    )
+    return Section(f"cost-{folder.name}", f"The study of {folder.name}", text, figures=figures, links=links)

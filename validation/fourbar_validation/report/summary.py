@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from heapq import nlargest
 from operator import attrgetter
 from statistics import median
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -57,6 +57,12 @@ class EngineLine:
     """error/allowed of that row."""
     undecided: float = 0.0
     """Largest share of the numbers of a scene that are undecided."""
+    microseconds: float = math.nan
+    """Time per position, median over the scenes; our own is that of the formulas."""
+    times_formulas: float = math.nan
+    """Time over that of the formulas on the same scene in the same process, median over the scenes."""
+    work: str = ""
+    """Work that it did in that time."""
 
     def add(self, row: Row, used: float) -> None:
         """Count a row; a share of undecided numbers is no error, unless it fails."""
@@ -65,18 +71,6 @@ class EngineLine:
             self.undecided = max(self.undecided, row.error)
         if row.compared and used > self.used and (row.quantity != "undecided" or row.failed):
             self.worst, self.used = row, used
-
-
-@dataclass(frozen=True, slots=True)
-class EngineCost:
-    """Time of one engine, as a ratio to the formulas on the same scene in the same process."""
-
-    engine: str
-    setting: str
-    times_formulas: float
-    microseconds_per_position: float
-    work: str
-    """Work that it did in that time."""
 
 
 OWN = "our own consistency"
@@ -127,7 +121,8 @@ class Summary:
         self._refusals: Counter[tuple[str, str]] = Counter()
         self._first_reason: dict[tuple[str, str], str] = {}
         self._worst: list[Worst] = []
-        self._costs: dict[tuple[str, str], list[Timed]] = {}
+        self._times: dict[str, list[tuple[float, float]]] = {}
+        """Microseconds per position, and the ratio to the formulas, of at most TIMED scenes of each engine."""
         self._orders: list[tuple[str, dict[str, float]]] = []
         self._failing: list[Record] = []
         self._holding: list[tuple[float, Record]] = []
@@ -155,7 +150,7 @@ class Summary:
                 k = row.error * row.condition / EPS
                 self.measured_k[row.engine] = max(self.measured_k.get(row.engine, 0.0), k)
         self.independence.update(scene.independence)
-        _add_costs(scene, self._costs)
+        self._add_times(scene)
         self._add_orders(scene)
         if bad:
             self._failing += [scene][: SCENES_SHOWN - len(self._failing)]
@@ -169,6 +164,14 @@ class Summary:
             if scene.name == drawn.name:
                 scene.figure = drawn.figure
         self._add_orders(drawn)
+
+    def _add_times(self, scene: Record) -> None:
+        refused = {row.engine for row in scene.rows if row.verdict == REFUSES}
+        for timing in scene.timings:
+            times = self._times.setdefault(timing.engine, [])
+            if timing.engine not in refused and len(times) < TIMED:
+                ratio = timing.seconds / scene.timings[0].seconds
+                times.append((1e6 * timing.seconds / timing.positions, ratio))
 
     def _add_orders(self, scene: Record) -> None:
         known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
@@ -201,6 +204,10 @@ class Summary:
         for line in self._engines.values():
             version = self.stated.get(line.name, versions.get(line.name.partition("-")[0], ""))
             line.version = "" if line.name.endswith(f" {version}") else version
+            engine = FORMULAS if line.name == OWN else line.name
+            if times := self._times.get(engine):
+                line.microseconds, line.times_formulas = map(median, zip(*times, strict=True))
+                line.work = WORK.get(engine, "")
         return sorted(self._engines.values(), key=lambda line: (line.name == OWN, line.name))
 
     @property
@@ -217,20 +224,6 @@ class Summary:
         Reasons that differ by their numbers alone are one, with the numbers of the first scene.
         """
         return [(kind[0], self._first_reason[kind], count) for kind, count in sorted(self._refusals.items())]
-
-    @property
-    def costs(self) -> list[EngineCost]:
-        """Return the time each engine took, by the kind of its setting."""
-        return [
-            EngineCost(
-                engine,
-                _write_settings(values),
-                median(t.times for t in values),
-                median(t.microseconds for t in values),
-                WORK[engine].full if engine in WORK else "",
-            )
-            for (engine, _), values in sorted(self._costs.items())
-        ]
 
     @property
     def orders(self) -> list[tuple[str, dict[str, float]]]:
@@ -295,28 +288,3 @@ def _keep_largest(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:
 
 def _find_lowest(order: tuple[str, dict[str, float]]) -> float:
     return -order[1]["observed_order"]
-
-
-class Timed(NamedTuple):
-    """One answer's setting, its time over that of the formulas, and per position."""
-
-    setting: str
-    times: float
-    microseconds: float
-
-
-def _add_costs(scene: Record, costs: dict[tuple[str, str], list[Timed]]) -> None:
-    formulas = scene.timings[0].seconds if scene.timings else math.nan
-    refused = {row.engine for row in scene.rows if row.verdict == REFUSES}
-    for t in scene.timings:
-        kept = costs.setdefault((t.engine, t.setting.partition(" ")[0]), [])  # an integrator, whatever its steps
-        if t.engine not in refused and len(kept) < TIMED:
-            kept.append(Timed(t.setting, t.seconds / formulas, 1e6 * t.seconds / t.positions))
-    for key in [key for key, values in costs.items() if not values]:
-        del costs[key]
-
-
-def _write_settings(of: Sequence[Timed]) -> str:
-    """Name the setting, or the first and last of those that differ by their number: "RK4 628/rev to 1490/rev"."""
-    known = sorted({t.setting for t in of}, key=lambda name: (len(name), name))
-    return known[0] if len(known) == 1 else f"{known[0]} to {known[-1].partition(' ')[2]}"

@@ -1,13 +1,63 @@
-"""A matplotlib figure as inline SVG: small, with ids of its own, its text as text, in the page's colours."""
+"""A matplotlib figure as inline SVG: small, with ids of its own, its text as text, in the colours of the page.
+
+Matplotlib draws with the light colours of page.css; in the page each is the custom property that it came from, which
+has a value for dark pages too (Okabe-Ito hues, darkened or lightened until every one has a contrast of 3:1 or more).
+"""
 
 import hashlib
 import io
 import re
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from fourbar_validation.compare.tolerance import EPS
-from fourbar_validation.report.colours import GRID, replace_colours
 
+PAGE = Path(__file__).parent / "templates" / "page.css"
+LIGHT: dict[str, str] = dict(re.findall(r"(--[\w-]+): light-dark\((#\w+),", PAGE.read_text(encoding="utf-8")))
+"""Colours of a light page by the names of their custom properties."""
+INK, SOFT, GRID, BAND, ALLOWED, PAPER = (
+    LIGHT[f"--{name}"] for name in ("ink", "soft", "grid", "under", "allowed", "paper")
+)
+BLACK = "#000000"
+"""Colour of matplotlib's own; in a page it is the ink."""
+
+
+class Style(NamedTuple):
+    """Colour and mark of an engine; marks tell the engines apart in grey."""
+
+    variable: str
+    """Custom property of the page."""
+    marker: str
+    symbol: str
+    """The mark as a character, for legends in text."""
+    simulated: bool = False
+
+    @property
+    def colour(self) -> str:
+        """Return the colour with which matplotlib draws."""
+        return LIGHT[self.variable]
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """Return the style of a curve with its marks, as matplotlib takes it."""
+        return {"color": self.colour, "marker": self.marker, "markersize": 3.5, "linewidth": 1.0}
+
+
+STYLES = {
+    "pinocchio-inverse": Style("--e1", "o", "○"),
+    "mujoco-inverse": Style("--e2", "s", "□"),
+    "mujoco-simulated": Style("--e3", "^", "△", simulated=True),
+    "free-body": Style("--e4", "D", "◇"),
+    "ball-arithmetic": Style("--e5", "v", "▽"),
+    "exudyn-constraints": Style("--e6", "<", "◁"),
+    "opensim-constraints": Style("--e7", ">", "▷"),
+    "drake-inverse": Style("--e8", "h", "⬡"),
+}
+_MARKS = (("P", "✚"), ("X", "✖"), ("*", "★"), ("p", "⬟"))
+OTHERS = tuple(Style(f"--e{9 + n % 3}", *_MARKS[n % 4]) for n in range(12))
+"""Styles of engines that are not named above, one after the other."""
+NUMBERS: dict[str, int] = {}
+"""Number of each engine's style among them, as a run numbers its engines, otherwise in the order of drawing."""
 FLOOR = EPS / 16.0
 """Errors below this, zero among them, are drawn here."""
 LONG_NUMBER = re.compile(r"(\d+\.\d)\d+")
@@ -16,6 +66,11 @@ STYLE = re.compile(r' style="([^"]*)"')
 BETWEEN_TAGS = re.compile(r">\s+<")
 METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
 GROUP_NAME = re.compile(r'<g id="[^"]*"')
+
+
+def choose_style(engine: str) -> Style:
+    """Choose the style of an engine: one that is not named in `STYLES` has the next of `OTHERS`."""
+    return STYLES.get(engine) or OTHERS[NUMBERS.setdefault(engine, len(NUMBERS)) % len(OTHERS)]
 
 
 def set_frame(axes: Any) -> None:
@@ -49,7 +104,9 @@ def shrink_svg(svg: str) -> str:
     svg = METADATA.sub("", svg)
     svg = COORDINATES.sub(lambda found: LONG_NUMBER.sub(r"\1", found.group()), svg)
     svg = GROUP_NAME.sub("<g", BETWEEN_TAGS.sub("><", svg))
-    return _name_styles(replace_colours(svg))
+    for variable, colour in (("--ink", BLACK), *LIGHT.items()):
+        svg = svg.replace(colour, f"var({variable})")
+    return _name_styles(svg)
 
 
 def _name_styles(svg: str) -> str:

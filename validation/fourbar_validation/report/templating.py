@@ -5,7 +5,7 @@ import gzip
 import math
 
 from fourbar_validation.compare.rows import make_plain
-from fourbar_validation.report.colours import choose_style, replace_colours, write_declarations
+from fourbar_validation.report.svg import choose_style
 
 PLAIN = (1e-2, 1e6)
 """Numbers between these are written without a power of ten, the larger ones where they are whole."""
@@ -19,7 +19,7 @@ def render(package: str, name: str, /, **what: object) -> str:
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     page = name.endswith(".html.j2")  # in Markdown `write_cell` escapes what would break out
-    made = Environment(
+    environment = Environment(
         loader=ChoiceLoader([PackageLoader(package), PackageLoader("fourbar_validation.report")]),
         undefined=StrictUndefined,
         autoescape=page,
@@ -27,18 +27,17 @@ def render(package: str, name: str, /, **what: object) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=not page,
     )
-    made.filters |= {
+    environment.filters |= {
         "number": write_number,
         "plain": count_or_size,
         "degrees": lambda radians: "-" if math.isnan(radians) else f"{math.degrees(radians):.3f}",
         "share": write_share,
         "cell": write_cell,
         "packed": lambda text: base64.b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode(),
-        "colour": lambda engine: replace_colours(choose_style(engine).colour),
+        "colour": lambda engine: f"var({choose_style(engine).variable})",
         "symbol": lambda engine: choose_style(engine).symbol,
     }
-    made.globals |= {"light": write_declarations(dark=False), "dark": write_declarations(dark=True)}
-    return made.get_template(name).render(**what)
+    return environment.get_template(name).render(**what)
 
 
 def write_cell(text: object) -> str:

@@ -12,8 +12,8 @@ from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.witnesses import WITNESSES, Witness
-from fourbar_validation.report.colours import NUMBERS
 from fourbar_validation.report.record import Record
+from fourbar_validation.report.svg import NUMBERS
 from fourbar_validation.run.answers import check_mjcf, compare_answers, compare_inertia, compare_statements
 from fourbar_validation.run.identities import check_identities, check_status
 from fourbar_validation.run.printed import check_blocks, check_error_bars, check_law, check_points, check_residual

@@ -20,12 +20,12 @@ from fourbar_validation.engines.mujoco.picture import render_pictures
 from fourbar_validation.engines.witnesses import Witness
 from fourbar_validation.regression.record import ABOUT, COLUMNS, TABLE, describe_run, write_about
 from fourbar_validation.regression.scenes import describe_scenes
-from fourbar_validation.report.colours import NUMBERS
 from fourbar_validation.report.html import write_html, write_markdown
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.sections import collect_sections
 from fourbar_validation.report.summary import PICTURED, Summary
+from fourbar_validation.report.svg import NUMBERS
 from fourbar_validation.run import pool
 from fourbar_validation.run.judge import OUTPUT
 from fourbar_validation.run.machines import Cluster
