@@ -4,32 +4,32 @@ import math
 
 import fourbar
 from fourbar.scene import command
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.places import MODELS
 from fourbar_validation.run.judge import judge
 
-ENGINES = {witness.name: witness for witness in WITNESSES}
+BY_NAME = {engine.name: engine for engine in ENGINES}
 SCENES = {path.stem: path for path in sorted(MODELS.glob("*.toml"))}
 
 
 class Verdict:
     """What `run` says of one engine on one model."""
 
-    params = (list(ENGINES), list(SCENES))
+    params = (list(BY_NAME), list(SCENES))
     param_names = ("engine", "model")
     timeout = 600
 
     def setup_cache(self):
         """Judge each model once, by every engine that is installed."""
-        here = [witness for witness in WITNESSES if not witness.missing()]
+        here = [engine for engine in ENGINES if not engine.missing()]
         verdicts = {}
         for model, path in SCENES.items():
             rows = judge(model, fourbar.load(path), here, order=False).rows
-            for engine in ENGINES:
-                judged = [row for row in rows if row.engine == engine and (row.compared or row.failed)]
+            for name in BY_NAME:
+                judged = [row for row in rows if row.engine == name and (row.compared or row.failed)]
                 used = [math.inf if math.isnan(row.error) else row.error / row.allowed for row in judged if row.error]
                 failing = sum(row.failed for row in judged) if judged else math.nan
-                verdicts[engine, model] = max(used, default=math.nan), failing
+                verdicts[name, model] = max(used, default=math.nan), failing
         return verdicts
 
     def track_worst_error(self, verdicts, engine, model):
@@ -50,13 +50,13 @@ class Answer:
 
     def setup(self, engine, model):
         """Start the engine and load the model, outside the clock."""
-        witness = ENGINES[engine]
-        if witness.missing():
-            raise NotImplementedError(witness.missing())
+        solver = BY_NAME[engine]
+        if solver.missing():
+            raise NotImplementedError(solver.missing())
         self.scene = fourbar.load(SCENES[model])
-        self.command, self.engine = command(self.scene), witness.engine()
-        self.engine.answer(self.scene, self.command)
+        self.command, self.adapter = command(self.scene), solver.start()
+        self.adapter.answer(self.scene, self.command)
 
     def time_answer(self, engine, model):
         """Answer every position of the model."""
-        self.engine.answer(self.scene, self.command)
+        self.adapter.answer(self.scene, self.command)

@@ -36,7 +36,7 @@ from fourbar_lab.contenders import (
 )
 from fourbar_validation.cost.formulas import make_bodies
 from fourbar_validation.cost.study import time_call
-from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.published.thirteen import solve_thirteen
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.terminal import make_table
@@ -239,8 +239,8 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     by_positions = time_positions(peers.here, largest, rounds)
     by_linkages = time_linkages(positions, rounds)
     cost, most = by_positions["NumPy"], max(by_linkages[STUDY])
-    exact = [witness for witness in WITNESSES if not witness.through_time]
-    if not any(witness.missing() for witness in exact):
+    exact = [engine for engine in ENGINES if not engine.through_time]
+    if not any(engine.missing() for engine in exact):
         rows[JUDGED] = 1e9 * time_judging(exact, max(1, positions // PER_SCENE))
     rows |= {name: rows[row.of] / rows[row.over] for name, row in LIMITS.items() if {row.of, row.over} <= rows.keys()}
     rows |= {
@@ -252,9 +252,9 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
     return Measured(rows, by_positions, by_linkages, peers.not_run)
 
 
-def time_judging(witnesses: list[Witness], scenes: int) -> float:
+def time_judging(engines: list[Engine], scenes: int) -> float:
     """Time the check of a random scene as `run` does it, nothing drawn: median CPU time in s."""
     suite = Random(scenes + 1, 0, tuple(DrawnType))
-    each = (partial(judge_for_report, suite.name(i), suite.scene(i), witnesses, draw=False) for i in range(scenes + 1))
+    each = (partial(judge_for_report, suite.name(i), suite.scene(i), engines, draw=False) for i in range(scenes + 1))
     times = [time_call(action) for action in each]
     return median(times[1:])  # the first one imports the engines

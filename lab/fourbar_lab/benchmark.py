@@ -14,7 +14,7 @@ from fourbar.errors import DependencyError, InputError
 from fourbar.writing import write_text
 from fourbar_lab.simulators.problems import PROBLEMS, list_problems
 from fourbar_validation.check.problem import MISSING, RESULT, find_levels, judge, read_problem
-from fourbar_validation.compare.answer import WitnessError
+from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.rows import write_csv, write_one_line
 from fourbar_validation.engines.environments import FILE, Entry, prepare_program, read_engines, read_engines_of
 from fourbar_validation.engines.guests import HELLO, Running
@@ -84,7 +84,7 @@ class Benchmark:
     def _ask_engine(self, engine: Entry, running: Running) -> None:
         try:
             hello = running.ask_again(HELLO, 0)
-        except WitnessError as error:
+        except EngineError as error:
             self._leave_out(engine, str(error))
             return
         version = write_one_line(str(hello.get("version", "")))
@@ -169,7 +169,7 @@ def _ask_problem(running: Running, problem: dict[str, Any]) -> dict[str, Any]:
     began = time.perf_counter()
     try:
         reply = running.ask_again(question, positions)
-    except WitnessError as error:
+    except EngineError as error:
         reply = {"error": str(error)}
     spent = {"seconds": time.perf_counter() - began}
     if "answers" in reply:

@@ -21,7 +21,7 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.solve import solve
 from fourbar.writing import write_text
 from fourbar_validation.cost.study import time_call, time_in_turns
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.machine import describe_setup
 from fourbar_validation.report.templating import render
 from fourbar_validation.report.terminal import make_table
@@ -102,18 +102,18 @@ def list_flags() -> dict[str, str]:
     return {LEFT_ON.format(flag): flag for flag in result}
 
 
-def prepare_answers(witness: str, effect: str) -> Callable[[int], Any]:
+def prepare_answers(name: str, effect: str) -> Callable[[int], Any]:
     """Prepare the answers of an inverse engine at a given number of positions."""
-    engine = next(each for each in WITNESSES if each.name == witness).engine()
+    adapter = next(engine for engine in ENGINES if engine.name == name).start()
 
     def work(amount: int) -> None:
         given = make_scene(effect, amount)
-        engine.answer(given, command(given))
+        adapter.answer(given, command(given))
 
     return work
 
 
-ENGINES: dict[str, Callable[[str], Callable[[int], Any]]] = {
+WORKLOADS: dict[str, Callable[[str], Callable[[int], Any]]] = {
     "formulas": prepare_formulas,
     SIMULATION: prepare_simulation,
     **{name: partial(prepare_answers, name) for name in ("mujoco-inverse", "pinocchio-inverse")},
@@ -136,7 +136,7 @@ class EffectCost(NamedTuple):
 def measure(engine: str, effect: str, rounds: int = ROUNDS) -> EffectCost:
     """Time neighbouring runs with and without an effect: both meet the same disturbances."""
     amount = AMOUNTS[engine]
-    works = {which: partial(ENGINES[engine](name), amount) for which, name in enumerate(("none", effect))}
+    works = {which: partial(WORKLOADS[engine](name), amount) for which, name in enumerate(("none", effect))}
     for work in works.values():
         work()
     clocks = {which: partial(time_call, work) for which, work in works.items()}
@@ -172,7 +172,7 @@ def list_pairs(engines: tuple[str, ...], effects: tuple[str, ...]) -> list[tuple
 
 
 @click.command()
-@click.option("--engines", metavar="NAMES", default=",".join(ENGINES), show_default=True, help="Comma-separated.")
+@click.option("--engines", metavar="NAMES", default=",".join(WORKLOADS), show_default=True, help="Comma-separated.")
 @click.option("--only", metavar="NAMES", help="Comma-separated; left out: all.")
 @click.option("-o", "--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table as Markdown too.")
 def effects(engines: str, only: str | None, out: Path | None) -> int:
@@ -182,13 +182,13 @@ def effects(engines: str, only: str | None, out: Path | None) -> int:
 
     wanted = tuple(name.strip() for name in engines.split(","))
     chosen = tuple(EFFECTS) if only is None else tuple(dict.fromkeys(["none", *only.split(",")]))
-    for option, names, allowed in (("--engines", wanted, ENGINES), ("--only", chosen, EFFECTS)):
+    for option, names, allowed in (("--engines", wanted, WORKLOADS), ("--only", chosen, EFFECTS)):
         for name in names:
             if name not in allowed:
                 raise InputError(option, name, "must be among " + ", ".join(allowed))
-    for witness in WITNESSES:
-        if witness.name in wanted and (reason := witness.missing()):
-            raise DependencyError(f"{witness.name}: {reason}")
+    for engine in ENGINES:
+        if engine.name in wanted and (reason := engine.missing()):
+            raise DependencyError(f"{engine.name}: {reason}")
     costs = [measure(*pair) for pair in track(list_pairs(wanted, chosen), description="timing", transient=True)]
     columns, rows = list_rows(costs)
     Console().print(make_table(["effect", *columns], rows, caption=ABOUT))

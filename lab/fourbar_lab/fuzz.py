@@ -25,8 +25,7 @@ from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, say_error
 from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, find_margin
 from fourbar_validation.engines import workers as processes
-from fourbar_validation.engines.hard_suite import hold_fully
-from fourbar_validation.engines.witnesses import WITNESSES, make_prediction
+from fourbar_validation.engines.registry import ENGINES, hold_fully, make_prediction
 from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.answers import check_statements
@@ -78,7 +77,7 @@ NUMBER = re.compile(r'(?<=")-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?= )')
 NEEDED = ("[motion]", "theta_2", "omega_2")
 """A scene without them has no torque, and fails for another reason."""
 LAB = Path(__file__).parent
-EXACT = tuple(hold_fully(w) for w in WITNESSES if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body"))
+EXACT = tuple(hold_fully(w) for w in ENGINES if w.name in ("pinocchio-inverse", "mujoco-inverse", "free-body"))
 """The exact engines, held to full accuracy or to what was predicted for the position."""
 CHUNK, CHUNK_OF_PROOFS = 200, 10
 """Scenes per task: some seconds, which is what an interruption costs."""
@@ -235,12 +234,12 @@ def _check_assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
 
 def _check_engines(question: Question) -> list[str]:
     scene, at, solution, rows = question.scene, question.at, question.solution, list(check_identities(question))
-    for witness in EXACT:
-        answer = witness.engine().answer(scene, at)
-        predicted = make_prediction(witness, scene, at, answer)
-        rows += Comparison("", scene, answer, solution, witness.tolerance, witness.expected, predicted).rows()
-        if witness.name == "pinocchio-inverse" and answer.refusal is None:  # the quicker of two exact engines
-            rows += check_statements("", scene, witness.engine(), answer, predicted=predicted)
+    for engine in EXACT:
+        answer = engine.start().answer(scene, at)
+        predicted = make_prediction(engine, scene, at, answer)
+        rows += Comparison("", scene, answer, solution, engine.tolerance, engine.expected, predicted).rows()
+        if engine.name == "pinocchio-inverse" and answer.refusal is None:  # the quicker of two exact engines
+            rows += check_statements("", scene, engine.start(), answer, predicted=predicted)
     # half of the scenes are drawn where doubles have few digits: that they are undecided is no fault
     failed = [row for row in rows if row.verdict == FAILS and row.quantity != "undecided"]
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]

@@ -81,16 +81,15 @@ class _Text(importlib.machinery.SourceFileLoader):
 def list_failing(names: list[str]) -> dict[str, list[str]]:
     """Check test scenes: by their names the rows that fail, as "engine quantity: reason"."""
     from fourbar_lab.fault_scenes import FAULT_SCENES
-    from fourbar_validation.engines.hard_suite import HARD_WITNESSES
-    from fourbar_validation.engines.witnesses import WITNESSES
+    from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES
     from fourbar_validation.run.judge import judge
 
     result = {}
     for name in names or FAULT_SCENES:
         simulated = name.startswith("simulated")
-        own = HARD_WITNESSES if name.startswith("to full accuracy") else WITNESSES
-        witnesses = [witness for witness in own if simulated or not witness.through_time]
-        rows = judge(name, FAULT_SCENES[name], witnesses, shipped=name.startswith("shipped")).rows
+        own = HARD_ENGINES if name.startswith("to full accuracy") else ENGINES
+        engines = [engine for engine in own if simulated or not engine.through_time]
+        rows = judge(name, FAULT_SCENES[name], engines, shipped=name.startswith("shipped")).rows
         result[name] = [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
     return result
 

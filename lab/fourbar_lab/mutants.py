@@ -31,7 +31,7 @@ from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.engines.free_body import NAME as FREE_BODY
-from fourbar_validation.engines.witnesses import WITNESSES, Witness, make_prediction
+from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities, compare_status
 from fourbar_validation.run.question import Question
@@ -192,17 +192,17 @@ def is_changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
     return False
 
 
-def is_caught(scene: Scene, at: Command, answers: list[tuple[Witness, Answer]]) -> bool:
+def is_caught(scene: Scene, at: Command, answers: list[tuple[Engine, Answer]]) -> bool:
     """Check a scene: whether any comparison or identity fails."""
     question = Question("", scene, at)
     solution, rows = question.solution, list(check_identities(question))
-    for witness, answer in answers:
-        predicted = make_prediction(witness, scene, at, answer)
-        rows += Comparison("", scene, answer, solution, witness.tolerance, witness.expected, predicted).rows()
-        if witness.name == FREE_BODY and (reference := make_reference(scene, answer)) is not None:
+    for engine, answer in answers:
+        predicted = make_prediction(engine, scene, at, answer)
+        rows += Comparison("", scene, answer, solution, engine.tolerance, engine.expected, predicted).rows()
+        if engine.name == FREE_BODY and (reference := make_reference(scene, answer)) is not None:
             rows.append(compare_status(question, reference))
     if not any(row.verdict == FAILS for row in rows):
-        rows += [row for witness, answer in answers for row in check_statements("", scene, witness.engine(), answer)]
+        rows += [row for engine, answer in answers for row in check_statements("", scene, engine.start(), answer)]
     return any(row.verdict == FAILS for row in rows)
 
 
@@ -211,7 +211,7 @@ class Baseline(NamedTuple):
 
     scene: Scene
     at: Command
-    answers: list[tuple[Witness, Answer]]
+    answers: list[tuple[Engine, Answer]]
     before: dict[str, Any]
 
 
@@ -220,7 +220,7 @@ def make_baselines() -> list[Baseline]:
     made = []
     for scene in choose_scenes():
         at = command_of(scene)
-        answers = [(w, w.engine().answer(scene, at)) for w in WITNESSES if w.name in EXACT]
+        answers = [(w, w.start().answer(scene, at)) for w in ENGINES if w.name in EXACT]
         if is_caught(scene, at, answers):
             raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
         made.append(Baseline(scene, at, answers, compute_numbers(scene, at)))

@@ -155,8 +155,7 @@ def _evaluate_ball(scene: Scene, name: str, parts: Array, theta_2: float) -> Any
     """Evaluate a ball by the thirteen equations of the free bodies; NaN where there is no value."""
     from flint import acb, arb
 
-    from fourbar_validation.engines.ball_vectors import wedge
-    from fourbar_validation.engines.balls import closure, compute_outputs, make_balls
+    from fourbar_validation.engines.balls import closure, compute_outputs, make_balls, wedge
 
     member = replace_numbers(scene, _move_numbers(scene, parts))
     x, branch = make_balls(member, theta_2), scene.motion.branch

@@ -24,8 +24,7 @@ from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.function import NEVER, function
 from fourbar.studies.keys import command_key, is_left_out, list_entries, read_place, replace_numbers, replace_place
 from fourbar_lab.tally import Tally, compute_ratio, is_untold, list_components
-from fourbar_validation.engines.ball_vectors import Values
-from fourbar_validation.engines.balls import STEP_BITS, compute_outputs, make_balls
+from fourbar_validation.engines.balls import STEP_BITS, Values, compute_outputs, make_balls
 from fourbar_validation.engines.description import PINS
 
 LIBRARIES = ("jax", "torch")

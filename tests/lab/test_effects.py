@@ -9,7 +9,7 @@ from fourbar.errors import BROKEN, HOLDS
 from fourbar_lab import effects
 from fourbar_lab.cli import status
 from fourbar_lab.effects import DEFAULT_FLAGS
-from fourbar_validation.engines import witnesses
+from fourbar_validation.engines import registry
 
 SAVED = 0.08
 """Part of the time of a step that the flags of the bare scene must save; they save some 0.2."""
@@ -30,7 +30,7 @@ def test_a_workload_with_twice_the_work_costs_twice_as_much(monkeypatch: pytest.
     def prepare(effect: str) -> object:
         return lambda amount: sum(range((1 + (effect == "twice")) * 1000 * amount))
 
-    monkeypatch.setitem(effects.ENGINES, "formulas", prepare)
+    monkeypatch.setitem(effects.WORKLOADS, "formulas", prepare)
     measured = effects.measure("formulas", "twice", 5)
     assert 1.5 < measured.median < 2.5 and measured.low <= measured.median <= measured.high and measured.seconds > 0.0
 
@@ -51,6 +51,6 @@ def test_the_table_has_a_row_for_each_effect_and_flag(
 def test_an_engine_that_is_missing_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(witnesses, "find_missing", lambda _: "mujoco is not installed")
+    monkeypatch.setattr(registry, "find_missing", lambda _: "mujoco is not installed")
     assert status(["effects", "--engines", "formulas,mujoco-inverse"]) == BROKEN
     assert capsys.readouterr().err == "error: mujoco-inverse: mujoco is not installed\n"

@@ -9,7 +9,7 @@ from fourbar_lab import faults
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_lab.faults import explain_survival, try_faults
 from fourbar_lab.injection import inject_fault, read_faults
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import thesis
 
@@ -76,7 +76,7 @@ def test_positions_outside_the_range_fail_the_run(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(fourbar_validation.run.question, "solve", pretend)
     scene = thesis(np.radians([80.0, 135.0]))  # the range starts at 84.6 deg
-    failing = {(row.engine, row.quantity) for row in judge("", scene, [w for w in WITNESSES if w.name in EXACT]).rows
+    failing = {(row.engine, row.quantity) for row in judge("", scene, [w for w in ENGINES if w.name in EXACT]).rows
                if not row.passed}  # fmt: skip
     assert {(engine, "assembled") for engine in EXACT} <= failing
 

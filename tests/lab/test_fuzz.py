@@ -93,14 +93,14 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(
 ) -> None:
     """Relative to 0 no error has a size: it is judged in newtons, and not left unjudged."""
     scene = loads((KEPT / "bar_with_all_mass_stands_for_an_instant.toml").read_text(encoding="utf-8"))
-    witness = next(witness for witness in examine.EXACT if witness.name == "pinocchio-inverse")
+    engine = next(engine for engine in examine.EXACT if engine.name == "pinocchio-inverse")
     solution = fourbar.solve(scene, "force")
     assert solution.F12 is not None and not solution.F12.any()
-    answer = witness.engine().answer(scene, examine.command(scene))
+    answer = engine.start().answer(scene, examine.command(scene))
     wrong = np.array([[times, 0.0]])
     answer.quantities["F12"] = wrong
     rows = examine.Comparison(
-        "", scene, answer, solution, witness.tolerance, ("F12",), lambda quantity, where: np.ones(1)
+        "", scene, answer, solution, engine.tolerance, ("F12",), lambda quantity, where: np.ones(1)
     ).rows()
     assert [row.verdict == "fails" for row in rows if row.quantity == "F12"] == [found]
 

@@ -33,13 +33,13 @@ def test_without_a_mutant_the_harness_holds() -> None:
     """Near change points too, where the engines lose as many digits as they are expected to."""
     for scene in harness.choose_scenes()[-3:]:
         at = command_of(scene)
-        answers = [(w, w.engine().answer(scene, at)) for w in harness.WITNESSES if w.name in harness.EXACT]
+        answers = [(w, w.start().answer(scene, at)) for w in harness.ENGINES if w.name in harness.EXACT]
         assert not is_caught(scene, at, answers)
 
 
 def test_the_harness_alone_catches_a_wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
     at = command_of(SCENE)
-    answers = [(w, w.engine().answer(SCENE, at)) for w in harness.WITNESSES if w.name in harness.EXACT]
+    answers = [(w, w.start().answer(SCENE, at)) for w in harness.ENGINES if w.name in harness.EXACT]
     assert not is_caught(SCENE, at, answers)
     true = harness.solve
 

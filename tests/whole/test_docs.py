@@ -147,7 +147,7 @@ def test_the_table_of_the_exercise_is_right(checkout: Path, capsys: pytest.Captu
 
 
 @pytest.mark.slow
-def test_the_witness_of_the_guide_agrees(
+def test_the_engine_of_the_guide_agrees(
     checkout: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (program,) = blocks("python", read("docs/guide-simulator.md"))

@@ -26,7 +26,7 @@ from fourbar_validation.engines import effects as on_trees
 from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.run.judge import judge
-from tests.validation.engines.test_effects import ENGINES, EXACT, SIMULATED, failing
+from tests.validation.engines.test_effects import EXACT, ON_TREES, SIMULATED, failing
 
 PAGE = (Path(__file__).parents[2] / "docs" / "extending.md").read_text(encoding="utf-8")
 REFERENCE = (Path(__file__).parents[2] / "docs" / "scene-file.md").read_text(encoding="utf-8")
@@ -76,9 +76,9 @@ def guide_scene() -> Scene:
     return loads(SCENE + block("toml"))
 
 
-def refusals(scene: Scene, witnesses: list[Any]) -> dict[str, str]:
+def refusals(scene: Scene, engines: list[Any]) -> dict[str, str]:
     """By engine, why it refuses."""
-    return {r.engine: r.reason for r in judge("scene", scene, witnesses).rows if r.verdict == "refuses"}
+    return {r.engine: r.reason for r in judge("scene", scene, engines).rows if r.verdict == "refuses"}
 
 
 def test_the_page_is_one_page() -> None:
@@ -95,7 +95,7 @@ def test_the_example_is_read_written_and_agreed_on(latch: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("table", "engines"), [(on_trees.TERM_OF, ENGINES), (free_body_effects.WRENCH_OF, {"free-body"})]
+    ("table", "engines"), [(on_trees.TERM_OF, ON_TREES), (free_body_effects.WRENCH_OF, {"free-body"})]
 )
 def test_engines_without_its_row_refuse_the_example(
     latch: Any, table: dict[str, Any], engines: set[str], monkeypatch: pytest.MonkeyPatch
@@ -119,7 +119,7 @@ def test_without_its_row_nothing_is_judged_by_another_scale(latch: Any, monkeypa
     monkeypatch.delitem(in_scales.SIZE_OF, "latch")
     rows = judge("scene", guide_scene(), EXACT).rows
     engines = {row.engine for row in rows if row.failed and "'latch'" in row.reason}
-    assert engines >= {witness.name for witness in EXACT}
+    assert engines >= {engine.name for engine in EXACT}
 
 
 def test_without_its_line_a_file_neither_reads_nor_writes_the_example(

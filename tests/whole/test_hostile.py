@@ -20,11 +20,11 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import COLUMNS, FAILS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines.memory import WORKER_MEMORY, bound_memory
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run import pool
-from fourbar_validation.run.command import choose_witnesses
+from fourbar_validation.run.command import choose_engines
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
 from tests.support.here import judge_here
@@ -44,7 +44,7 @@ HOSTILE = {
 }
 STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 """Control characters, but for the ends of lines."""
-EXACT = choose_witnesses("free-body")
+EXACT = choose_engines("free-body")
 
 
 def scene_text(title: str) -> str:
@@ -278,7 +278,7 @@ def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch: pyte
 def test_running_out_of_memory_costs_its_own_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
-    greedy = Witness("greedy", Greedy, EQUIVALENCE)
+    greedy = Engine("greedy", Greedy, EQUIVALENCE)
     run(suite, tmp_path / "run", (*EXACT, greedy), RunOptions(workers=1, drawn=False))
     failing = [row for row in read_columns(tmp_path / "run" / "results.csv") if row.verdict == FAILS]
     assert {(row.scene, row.engine) for row in failing} == {("b", "greedy")}

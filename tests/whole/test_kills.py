@@ -24,12 +24,12 @@ from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import workers
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import CODE, build, hash_modules, name_code
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import Summary
 from fourbar_validation.run import pool
-from fourbar_validation.run.command import choose_witnesses
+from fourbar_validation.run.command import choose_engines
 from fourbar_validation.run.run import COLLECTING, RunOptions, run
 from fourbar_validation.run.store import RunningError, Store
 from fourbar_validation.scenes.random import DrawnType
@@ -48,12 +48,12 @@ SMALL = f"import fourbar_validation.run.run as run; run.CHUNK = {{False: {IN_A_C
 HARNESS = "import runpy; runpy.run_module('validation', run_name='__main__', alter_sys=True)"
 PROGRAM = ("-m", "validation") if FULL else ("-c", SMALL + HARNESS)
 TYPES = tuple(DrawnType)
-EXACT = choose_witnesses("free-body")
+EXACT = choose_engines("free-body")
 
 
-def judge_all(suite: Suite, out: Path, witnesses: tuple[Witness, ...] = EXACT, workers: int = 2) -> Summary:
+def judge_all(suite: Suite, out: Path, engines: tuple[Engine, ...] = EXACT, workers: int = 2) -> Summary:
     heard = Heard()
-    summary = run(suite, out, witnesses, RunOptions(workers=workers, drawn=False, sample=0), progress=heard)
+    summary = run(suite, out, engines, RunOptions(workers=workers, drawn=False, sample=0), progress=heard)
     assert heard.scenes[COLLECTING] == len(suite)
     return summary
 
@@ -64,7 +64,7 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path: Path, monk
     monkeypatch.setattr(fourbar_validation.run.run, "CHUNK", {True: 2, False: 2})
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     hangs = 2.0 * max(1.0, load / (os.cpu_count() or 1))  # s; a busy machine is given longer
-    moody = Witness("moody", Moody, EQUIVALENCE)
+    moody = Engine("moody", Moody, EQUIVALENCE)
     monkeypatch.setattr(workers, "SECONDS", hangs)
     judge_all(Few(), tmp_path / "run", (*EXACT, moody))
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
@@ -84,8 +84,8 @@ def test_a_worker_ends_itself_in_the_scene_that_hangs_and_with_its_parent(parent
     judge = (
         "import os; from tests.support.unlucky import Few, Moody; from fourbar_validation.engines import workers; "
         "from fourbar_validation.compare.tolerance import EQUIVALENCE; from fourbar_validation.run import pool; "
-        "from fourbar_validation.engines.witnesses import Witness; "
-        "jobs = pool.make_jobs(Few(), [0, 2], [Witness('moody', Moody, EQUIVALENCE)], False); "
+        "from fourbar_validation.engines.registry import Engine; "
+        "jobs = pool.make_jobs(Few(), [0, 2], [Engine('moody', Moody, EQUIVALENCE)], False); "
         f"os.write(1, b'ready'); workers.prepare_worker({parent}); "
         f"workers.apply_watched({limit}, pool.judge_job, jobs); os.write(1, b'came back')"
     )
@@ -107,7 +107,7 @@ def test_what_comes_from_outside_is_not_held_against_the_engine(
     for life in range(3):
         (tmp_path / "lives" / f"{how} {life}").touch()
     monkeypatch.setenv("LIVES", str(tmp_path / "lives"))
-    unlucky = Witness("unlucky", Unlucky, EQUIVALENCE)
+    unlucky = Engine("unlucky", Unlucky, EQUIVALENCE)
     assert judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1).counts[FAILS] == 0
     assert not list((tmp_path / "lives").iterdir())
 
@@ -407,7 +407,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     monkeypatch.setattr("fourbar_validation.report.summary.PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "PICTURED", 3)
     monkeypatch.setattr(fourbar_validation.run.run, "write_html", lambda *_, **__: "")
-    blunders = Witness("blunders", Blunders, EQUIVALENCE)
+    blunders = Engine("blunders", Blunders, EQUIVALENCE)
     without = run(Few(), tmp_path / "without", (*EXACT, blunders), RunOptions(drawn=False))
     assert not drawn and not any(record.figure for record in without.shown)
     once = Blunders.titles.count("b")

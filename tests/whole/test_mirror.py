@@ -39,19 +39,18 @@ JUDGED_BY = {
     "fourbar/show/test_page.py": "fourbar/show: tolerances",
     "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody labels linkage "
     "studies style symbols view",
-    # a comparison is tested by witnesses with given answers
+    # a comparison is tested by engines with given answers
     "validation/run/test_judge.py": "validation/compare: answer compare effects rows; "
     "validation/run: answers command identities question run",
     "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limit_positions "
     "transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
-    "validation/engines/test_engines.py": "validation/engines: ball_drive ball_vectors balls description "
-    "limits loaded loop pinocchio prediction tree witnesses; lab/engines: drake exudyn exudyn_elements opensim; "
+    "validation/engines/test_engines.py": "validation/engines: balls description "
+    "limits loaded loop pinocchio prediction tree; lab/engines: drake exudyn exudyn_elements opensim; "
     "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
     "validation/engines/test_guests.py": "validation: engine; validation/engines: keeper output processes workers",
-    "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects free_body_stroke",
-    "validation/engines/test_hard_suite.py": "validation/scenes: hard_families; "
-    "validation/engines: exact; validation/engines/mujoco: shipped",
+    "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
+    "validation/scenes/test_hard_families.py": "validation/engines: exact; validation/engines/mujoco: shipped",
     "validation/report/test_sections.py": "validation/report: hard_picture",
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives led monitor motions runner",
     "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls cuts sensitivities equilibria "
@@ -60,7 +59,7 @@ JUDGED_BY = {
     "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
     "validation/run: printed",
     "validation/check/test_mjcf.py": "validation/check: causes differences screen; "
-    "validation/engines: memory; validation/engines/mujoco: attached corrections describe guess theirs topology",
+    "validation/engines/mujoco: attached corrections describe guess theirs topology",
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "
     "ladder thesis_dynamics thesis_positions thirteen",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "

@@ -25,11 +25,11 @@ class Blocker:
 sys.meta_path.insert(0, Blocker())
 """
 """As `sitecustomize` it is imported by every Python started with it on its path, the workers too."""
-WITNESSES = {
+ENGINES = {
     "mujoco": {"mujoco-inverse", "mujoco-simulated"},
     "pinocchio": {"pinocchio-inverse"},
 }
-ALL = {"free-body", *WITNESSES["mujoco"], *WITNESSES["pinocchio"]}
+ALL = {"free-body", *ENGINES["mujoco"], *ENGINES["pinocchio"]}
 NEVER = "exudyn opensim pydrake"
 """Not here, installed or not: the same engines are left on every machine."""
 SCENE = """
@@ -74,15 +74,15 @@ def without(library: str, folder: Path, *arguments: str, **settings: str) -> sub
     )
 
 
-@pytest.mark.parametrize("library", WITNESSES)
+@pytest.mark.parametrize("library", ENGINES)
 def test_the_others_run_and_the_missing_named_with_the_reason(library: str, tmp_path: Path) -> None:
     done = without(library, tmp_path)
     reason = f'{library} is not installed: pip install ".[validation]" in the checkout'
     with (tmp_path / "out" / "results.csv").open() as table:
         rows = list(csv.DictReader(table))
-    assert {row["engine"] for row in rows} == {"formulas", *(ALL - WITNESSES[library])}
+    assert {row["engine"] for row in rows} == {"formulas", *(ALL - ENGINES[library])}
     assert "fails" not in {row["verdict"] for row in rows}  # MuJoCo refuses bars without mass
-    for name in WITNESSES[library]:
+    for name in ENGINES[library]:
         assert f"not run {name}: {reason}" in done.stdout
         assert f"Not run: {name}: " in (tmp_path / "out" / "report.html").read_text()
         assert f"not run: {name}: " in (tmp_path / "out" / "report.md").read_text()

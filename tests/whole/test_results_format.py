@@ -16,16 +16,14 @@ from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import COLUMNS, FORMULAS, IDENTITIES, Row
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.further import FURTHER
-from fourbar_validation.engines.hard_suite import HARD_WITNESSES
 from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
-from fourbar_validation.engines.witnesses import WITNESSES, WORK
+from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES, WORK, load_further
 from fourbar_validation.regression.change import WHOLE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.answers import check_statements
-from fourbar_validation.run.command import choose_witnesses
+from fourbar_validation.run.command import choose_engines
 from fourbar_validation.run.judge import CHECKS
-from fourbar_validation.run.released import ENGINES, FULL
+from fourbar_validation.run.released import FORWARD, FULL
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
@@ -49,7 +47,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
         options = RunOptions(workers=1, drawn=False)
-        run(Random(8, 1, tuple(DrawnType)), folder / "results", choose_witnesses("free-body"), options)
+        run(Random(8, 1, tuple(DrawnType)), folder / "results", choose_engines("free-body"), options)
     return folder
 
 
@@ -70,8 +68,8 @@ def test_every_quantity_is_described_as_the_table_has_it() -> None:
 def test_every_engine_is_described() -> None:
     table = PAGE.partition("## The engines")[2].partition("## The quantities")[0]
     described = re.findall(r"^\| `([\w-]+)` \| .+ \|$", table, re.MULTILINE)
-    assert described == ["engine", *WORK, *ENGINES, *(check.rows.__name__ for check in CHECKS if check.shipped)]
-    names = {each.name for each in (*WITNESSES, *FURTHER, *HARD_WITNESSES)}
+    assert described == ["engine", *WORK, *FORWARD, *(check.rows.__name__ for check in CHECKS if check.shipped)]
+    names = {each.name for each in (*ENGINES, *load_further(), *HARD_ENGINES)}
     assert names | {FORMULAS} == set(WORK)
 
 

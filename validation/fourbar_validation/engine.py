@@ -21,11 +21,9 @@ from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer, explain_refusal
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.engines import protocol
-from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.guests import NOT_FOUND
-from fourbar_validation.engines.hard_suite import BALLS
-from fourbar_validation.engines.mujoco.required_error import adjust_witnesses
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.mujoco.required_error import adjust_engines
+from fourbar_validation.engines.registry import BALLS, ENGINES, load_further
 from fourbar_validation.report.machine import DISTRIBUTIONS
 
 ALL_BUT_CYLINDER = (*(getattr(effects, name).key for name in effects.FILE_OF), "loads", "drive")
@@ -43,28 +41,28 @@ def open_engine(entry: str) -> tuple[Factory, dict[str, Any]]:
     """Return what makes an engine, and its hello; NotFoundError where there is none."""
     if ":" in entry:
         return _open_class(entry)
-    known = {witness.name: witness for witness in (*WITNESSES, *FURTHER, BALLS)}
+    known = {engine.name: engine for engine in (*ENGINES, *load_further(), BALLS)}
     if entry not in known:
         raise NotFoundError(f"must be module:Class, or one of {', '.join(known)}")
-    witness = known[entry]
-    if reason := witness.missing():
+    engine = known[entry]
+    if reason := engine.missing():
         raise NotFoundError(reason)
-    engine = witness.engine()
+    adapter = engine.start()
     hello = {
         "engine": entry,
-        "answers": list(witness.expected),
-        "commands": list(getattr(engine, "commands", ("theta_2",))),
+        "answers": list(engine.expected),
+        "commands": list(getattr(adapter, "commands", ("theta_2",))),
         "effects": [*ALL_BUT_CYLINDER, "cylinder"],
     }
-    library = witness.library.removeprefix("py")  # pydrake is of the distribution drake
+    library = engine.library.removeprefix("py")  # pydrake is of the distribution drake
     try:
         hello["version"] = version(DISTRIBUTIONS.get(library, "fourbar"))
     except PackageNotFoundError:
         hello["version"] = ""
 
     def make(error: float | None = None, **setting: Any) -> Any:
-        laid_out = witness if error is None else adjust_witnesses((witness,), error)[0]
-        return _apply_setting(laid_out.engine(), setting, ())
+        laid_out = engine if error is None else adjust_engines((engine,), error)[0]
+        return _apply_setting(laid_out.start(), setting, ())
 
     return make, hello
 

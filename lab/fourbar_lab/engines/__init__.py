@@ -5,27 +5,27 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from fourbar_validation.compare.answer import Engine
+from fourbar_validation.compare.answer import Adapter
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.prediction import predict_in_world_axes
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.registry import Engine
 
 
-def make_exudyn() -> Engine:
+def make_exudyn() -> Adapter:
     """Start Exudyn."""
     from fourbar_lab.engines.exudyn import ExudynConstraints
 
     return ExudynConstraints()
 
 
-def make_opensim() -> Engine:
+def make_opensim() -> Adapter:
     """Start OpenSim."""
     from fourbar_lab.engines.opensim import OpenSimConstraints
 
     return OpenSimConstraints()
 
 
-def make_drake() -> Engine:
+def make_drake() -> Adapter:
     """Start Drake."""
     from fourbar_lab.engines.drake import DrakeInverse
 
@@ -39,8 +39,8 @@ def _hash_adapters() -> str:
     return digest.hexdigest()[:16]
 
 
-_exact: Callable[..., Witness] = partial(
-    Witness, tolerance=EQUIVALENCE, predictor=predict_in_world_axes, code=_hash_adapters()
+_exact: Callable[..., Engine] = partial(
+    Engine, tolerance=EQUIVALENCE, predictor=predict_in_world_axes, code=_hash_adapters()
 )
 EXUDYN = _exact("exudyn-constraints", make_exudyn, library="exudyn")
 OPENSIM = _exact("opensim-constraints", make_opensim, library="opensim")

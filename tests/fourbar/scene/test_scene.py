@@ -20,7 +20,7 @@ from fourbar.solution import Solution
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.engines.balls import compute_reference
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 
 U = 2.0**-53
@@ -292,14 +292,14 @@ def test_the_harness_asks_who_takes_the_command_and_writes_the_refusal_of_the_ot
     assert not [row for row in rows if row.failed]
     agreed = {row.quantity for row in rows if row.engine == "free-body" and row.verdict == AGREES}
     assert {"theta_3", "omega_2", "alpha_2", "A", "F12", "F43", "torque", "closure"} <= agreed
-    undeclared = replace(WITNESSES[0], name="undeclared", engine=Undeclared)
+    undeclared = replace(ENGINES[0], name="undeclared", start=Undeclared)
     (row,) = (row for row in judge("", scene, (undeclared,)).rows if row.engine == "undeclared")
     assert row.verdict == REFUSES
     assert row.reason == "it takes a command of theta_2, and here theta_4 is commanded"
 
 
 class Undeclared:
-    """A witness that does not say what commands it takes, and so is asked for none but theta_2."""
+    """An engine that does not say what commands it takes, and so is asked for none but theta_2."""
 
     name = "undeclared"
 

@@ -16,7 +16,7 @@ from fourbar.scene.motion import Sweep
 from fourbar.studies.keys import read_place, replace_numbers
 from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines.balls import compute_reference
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
@@ -88,7 +88,7 @@ def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end() -> No
 @pytest.mark.parametrize("bar", [2, 4])
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_free_bodies_find_the_angle_by_halving_and_agree(bar: int, side: str) -> None:
-    free_body = [witness for witness in WITNESSES if witness.name == "free-body"]
+    free_body = [engine for engine in ENGINES if engine.name == "free-body"]
     strokes = {2: Sweep(0.25, 0.35, 8), 4: Sweep(0.45, 0.52, 8)}[bar]
     rows = judge("", scene(bar, strokes, side, stroke_speed=0.2, stroke_acceleration=0.1), free_body).rows
     assert not [row for row in rows if row.failed]

@@ -18,8 +18,7 @@ from fourbar.scene.motion import Free, FromLimit, Motion
 from fourbar.solution import find_values
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import list_entries
-from fourbar_validation.engines.ball_vectors import Values
-from fourbar_validation.engines.balls import BITS, collect_inputs, compute_outputs
+from fourbar_validation.engines.balls import BITS, Values, collect_inputs, compute_outputs
 from tests.fourbar.studies.test_study import ANGLES, DRIVEN, LINK, LOADS, RUBBING, scene
 
 TABLED = Load(4, (2.0, 0.1), (0.0, 0.0), 0.3, "world", Table((0.0, 2.0, 6.0), (0.0, 1.0, 2.0)))

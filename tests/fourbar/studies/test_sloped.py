@@ -34,8 +34,7 @@ from fourbar.studies import sloped
 from fourbar.studies.enclosure import _Search, require_provable
 from fourbar.studies.keys import list_entries, read_place, replace_numbers
 from fourbar.studies.sloped import Sloped, Undecided
-from fourbar_validation.engines.ball_vectors import wedge
-from fourbar_validation.engines.balls import closure, make_balls
+from fourbar_validation.engines.balls import closure, make_balls, wedge
 
 STRADDLED = [(0.0, 1.0), (0.5, 1.0), (-1.0, 1e-3), (2.0, 2.0), (0.0, 0.0)]
 """Centres and radii: over 0, over whole and half numbers, at a kink, and none at all."""

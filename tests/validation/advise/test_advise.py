@@ -21,7 +21,7 @@ from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.mujoco import required_error
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.trial import TrialSetup
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import MODELS
 from tests.validation.cost.test_cost import turning
@@ -107,15 +107,15 @@ def test_an_error_is_between_0_and_1(required: float) -> None:
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
         advise.advise(turning(), required)
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
-        required_error.adjust_witnesses(WITNESSES, required)
+        required_error.adjust_engines(ENGINES, required)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("required", [1e-3, 1e-7])
 def test_a_run_is_no_more_precise_than_required(required: float) -> None:
     scene = turning(positions=90)
-    witnesses = [witness for witness in WITNESSES if witness.through_time]
-    record = judge("s", scene, required_error.adjust_witnesses(witnesses, required))
+    engines = [engine for engine in ENGINES if engine.through_time]
+    record = judge("s", scene, required_error.adjust_engines(engines, required))
     assert not [row for row in record.rows if row.verdict == FAILS]
     (answer,) = record.answers
     answers = [row for row in record.rows if row.engine == "mujoco-simulated" and row.quantity != "as shipped"]
@@ -127,20 +127,20 @@ def test_a_run_is_no_more_precise_than_required(required: float) -> None:
 
 
 def test_a_guest_is_asked_for_the_error_and_not_answered_for_by_the_harness() -> None:
-    (simulated,) = (witness for witness in WITNESSES if witness.through_time)
+    (simulated,) = (engine for engine in ENGINES if engine.through_time)
     guest = Guest("mujoco 3.3.7", partial(dict), simulated.tolerance, through_time=True)
-    ours, theirs, exact = required_error.adjust_witnesses((simulated, guest, replace(guest, through_time=False)), 1e-3)
-    assert ours.engine != simulated.engine and theirs.engine() == {"setting": {"error": 1e-3}} == exact.engine()
+    ours, theirs, exact = required_error.adjust_engines((simulated, guest, replace(guest, through_time=False)), 1e-3)
+    assert ours.start != simulated.start and theirs.start() == {"setting": {"error": 1e-3}} == exact.start()
     assert theirs.tolerance == ours.tolerance != exact.tolerance == guest.tolerance
 
 
-def test_exact_witnesses_stay_exact() -> None:
+def test_exact_engines_stay_exact() -> None:
     changed = [
-        new for old, new in zip(WITNESSES, required_error.adjust_witnesses(WITNESSES, 1e-3), strict=True) if new != old
+        new for old, new in zip(ENGINES, required_error.adjust_engines(ENGINES, 1e-3), strict=True) if new != old
     ]
-    assert [witness.name for witness in changed] == ["mujoco-simulated"]
+    assert [engine.name for engine in changed] == ["mujoco-simulated"]
     assert changed[0].tolerance.factor == 1e-3 and changed[0].expected == next(
-        w.expected for w in WITNESSES if w.through_time
+        w.expected for w in ENGINES if w.through_time
     )
 
 

@@ -31,8 +31,8 @@ from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.compare.tolerance import SIMULATED
-from fourbar_validation.engines.memory import WORKER_MEMORY
 from fourbar_validation.engines.mujoco.theirs import ONE_STATE, THROUGH_TIME, Examined, examine, examine_corrected
+from fourbar_validation.engines.processes import WORKER_MEMORY
 
 CRANK_ROCKER = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 GENERATED = write_mjcf(CRANK_ROCKER)

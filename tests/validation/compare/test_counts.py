@@ -22,7 +22,7 @@ from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, write_results
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.cost.laws import ErrorLaw
-from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import compare_rows
 from fourbar_validation.report.html import write_html as page_of
@@ -144,16 +144,16 @@ class SilentWithoutEffects(Echo):
 
 
 @pytest.mark.parametrize(
-    ("engine", "verdict", "reason"),
+    ("adapter", "verdict", "reason"),
     [
         (OnlyWithEffects, REFUSES, "nothing acts"),
         (AlarmedWithoutEffects, FAILS, "watch: it shakes"),
         (SilentWithoutEffects, FAILS, "assembled: the engine did not say where the loop closes"),
     ],
 )
-def test_what_is_wrong_with_the_inertia_alone_is_a_row(engine: type, verdict: str, reason: str) -> None:
-    witness = Witness("echo", engine, EQUIVALENCE)
-    found = [row for row in judge("scene", crank_rocker(), [witness]).rows if row.quantity == "torque_inertia"]
+def test_what_is_wrong_with_the_inertia_alone_is_a_row(adapter: type, verdict: str, reason: str) -> None:
+    engine = Engine("echo", adapter, EQUIVALENCE)
+    found = [row for row in judge("scene", crank_rocker(), [engine]).rows if row.quantity == "torque_inertia"]
     assert [(row.verdict, row.reason) for row in found] == [(verdict, reason)]
 
 
@@ -161,7 +161,7 @@ def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
     apart = fourbar.Motion(fourbar.Sweep(2.0, 4.0, 5), 1.0)  # beyond the limits of this input
     scene = Scene(fourbar.uniform(0.3, 0.25, 0.1, 0.22), apart)
     assert not fourbar.solve(scene).assembled.any()
-    found = judge("scene", scene, [w for w in WITNESSES if w.name == "free-body"]).rows
+    found = judge("scene", scene, [w for w in ENGINES if w.name == "free-body"]).rows
     verdicts = {(row.engine, row.quantity): row.verdict for row in found}
     assert verdicts["formulas", "closure"] == verdicts["free-body", "torque"] == UNDECIDED
     assert verdicts["free-body", "assembled"] == AGREES
@@ -218,11 +218,11 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
 
 @pytest.mark.slow
 def test_every_form_of_a_report_says_the_same_counts() -> None:
-    refused = Witness("echo", Refuses, EQUIVALENCE)
-    exact = next(w for w in WITNESSES if w.name == "free-body")
+    refused = Engine("echo", Refuses, EQUIVALENCE)
+    exact = next(w for w in ENGINES if w.name == "free-body")
     good, bad = (
-        judge_for_report(name, crank_rocker(title=name), witnesses, draw=False)
-        for name, witnesses in (("good", (exact, refused)), ("refused", (refused,)))
+        judge_for_report(name, crank_rocker(title=name), engines, draw=False)
+        for name, engines in (("good", (exact, refused)), ("refused", (refused,)))
     )
     summary = summary_of([good, bad])
     # the rows of the formulas themselves stand on both scenes; the others are of the free bodies
@@ -243,7 +243,7 @@ def test_a_free_motion_that_every_engine_refuses_is_not_held(monkeypatch: pytest
         def release(self, scene: Scene, times: object) -> ReleasedAnswer:
             return ReleasedAnswer.refused("refusing", "-", "a declared limit")
 
-    monkeypatch.setattr(free, "ENGINES", {name: (Refusing, *rest) for name, (_, *rest) in free.ENGINES.items()})
+    monkeypatch.setattr(free, "FORWARD", {name: (Refusing, *rest) for name, (_, *rest) in free.FORWARD.items()})
     scene = crank_rocker(motion=fourbar.Motion(1.0, 0.0, free=fourbar.Free(0.2, 20)))
     page = judge_for_report("free", scene, (), draw=False)
     sentence = "Nothing was compared on 1 scene: 1 of the formulas' own identities hold; 2 refuse"

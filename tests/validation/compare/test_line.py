@@ -12,14 +12,13 @@ from fourbar.effects import LinearDrive, SpringEnd
 from fourbar.scene import Scene
 from fourbar_validation.compare.rows import AGREES, FAILS
 from fourbar_validation.engines.exact import BallArithmetic
-from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.guests import Asked, Hello, Program
-from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.engines.registry import ENGINES, Engine, load_further
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
-FREE_BODY = [witness for witness in WITNESSES if witness.name == "free-body"]
-EXACT = [witness for witness in (*WITNESSES, *FURTHER) if not witness.through_time and witness not in FREE_BODY]
+FREE_BODY = [engine for engine in ENGINES if engine.name == "free-body"]
+EXACT = [engine for engine in (*ENGINES, *load_further()) if not engine.through_time and engine not in FREE_BODY]
 PAIRS = list(combinations((1, 2, 3, 4), 2))
 PINS = fourbar.PinFriction.at(A=(0.1, 0.005), O4=(0.2, 0.004))
 
@@ -42,22 +41,22 @@ def test_every_pair_of_bars_agrees_with_thirteen_equations(one: int, other: int)
             assert "drive_force_inertia" in known and "torque" not in known
 
 
-@pytest.mark.parametrize("witness", EXACT, ids=lambda witness: witness.name)
+@pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
 @pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(witness: Witness, one: int, other: int) -> None:
-    if missing := witness.missing():
+def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(engine: Engine, one: int, other: int) -> None:
+    if missing := engine.missing():
         pytest.skip(missing)
     for effects in ((fourbar.Gravity(), fourbar.Viscous.at(B=0.02)), (fourbar.Gravity(), PINS)):
-        rows = judge("", driven(one, other, effects=effects), [*FREE_BODY, witness]).rows
+        rows = judge("", driven(one, other, effects=effects), [*FREE_BODY, engine]).rows
         assert not [row for row in rows if row.failed]
-        known = {row.quantity for row in rows if row.engine == witness.name and row.verdict == AGREES}
+        known = {row.quantity for row in rows if row.engine == engine.name and row.verdict == AGREES}
         assert known >= {"drive_force", "stroke", "stroke_speed", "drive_force_inertia", "F12", "F32", "F43", "F14"}
 
 
-@pytest.mark.parametrize("witness", [*FREE_BODY, *EXACT], ids=lambda witness: witness.name)
+@pytest.mark.parametrize("engine", [*FREE_BODY, *EXACT], ids=lambda engine: engine.name)
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
-def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(witness: Witness, gap: float) -> None:
-    if missing := witness.missing():
+def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine: Engine, gap: float) -> None:
+    if missing := engine.missing():
         pytest.skip(missing)
     linkage = crank_rocker().linkage
     (theta_4,) = fourbar.solve(crank_rocker(motion=fourbar.Motion(1.0)), "position").theta_4
@@ -65,7 +64,7 @@ def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(witness: W
     drive = LinearDrive(SpringEnd(1, abs(on_bar + gap), np.angle(on_bar + gap)), SpringEnd(4, 0.2, 0.4))
     scene = crank_rocker(motion=fourbar.Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0), drive=drive)
     assert fourbar.solve(scene, "position").stroke == pytest.approx(gap, rel=0.5)
-    rows = {row.quantity: row for row in judge("", scene, [witness]).rows if row.engine == witness.name}
+    rows = {row.quantity: row for row in judge("", scene, [engine]).rows if row.engine == engine.name}
     for quantity in ("stroke", "drive_line", "stroke_speed", "drive_force", "F14"):
         assert rows[quantity].verdict == AGREES and rows[quantity].allowed < 1e-12 / gap, quantity
 

@@ -11,7 +11,7 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.solve import solve
 from fourbar_validation.compare.reversals import break_curve, find_reversals
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
@@ -55,7 +55,7 @@ def test_the_jump_is_that_of_statics() -> None:
 @pytest.mark.parametrize("start", [0.1, 0.0])
 def test_both_sides_are_judged_and_the_reversal_itself_is_not(start: float) -> None:
     """From 0 the sweep meets both reversals of pin B exactly; the engines' rounding decides their sense there."""
-    record = judge("scene", scene("B", start=start), [witness for witness in WITNESSES if not witness.through_time])
+    record = judge("scene", scene("B", start=start), [engine for engine in ENGINES if not engine.through_time])
     assert all(row.passed for row in record.rows), [row for row in record.rows if not row.passed]
     noted = [row.reason for row in record.rows if "reverses not judged" in row.reason]
     assert bool(noted) == (start == 0.0)

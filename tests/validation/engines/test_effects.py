@@ -36,7 +36,7 @@ from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_effects
 from fourbar_validation.engines.effects import TERM_OF
 from fourbar_validation.engines.free_body_closure import close
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
@@ -60,11 +60,11 @@ ACTING: dict[str, Effect] = {
     "load": Load(4, (3.0, 0.7), (0.05, 1.0), 0.2, "bar"),
     "load over theta_2": Load(3, (4.0, 0.7), (0.05, 1.0), 0.2, "world", TABLE),
 }
-EXACT = [witness for witness in WITNESSES if not witness.through_time]
-SIMULATED = [replace(witness, order=None) for witness in WITNESSES if witness.through_time]
-ENGINES = {"pinocchio-inverse", "mujoco-inverse"}
+EXACT = [engine for engine in ENGINES if not engine.through_time]
+SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through_time]
+ON_TREES = {"pinocchio-inverse", "mujoco-inverse"}
 """What acts by `TERM_OF`, the table of the engines."""
-INVERSE = {*ENGINES, "free-body"}
+INVERSE = {*ON_TREES, "free-body"}
 NO_COUNTERPART = {"mujoco-simulated": NO_MJCF}
 """What an engine cannot do; it must say so, and the others remain."""
 
@@ -80,16 +80,16 @@ def scene(*names: str) -> Scene:
     )
 
 
-def outcome(posed: Scene, witnesses: list[Any]) -> tuple[list[tuple[str, str, str]], set[str]]:
+def outcome(posed: Scene, engines: list[Any]) -> tuple[list[tuple[str, str, str]], set[str]]:
     """What fails, and who refuses."""
-    rows = judge("scene", posed, witnesses).rows
+    rows = judge("scene", posed, engines).rows
     return [(r.engine, r.quantity, r.reason) for r in rows if r.failed], {
         r.engine for r in rows if r.verdict == "refuses"
     }
 
 
-def failing(posed: Scene, witnesses: list[Any]) -> list[tuple[str, str, str]]:
-    return outcome(posed, witnesses)[0]
+def failing(posed: Scene, engines: list[Any]) -> list[tuple[str, str, str]]:
+    return outcome(posed, engines)[0]
 
 
 def test_every_effect_of_the_registry_is_here() -> None:
@@ -231,7 +231,7 @@ class Lightening(Flywheel):
 @pytest.mark.parametrize("fault", ["wrong sign", "wrong pin or bar", "applied twice", "missing"])
 def test_a_fault_in_the_formulas_fails_the_run(name: str, fault: str) -> None:
     posed, effect = scene(name), ACTING[name]
-    inverse = [witness for witness in EXACT if witness.name in INVERSE]
+    inverse = [engine for engine in EXACT if engine.name in INVERSE]
     if fault == "missing":
         with formulas_see(each_term(lambda term: [])):
             found = failing(posed, inverse)
@@ -293,14 +293,14 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
         monkeypatch.setattr(free_body_effects, "apply_load", faulty(free_body_effects.apply_load))
     else:
         monkeypatch.setitem(free_body_effects.WRENCH_OF, name, faulty(free_body_effects.WRENCH_OF[name]))
-    found = failing(scene(name), [witness for witness in EXACT if witness.name == "free-body"])
+    found = failing(scene(name), [engine for engine in EXACT if engine.name == "free-body"])
     assert "torque" in {quantity for _, quantity, _ in found}
 
 
 def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Spring, "slack", 0.0)
-    found = failing(scene("springs"), [witness for witness in EXACT if witness.name in ENGINES])
-    assert {engine for engine, _, _ in found} >= ENGINES
+    found = failing(scene("springs"), [engine for engine in EXACT if engine.name in ON_TREES])
+    assert {engine for engine, _, _ in found} >= ON_TREES
 
 
 @pytest.mark.parametrize("name", ACTING)
@@ -309,15 +309,15 @@ def test_a_fault_in_the_engine_term_fails_the_run(name: str, factor: float, monk
     key = ACTING[name].key
     right = TERM_OF[key]
     monkeypatch.setitem(TERM_OF, key, lambda effect, tree: right(effect, FaultyTree(tree, factor)))
-    found = failing(scene(name), [witness for witness in EXACT if witness.name in ENGINES])
-    assert {engine for engine, _, _ in found} >= ENGINES
+    found = failing(scene(name), [engine for engine in EXACT if engine.name in ON_TREES])
+    assert {engine for engine, _, _ in found} >= ON_TREES
 
 
 @pytest.mark.parametrize("name", [n for n in ACTING if n not in ("pin_friction", "flywheel")])
 def test_the_work_of_an_effect_is_that_of_the_forces_on_the_free_bodies(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Power = sum of F v + M omega, with F and M of the witness and velocities of the first pins; a sign must show."""
+    """Power = sum of F v + M omega, with F and M of the engine and velocities of the first pins; a sign must show."""
     posed, effect = scene(name), ACTING[name]
     where, linkage = command(posed), posed.linkage
     moving = compute_state(linkage, where.theta_2, where.branch, 10.0, 3.0)

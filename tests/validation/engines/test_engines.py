@@ -22,18 +22,17 @@ from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, K
 from fourbar_validation.engines import loop
 from fourbar_validation.engines.effects import TERM_OF
-from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse, MujocoTree
+from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.engines.tree import solve_closed
-from fourbar_validation.engines.witnesses import WITNESSES
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.scenes import crank_rocker, thesis
 from tests.validation.engines.test_effects import ACTING, scene
 
-WITNESS = {witness.name: witness for witness in (*WITNESSES, *FURTHER) if not witness.through_time}
+ENGINE = {engine.name: engine for engine in (*ENGINES, *load_further()) if not engine.through_time}
 TREES = ("pinocchio-inverse", "mujoco-inverse", "drake-inverse")
 BARS = (*TREES, "exudyn-constraints", "opensim-constraints")
 OWN = {"exudyn-constraints": {"viscous", "torsion", "springs"}}
@@ -61,20 +60,20 @@ MECHANISMS = {  # ground, input, coupler, output
 
 def present(*names: str) -> list[Any]:
     """Engines, each skipped by its name where it is not installed."""
-    libraries = {name: WITNESS[name].library for name in names}
+    libraries = {name: ENGINE[name].library for name in names}
     return [
         pytest.param(
             name,
-            marks=pytest.mark.skipif(bool(lib) and find_spec(lib) is None, reason=str(WITNESS[name].missing())),
+            marks=pytest.mark.skipif(bool(lib) and find_spec(lib) is None, reason=str(ENGINE[name].missing())),
         )
         for name, lib in libraries.items()
     ]
 
 
-each_witness = pytest.mark.parametrize("name", present(*WITNESS))
+each_engine = pytest.mark.parametrize("name", present(*ENGINE))
 each_engine = pytest.mark.parametrize("name", present(*BARS))
 each_tree = pytest.mark.parametrize("name", present(*TREES))
-further = pytest.mark.parametrize("name", present(*(witness.name for witness in FURTHER)))
+further = pytest.mark.parametrize("name", present(*(engine.name for engine in load_further())))
 
 
 def bars(lengths: tuple[float, ...], ground_angle: float = 0.4) -> FourBar:
@@ -93,7 +92,7 @@ def random_linkage(rng: np.random.Generator) -> FourBar:
 
 
 def answered(name: str, case: Scene, at: Command | None = None) -> Any:
-    return WITNESS[name].engine().answer(case, at or command(case))
+    return ENGINE[name].start().answer(case, at or command(case))
 
 
 def failures(name: str, case: Scene, every: int = 1) -> list[tuple[str, str]]:
@@ -108,7 +107,7 @@ def failures(name: str, case: Scene, every: int = 1) -> list[tuple[str, str]]:
     return [(row.quantity, row.reason) for row in rows if not row.passed]
 
 
-@each_witness
+@each_engine
 def test_thesis_figures(name: str) -> None:
     got = answered(name, thesis()).quantities
     assert got["torque"][0] == pytest.approx(3.0930935923, abs=PRINTED, rel=0.0)
@@ -118,7 +117,7 @@ def test_thesis_figures(name: str) -> None:
         assert got[force][0] == pytest.approx(figure, abs=PRINTED, rel=0.0), force
 
 
-@each_witness
+@each_engine
 @pytest.mark.parametrize("lengths", MECHANISMS.values(), ids=MECHANISMS.keys())
 def test_agrees_to_round_off(name: str, lengths: tuple[float, ...]) -> None:
     for drive in (2, 3, 4):
@@ -181,7 +180,7 @@ def test_the_branch_is_the_commanded_one(name: str) -> None:
     assert missing > 100, "the sample must hold positions that do not assemble"
 
 
-@each_witness
+@each_engine
 @pytest.mark.parametrize("offset", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_assembles_up_to_a_limit_and_not_beyond(name: str, offset: float) -> None:
     linkage = bars(MECHANISMS["triple rocker"], 0.0)
@@ -197,7 +196,7 @@ def test_assembles_up_to_a_limit_and_not_beyond(name: str, offset: float) -> Non
             assert np.isnan(answer.quantities["torque"][0]) == (not answer.assembled[0])
 
 
-@each_witness
+@each_engine
 def test_positions_only(name: str) -> None:
     quantities = answered(name, Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.array([0.5, 1.0])))).quantities
     assert "theta_3" in quantities and "torque" not in quantities and "omega_3" not in quantities
@@ -290,7 +289,7 @@ class Wind(Effect):
     key: ClassVar[str] = "wind"
 
 
-@each_witness
+@each_engine
 def test_what_has_no_model_is_refused_by_name(name: str) -> None:
     assert "'wind'" in (answered(name, replace(scene(), effects=(Wind(),))).refusal or "")
 
@@ -356,7 +355,7 @@ def judged(name: str) -> set[str]:
 
 @each_engine
 def test_a_planted_fault_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    owner: Any = type(WITNESS[name].engine().build(SPOILED))  # type: ignore[attr-defined]
+    owner: Any = type(ENGINE[name].start().build(SPOILED))  # type: ignore[attr-defined]
     assert judged(name) == set()
     for method, (fault, seen) in PLANTED[name].items():
         with monkeypatch.context() as patch:
@@ -393,7 +392,7 @@ def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
 ) -> None:
     for branch in (1, -1):
         case = commanded(what, branch)
-        rows = [row for row in judge("", case, [WITNESS[name]]).rows if row.engine == name]
+        rows = [row for row in judge("", case, [ENGINE[name]]).rows if row.engine == name]
         if name == "opensim-constraints" and what == "theta_3":
             assert [(row.verdict, "theta_3 is commanded" in row.reason) for row in rows] == [(REFUSES, True)]
             continue
@@ -403,7 +402,7 @@ def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
         right = loop.Assembler.find
         with monkeypatch.context() as patch:
             patch.setattr(loop.Assembler, "find", lambda self, theta, branch, of=right: of(self, theta, -branch))
-            assert [row for row in judge("", case, [WITNESS[name]]).rows if row.engine == name and row.failed]
+            assert [row for row in judge("", case, [ENGINE[name]]).rows if row.engine == name and row.failed]
 
 
 def test_rates_close_the_loop_and_give_the_commanded_bar_its_own() -> None:
@@ -484,7 +483,7 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
         friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
         whole = Scene(link, motion, drive, (), (Gravity(), friction))
         names = ("pinocchio-inverse", "free-body")
-        answers = [WITNESS[name].engine().answer(whole, command(whole)) for name in names]
+        answers = [ENGINE[name].start().answer(whole, command(whole)) for name in names]
         engine, bodies = (answer.quantities["torque"][0] for answer in answers)
         assert math.isnan(engine) is math.isnan(bodies) is jams
         assert jams or abs(engine - bodies) <= 1e-9 * abs(bodies)  # of some 1e-12 that rounding leaves near a jam

@@ -13,10 +13,10 @@ from fourbar.scene import command as list_positions
 from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines import environments, guests
 from fourbar_validation.engines.environments import Entry, make_environment, read_engines, start_engines
-from fourbar_validation.engines.mujoco.required_error import adjust_witnesses
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.mujoco.required_error import adjust_engines
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.regression.record import describe_run
-from fourbar_validation.run.command import choose_witnesses
+from fourbar_validation.run.command import choose_engines
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
@@ -59,11 +59,11 @@ def test_two_versions_are_judged_side_by_side(tmp_path: Path, monkeypatch: pytes
         for version, factor in (("1.0", "1.0"), ("1.1", "1.001"))
     ]
     (tmp_path / "engines.toml").write_text("\n".join(tables))
-    witnesses = choose_witnesses("free-body, toy 1.0, toy 1.1", WITNESSES, [tmp_path])
-    assert [witness.name for witness in witnesses] == ["free-body", "toy 1.0", "toy 1.1"]
-    assert describe_run(witnesses, "").versions.items() >= {("toy 1.0", "1.0"), ("toy 1.1", "1.1")}
+    engines = choose_engines("free-body, toy 1.0, toy 1.1", ENGINES, [tmp_path])
+    assert [engine.name for engine in engines] == ["free-body", "toy 1.0", "toy 1.1"]
+    assert describe_run(engines, "").versions.items() >= {("toy 1.0", "1.0"), ("toy 1.1", "1.1")}
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0))
-    failed = {(row.engine, row.quantity) for row in judge("scene", scene, witnesses).rows if row.verdict != AGREES}
+    failed = {(row.engine, row.quantity) for row in judge("scene", scene, engines).rows if row.verdict != AGREES}
     assert failed == {("toy 1.1", "torque")}
     for running in guests._RUNNING.values():
         running.end()
@@ -82,8 +82,8 @@ def test_an_environment_that_cannot_be_made_is_one_line(tmp_path: Path, monkeypa
 
 
 def test_an_adapter_of_ours_is_held_to_what_it_is_held_to_here() -> None:
-    (guest,) = start_engines([Entry("mine", adapter="mujoco-simulated")], WITNESSES)
-    (ours,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
+    (guest,) = start_engines([Entry("mine", adapter="mujoco-simulated")], ENGINES)
+    (ours,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
     assert (guest.name, guest.tolerance, guest.through_time, guest.residuals) == ("mine", ours.tolerance, True, True)
     assert guest.version and not guest.generated
 
@@ -92,16 +92,16 @@ def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
     pytest.importorskip("mujoco")
     entry = Entry("mine", adapter="mujoco-simulated", steps=(48, 96))
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
-    (guest,) = start_engines([entry], WITNESSES)
-    (wanted,) = adjust_witnesses([guest], 1e-3)
-    refused, exact = start_engines([replace(entry, setting="fast"), Entry("free", adapter="free-body")], WITNESSES)
+    (guest,) = start_engines([entry], ENGINES)
+    (wanted,) = adjust_engines([guest], 1e-3)
+    refused, exact = start_engines([replace(entry, setting="fast"), Entry("free", adapter="free-body")], ENGINES)
     at = list_positions(scene)
     try:
-        assert guest.engine().answer(scene, at).setting == "RK4 96/rev"
-        answer = wanted.engine().answer(scene, at)
+        assert guest.start().answer(scene, at).setting == "RK4 96/rev"
+        answer = wanted.start().answer(scene, at)
         assert answer.evidence["wanted_error"] == 1e-3 and answer.setting != "RK4 96/rev"
-        assert refused.engine().answer(scene, at).refusal == "it does not name 'fast' among its settings"
-        assert adjust_witnesses([exact], 1e-3)[0].engine().answer(scene, at).setting == "exact"
+        assert refused.start().answer(scene, at).refusal == "it does not name 'fast' among its settings"
+        assert adjust_engines([exact], 1e-3)[0].start().answer(scene, at).setting == "exact"
     finally:
         for running in guests._RUNNING.values():
             running.end()
@@ -129,4 +129,4 @@ def test_what_is_no_entry_is_named_with_its_file(text: str, words: str, tmp_path
 
 def test_a_name_that_is_nobody_s_is_refused_with_those_that_are_known() -> None:
     with pytest.raises(InputError, match=r"must be among pinocchio-inverse, .*mujoco 3\.3\.7"):
-        choose_witnesses("nobody")
+        choose_engines("nobody")

@@ -17,7 +17,7 @@ from fourbar.quantities import OF_LINE, STAGE_OF
 from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
 from fourbar_validation.engines.free_body import FreeBody, grow_couples
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import ROOT, imported
@@ -25,7 +25,7 @@ from tests.whole.test_imports import ROOT, imported
 EPS = 2.0**-52
 DIGITS = 50.0 * EPS
 """Of the sum of the terms: an equation of some fifty roundings, evaluated in doubles."""
-ONE = [witness for witness in WITNESSES if witness.name == "free-body"]
+ONE = [engine for engine in ENGINES if engine.name == "free-body"]
 RECTANGLE = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.3), fourbar.Bar(0.1))
 
 

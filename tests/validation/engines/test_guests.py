@@ -21,8 +21,7 @@ from fourbar.scene.motion import Free
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests
-from fourbar_validation.engines.further import FURTHER
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.command import Request, select_scenes
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.run import RunOptions, run
@@ -36,7 +35,7 @@ HERE = "tests.support.hostile_class:"
 TORQUE = '"torque": moments[0] - cross(r2, F32)'
 SCRIPT = ROOT / "tests" / "support" / "plain_engine.mjs"
 SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
-FREE_BODY = tuple(witness for witness in WITNESSES if witness.name == "free-body")
+FREE_BODY = tuple(engine for engine in ENGINES if engine.name == "free-body")
 Verdicts = dict[str, dict[str, tuple[str, str]]]
 
 
@@ -51,9 +50,9 @@ def _ended() -> Iterator[None]:
 def judged(scene: fourbar.Scene, *entries: str, seconds: float = 60.0) -> Verdicts:
     """Verdict and reason by engine and quantity; a name without a colon is a class of tests.support."""
     entries = tuple(entry if re.search("[: ]", entry) else HERE + entry for entry in entries)
-    witnesses = (*guests.read_guests(entries, [witness.name for witness in FREE_BODY], seconds), *FREE_BODY)
+    engines = (*guests.read_guests(entries, [engine.name for engine in FREE_BODY], seconds), *FREE_BODY)
     result: Verdicts = {}
-    for row in judge("scene", scene, witnesses).rows:
+    for row in judge("scene", scene, engines).rows:
         result.setdefault(row.engine, {})[row.quantity] = row.verdict, row.reason
     return result
 
@@ -81,7 +80,7 @@ WHOLE = '    text = json.dumps({"id": question["id"], **reply})\n'
 SAY = "    print(text, flush=True)\n"
 NO_JSON, ENDLESS = "said what is no JSON", "    while True:\n        print(end='x' * 2**20)\n"
 PROGRAMS: dict[str, tuple[str, str, str]] = {
-    "one number short": ("values in found]", "values in found[1:]]", "answers.theta_3 = "),
+    "one number short": ("values in solved]", "values in solved[1:]]", "answers.theta_3 = "),
     "log line": ("for question in", 'print("started")\nfor question in', f"{NO_JSON} (Expecting value"),
     "dead": (LAST, f"{AFTER_HELLO}    sys.exit(3)\n", "exit status 3"),
     "another hello": (
@@ -340,30 +339,30 @@ def test_parts_judged_by_another_code_are_made_again(tmp_path: Path, monkeypatch
                 raise KeyboardInterrupt
 
     def notes(entries: Sequence[str]) -> list[str]:
-        heard, witnesses = Interrupting(), guests.read_guests(entries, ())
+        heard, engines = Interrupting(), guests.read_guests(entries, ())
         with pytest.raises(KeyboardInterrupt):
-            run(suite, tmp_path / "out", witnesses, RunOptions(drawn=False), progress=heard)
+            run(suite, tmp_path / "out", engines, RunOptions(drawn=False), progress=heard)
         return heard.lines
 
     program = write_program(tmp_path, "program")
     for factor, expected in (("1.0", 0), ("1.0", 0), ("1.01", 1), ("1.01", 0)):
         (tmp_path / "near.py").write_text(NEAR.replace("FACTOR", factor))
-        assert notes(["mine:Mine", program]) == ["made again: the parts of another run (witnesses)"] * expected
+        assert notes(["mine:Mine", program]) == ["made again: the parts of another run (engines)"] * expected
     write_program(tmp_path, "program", (TORQUE, '"torque": 1.01 * (moments[0] - cross(r2, F32))'))
-    assert notes(["mine:Mine", program]) == ["made again: the parts of another run (witnesses)"]
+    assert notes(["mine:Mine", program]) == ["made again: the parts of another run (engines)"]
 
 
-@pytest.mark.parametrize("witness", [*WITNESSES, *FURTHER], ids=lambda witness: witness.name)
-def test_our_own_adapters_answer_the_same_bytes_through_the_host(witness: Any) -> None:
-    if missing := witness.missing():
+@pytest.mark.parametrize("engine", [*ENGINES, *load_further()], ids=lambda engine: engine.name)
+def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) -> None:
+    if missing := engine.missing():
         pytest.skip(missing)
-    program = guests.serve(witness.name, 120.0)
-    engine = partial(guests.Asked, witness.name, program, guests.ask_hello(program))
-    outside = replace(witness, engine=engine)
+    program = guests.serve(engine.name, 120.0)
+    start = partial(guests.Asked, engine.name, program, guests.ask_hello(program))
+    outside = replace(engine, start=start)
     loaded = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 40), 10.0))
     stroke = fourbar.Motion(stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left")
     drive = fourbar.LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
     theta_4 = fourbar.Motion(theta_4=fourbar.Sweep(1.8, 2.5, 8), omega_4=3.0)
     for scene in (loaded, SCENE, crank_rocker(motion=stroke, drive=drive), crank_rocker(motion=theta_4)):
-        inside = judge("scene", scene, (witness,), order=False).rows
+        inside = judge("scene", scene, (engine,), order=False).rows
         assert repr(judge("scene", scene, (outside,), order=False).rows) == repr(inside)

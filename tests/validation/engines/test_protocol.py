@@ -11,12 +11,12 @@ import fourbar
 from fourbar.errors import FourBarError, InputError
 from fourbar.files import dump
 from fourbar.scene import command as list_positions
-from fourbar_validation.compare.answer import Answer, WitnessError
+from fourbar_validation.compare.answer import Answer, EngineError
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.hard_suite import Hard
 from fourbar_validation.places import MODELS
 from fourbar_validation.run.question import ask_at
+from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.scenes import crank_rocker
@@ -147,7 +147,7 @@ def test_what_an_answer_leaves_out_has_defaults():
     answer = protocol.answer_from_json("mine", at, {"answers": {"torque": [1, None, 3], "F12": [[1, 2], None, None]}})
     assert answer.assembled.tolist() == [True, False, True] and answer.setting == "exact" and answer.at is at
     assert np.isnan(answer.quantities["F12"][1:]).all()
-    with pytest.raises(WitnessError, match="no licence"):
+    with pytest.raises(EngineError, match="no licence"):
         protocol.answer_from_json("mine", at, {"error": "no licence"})
     assert protocol.answer_from_json("mine", at, {"refusal": "no springs here"}).refusal == "no springs here"
 

@@ -8,7 +8,7 @@ import pytest
 import fourbar
 from fourbar_validation.compare.rows import DEGRADED
 from fourbar_validation.compare.tolerance import EPS, K
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import compare_rows
 from fourbar_validation.regression.record import ACCEPTED, describe_run, find_baseline, read_run
@@ -16,17 +16,17 @@ from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import list_model_files
 
 SCENES = [(file.stem, fourbar.load(file)) for file in list_model_files()]
-EXACT = [witness for witness in WITNESSES if not witness.through_time]
+EXACT = [engine for engine in ENGINES if not engine.through_time]
 """A simulation through time takes longer than all of them; `validation run --against accepted` asks it too."""
 
 
 def test_nothing_got_worse_since_the_accepted_state() -> None:
-    left_out = {witness.name for witness in WITNESSES} - {witness.name for witness in EXACT}
+    left_out = {engine.name for engine in ENGINES} - {engine.name for engine in EXACT}
     record, accepted = read_run(find_baseline(ACCEPTED))
     kept = [row for row in accepted if row.engine not in left_out]
     rows = [row for scene in SCENES for row in judge(*scene, EXACT).rows]
     found = compare_rows((record, kept), (describe_run((), "models"), rows))
-    assert {row.engine for row in kept} == {"formulas", *(witness.name for witness in EXACT)}
+    assert {row.engine for row in kept} == {"formulas", *(engine.name for engine in EXACT)}
     assert not found.regressed, render.write_text(found)
 
 

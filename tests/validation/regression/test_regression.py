@@ -27,7 +27,7 @@ from fourbar_validation.compare.columns import Columns
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_results
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression import record, render
 from fourbar_validation.regression.accept import accept_command, compare
 from fourbar_validation.regression.change import Kind
@@ -51,7 +51,7 @@ from tests.support.here import judge_here
 
 WithRows = tuple[About, list[Row]]
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)
-HERE = describe_run([Witness("engine", FreeBody, EQUIVALENCE)], "suite")
+HERE = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
 
 
 def kinds(old: list[Row], new: list[Row]) -> list[Kind]:
@@ -429,8 +429,8 @@ SCENE = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
 
 
 def made(rows: list[Row], scenes: dict[str, fourbar.Scene], engines: tuple[str, ...] = ("engine",)) -> WithRows:
-    witnesses = [Witness(engine, FreeBody, EQUIVALENCE) for engine in engines]
-    return describe_run(witnesses, "suite", {name: describe_changes(s) for name, s in scenes.items()}), rows
+    free_bodies = [Engine(engine, FreeBody, EQUIVALENCE) for engine in engines]
+    return describe_run(free_bodies, "suite", {name: describe_changes(s) for name, s in scenes.items()}), rows
 
 
 def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> None:

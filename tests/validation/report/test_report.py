@@ -18,8 +18,7 @@ import pytest
 import fourbar
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row, write_rows
 from fourbar_validation.engines import guests
-from fourbar_validation.engines.further import FURTHER
-from fourbar_validation.engines.witnesses import WITNESSES, WORK
+from fourbar_validation.engines.registry import ENGINES, WORK, load_further
 from fourbar_validation.report import svg
 from fourbar_validation.report.figures import STRETCHES, find_worst_of_segments
 from fourbar_validation.report.html import ALL_OPEN, Section, write_html, write_markdown
@@ -41,7 +40,7 @@ def demo(*, draw: bool = True) -> Record:
     """A small scene as two exact engines and the free bodies judge it."""
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 36), 5.0))
     return judge_for_report(
-        "demo", scene, tuple(w for w in WITNESSES if w.name != "mujoco-simulated"), draw=draw, shipped=draw
+        "demo", scene, tuple(w for w in ENGINES if w.name != "mujoco-simulated"), draw=draw, shipped=draw
     )
 
 
@@ -185,15 +184,15 @@ def test_the_times_of_engines_are_those_of_the_run() -> None:
 )
 def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int, monkeypatch: pytest.MonkeyPatch) -> None:
     judge_solve_alone(monkeypatch)
-    witnesses = tuple(w for w in WITNESSES if w.name == "free-body")
-    made = judge_for_report("kind", crank_rocker(motion=motion), witnesses)
+    engines = tuple(w for w in ENGINES if w.name == "free-body")
+    made = judge_for_report("kind", crank_rocker(motion=motion), engines)
     assert made.figure is not None and made.figure.count("<svg") == pictures
     _, text = report([made])
     assert "kind: crank-rocker" in text
 
 
 def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
-    absent = replace(WITNESSES[0], engine=lambda: import_module("fourbar_validation.engines.absent").Absent())
+    absent = replace(ENGINES[0], engine=lambda: import_module("fourbar_validation.engines.absent").Absent())
     summary, text = report([judge_for_report("demo", crank_rocker(), (absent,), draw=False)])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text
@@ -219,19 +218,19 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.slow
-def test_every_witness_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever is drawn first, and in whatever process: the witness says its number."""
+def test_every_engine_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever is drawn first, and in whatever process: the engine says its number."""
     monkeypatch.setattr(svg, "NUMBERS", {})
     classes = "tests.support.hostile_class:"
-    witnesses = guests.read_guests(
-        [f"{classes}Right", f"{classes}Leaves"], [each.name for each in (*WITNESSES, *FURTHER)]
+    engines = guests.read_guests(
+        [f"{classes}Right", f"{classes}Leaves"], [each.name for each in (*ENGINES, *load_further())]
     )
-    names = [each.name for each in (*WITNESSES, *FURTHER, *witnesses)]
-    svg.NUMBERS.update(guests.list_numbers(witnesses))
+    names = [each.name for each in (*ENGINES, *load_further(), *engines)]
+    svg.NUMBERS.update(guests.list_numbers(engines))
     marks = {name: (svg.choose_style(name).symbol, svg.choose_style(name).marker) for name in names}
     assert len({mark for mark, _ in marks.values()}) == len({marker for _, marker in marks.values()}) == len(names)
     svg.NUMBERS.clear()
-    svg.NUMBERS.update(guests.list_numbers(witnesses[1:]))  # a scene in which the first broke down
+    svg.NUMBERS.update(guests.list_numbers(engines[1:]))  # a scene in which the first broke down
     assert svg.choose_style(names[-1]).symbol == marks[names[-1]][0]
     assert all(svg.choose_style(name).variable in svg.LIGHT for name in names)
 

@@ -7,14 +7,12 @@ import pytest
 from markupsafe import escape
 
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results
-from fourbar_validation.engines.further import FURTHER
-from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard
 from fourbar_validation.engines.limits import LIMITS
-from fourbar_validation.engines.witnesses import WORK
+from fourbar_validation.engines.registry import HARD_ENGINES, WORK, load_further
 from fourbar_validation.report.html import write_html
 from fourbar_validation.report.sections import LARGEST, collect_hard_cases, collect_sections
 from fourbar_validation.report.templating import count_or_size
-from fourbar_validation.scenes.hard_families import FAMILIES
+from fourbar_validation.scenes.hard_families import FAMILIES, Hard
 from tests.support.here import summary_of
 from tests.validation.report.test_report import demo, report
 
@@ -65,7 +63,7 @@ def test_the_report_of_the_hard_suite_has_its_picture_every_statement_and_every_
 
 
 def test_every_engine_says_what_its_time_goes_into() -> None:
-    assert set(WORK) == {"formulas", *(witness.name for witness in (*HARD_WITNESSES, *FURTHER))}
+    assert set(WORK) == {"formulas", *(engine.name for engine in (*HARD_ENGINES, *load_further()))}
 
 
 @pytest.mark.slow

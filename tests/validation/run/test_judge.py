@@ -1,4 +1,4 @@
-"""The harness itself, with witnesses with given answers: silence, NaN and breakdowns must cost the run."""
+"""The harness itself, with engines with given answers: silence, NaN and breakdowns must cost the run."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED, Row, write_results, write_rows
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, FULL_ACCURACY, K
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.witnesses import WITNESSES, Witness, make_prediction
+from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
@@ -76,9 +76,9 @@ class SlightlyOff(Echo):
         return answer
 
 
-def rows_of(engine: type, scene: Scene | None = None) -> dict[str, Row]:
-    witness = Witness("echo", engine, EQUIVALENCE)
-    record = judge("scene", scene or crank_rocker(), [witness])
+def rows_of(adapter: type, scene: Scene | None = None) -> dict[str, Row]:
+    engine = Engine("echo", adapter, EQUIVALENCE)
+    record = judge("scene", scene or crank_rocker(), [engine])
     return {row.quantity: row for row in record.rows if row.engine == "echo"}
 
 
@@ -111,8 +111,8 @@ def test_an_engine_that_breaks_down_costs_its_own_row_in_one_line() -> None:
 
 
 def test_a_basis_that_breaks_down_is_no_agreement(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By the free bodies all are judged, also where they are no witness."""
-    others = [witness for witness in WITNESSES if witness.name == "mujoco-inverse"]
+    """By the free bodies all are judged, also where they are no engine."""
+    others = [engine for engine in ENGINES if engine.name == "mujoco-inverse"]
 
     def broken(*_: object) -> Answer:
         raise IndexError("lost")
@@ -197,8 +197,8 @@ def test_a_loop_said_to_be_open_a_thousand_roundings_from_its_limit_fails() -> N
 
 
 def test_an_engine_that_may_answer_within_the_rounding_of_theta_2_is_held_to_that_answer() -> None:
-    witness = Witness("echo", SlightlyOff, FULL_ACCURACY, nearby=True)
-    rows = {row.quantity: row for row in judge("", crank_rocker(), [witness]).rows if row.engine == "echo"}
+    engine = Engine("echo", SlightlyOff, FULL_ACCURACY, nearby=True)
+    rows = {row.quantity: row for row in judge("", crank_rocker(), [engine]).rows if row.engine == "echo"}
     assert rows["torque"].verdict == FAILS and rows["F12"].verdict == AGREES
 
 
@@ -209,7 +209,7 @@ def test_positions_alone_need_no_forces() -> None:
 
 
 def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    rows = judge("scene", crank_rocker(), [Witness("echo", Echo, EQUIVALENCE)]).rows
+    rows = judge("scene", crank_rocker(), [Engine("echo", Echo, EQUIVALENCE)]).rows
     write_results(rows, tmp_path / "results.csv")
     again = list(read_columns(tmp_path / "results.csv"))
     assert write_rows(again) == write_rows(rows)
@@ -221,12 +221,12 @@ def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-
 def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own() -> None:
     scene = crank_rocker()
     at = command(scene)
-    witness = next(witness for witness in WITNESSES if witness.residuals)
-    answer = Answer(witness.name, "RK4", at, predicted={"torque": np.ones(len(at.theta_2))})
-    predicted = make_prediction(witness, scene, at, answer)
+    engine = next(engine for engine in ENGINES if engine.residuals)
+    answer = Answer(engine.name, "RK4", at, predicted={"torque": np.ones(len(at.theta_2))})
+    predicted = make_prediction(engine, scene, at, answer)
     assert predicted is not None and predicted("torque", np.ones(len(at.theta_2), bool))[0] == 1.0
     answer.alarms.append("the loop is open")
-    assert make_prediction(witness, scene, at, answer) is None
+    assert make_prediction(engine, scene, at, answer) is None
 
 
 class AnswersAnyway(Echo):
@@ -286,11 +286,11 @@ def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypa
 
     monkeypatch.setattr(FreeBody, "answer", noting)
     scene = crank_rocker()
-    judge("scene", scene, [witness for witness in WITNESSES if witness.name == "free-body"])
+    judge("scene", scene, [engine for engine in ENGINES if engine.name == "free-body"])
     assert len({(id(of), id(command)) for of, command in put}) == len(put)
     # nor of the bars without loads, which the answer holds too
     assert [of for of, _ in put if of.linkage is scene.linkage] == [scene]
-    judge("scene", scene, [Witness("counting", Counting, EQUIVALENCE)])
+    judge("scene", scene, [Engine("counting", Counting, EQUIVALENCE)])
     assert Counting.started == 1
 
 
@@ -304,7 +304,7 @@ def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch: 
         return answering(engine, scene, at)
 
     monkeypatch.setattr(FreeBody, "answer", seen)
-    rows = judge("", FAULT_SCENES["stroke"], [witness for witness in WITNESSES if witness.name == "free-body"]).rows
+    rows = judge("", FAULT_SCENES["stroke"], [engine for engine in ENGINES if engine.name == "free-body"]).rows
     assert not [row for row in rows if row.failed]
     assert sum(row.engine == "free-body" and row.compared for row in rows) > 20
     assert given

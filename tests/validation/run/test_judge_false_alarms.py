@@ -13,14 +13,14 @@ from fourbar.scene.motion import Free, Motion
 from fourbar.solution import Solution
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run import printed, released
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.random import draw_random_scene
 
-EXACT = [witness for witness in WITNESSES if not witness.through_time]
-BY_ITSELF = [witness for witness in EXACT if not witness.library]
+EXACT = [engine for engine in ENGINES if not engine.through_time]
+BY_ITSELF = [engine for engine in EXACT if not engine.library]
 POSITIONS = np.array([0.14, 1.75, 4.03, 4.73])
 
 
@@ -58,7 +58,7 @@ def test_ratios_over_ten_decades_raise_no_alarm() -> None:
 @pytest.mark.slow
 def test_a_free_motion_near_a_limit_raises_no_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
     """The engines get theta_2, omega_2 and alpha_2 of the independent theta_4, rounded: what that costs is computed."""
-    monkeypatch.setattr(released, "ENGINES", {})
+    monkeypatch.setattr(released, "FORWARD", {})
     scene = FAULT_SCENES["double rocker released"]
     often = replace(scene, motion=scene.motion.replace(free=Free(1.0, 1000)))  # nearer to its limits
     rows = judge("released", often, BY_ITSELF).rows

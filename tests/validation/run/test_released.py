@@ -37,9 +37,9 @@ def test_every_engine_is_judged_up_to_the_limit_and_by_its_instant(coupler: floa
     assert solution.stopped_at is not None and solution.time is not None
     assert solution.time[-1] <= solution.stopped_at < solution.time[-1] + 0.01
     page = judge_for_report("falling", scene)
-    assert {row.engine for row in page.rows} > set(free.ENGINES)
+    assert {row.engine for row in page.rows} > set(free.FORWARD)
     assert all(row.passed for row in page.rows)
-    for engine in free.ENGINES:
+    for engine in free.FORWARD:
         assert row(page.rows, engine, "stopped_at").error < 2e-5  # of the second, as measured
         assert row(page.rows, engine, "theta_2").error < 2e-6
     assert page.figure is not None
@@ -121,7 +121,7 @@ def test_formulas_that_stop_too_early_are_found(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr("fourbar_validation.run.question.solve", short)
     rows = judge("falling", falling()).rows
-    for engine in free.ENGINES:
+    for engine in free.FORWARD:
         assert row(rows, engine, "stopped_at").verdict == FAILS
 
 

@@ -29,7 +29,7 @@ from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import Row, make_plain, write_results
 from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, hold_simulated
-from fourbar_validation.engines.memory import WORKER_MEMORY, bound_memory
+from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
 from fourbar_validation.report.templating import render, write_number
 from fourbar_validation.report.terminal import make_table
 from fourbar_validation.scenes.suites import read_scene_files

@@ -41,11 +41,11 @@ class Answer:
     seconds: float = 0.0
 
 
-class WitnessError(FourBarError):
+class EngineError(FourBarError):
     """Failure of an engine from outside, in words."""
 
 
-class Engine(Protocol):
+class Adapter(Protocol):
     """One engine, in one of its forms."""
 
     @property
@@ -56,7 +56,7 @@ class Engine(Protocol):
         """Answer a scene, given the description and the command, never a result of the formulas."""
 
 
-def explain_refusal(engine: Engine, at: Command) -> str:
+def explain_refusal(engine: Adapter, at: Command) -> str:
     """Say why an engine cannot be asked: it does not declare that it takes what is commanded; empty where it does."""
     takes = getattr(engine, "commands", ("theta_2",))
     if at.commanded in takes:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fourbar.writing import write_text
-from fourbar_validation.compare.answer import WitnessError
+from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.tolerance import Array, Mask, find_used
 
 AGREES, DEGRADED, UNDECIDED, REFUSES, FAILS = (
@@ -118,7 +118,7 @@ def make_breakdown(scene: str, engine: str, error: BaseException, part: str = ""
     elif type(error).__name__ == "KilledWorker":  # raised by Dask
         reason = "the engine crashed its process, or hung and was stopped"
     else:
-        reason = str(error) if isinstance(error, WitnessError) else say_error(error)
+        reason = str(error) if isinstance(error, EngineError) else say_error(error)
     return Row.unmeasured(scene, engine, part, "all", FAILS, reason)
 
 

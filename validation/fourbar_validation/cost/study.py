@@ -17,7 +17,7 @@ from fourbar.formulas.mobility import turns_fully
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.advise.advise import advise
 from fourbar_validation.advise.worst_errors import NO_ANSWER, WorstErrors, compute_errors
-from fourbar_validation.compare.answer import Engine
+from fourbar_validation.compare.answer import Adapter
 from fourbar_validation.cost import formulas
 from fourbar_validation.cost.series import BEST, SLOW, Curve, Spot, design_curves
 from fourbar_validation.engines.loop import Trial
@@ -230,7 +230,7 @@ class CostStudy:
 
         return [self._time_answer("inverse", engine) for engine in (PinocchioInverse(), MujocoInverse())]
 
-    def _time_answer(self, curve: str, engine: Engine, label: str = "", setting_value: float = math.nan) -> CostPoint:
+    def _time_answer(self, curve: str, engine: Adapter, label: str = "", setting_value: float = math.nan) -> CostPoint:
         """Time an engine that answers each position."""
         answer = engine.answer(self.scene, self.command)
         if answer.refusal is not None:

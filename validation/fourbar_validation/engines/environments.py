@@ -18,10 +18,9 @@ from filelock import FileLock
 from fourbar.errors import DependencyError, InputError
 from fourbar.files.reading import read_text
 from fourbar.writing import write_text
-from fourbar_validation.engines.further import FOLDERS
 from fourbar_validation.engines.guests import Guest, Program, name_guests, serve
 from fourbar_validation.engines.processes import run_to_end
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.registry import FOLDERS, Engine
 
 FILE = "engines.toml"
 LARGEST_FILE = 10**6
@@ -138,11 +137,11 @@ def prepare_program(entry: Entry, seconds: float | None = None) -> Program:
 
 
 def start_engines(
-    entries: Sequence[Entry], witnesses: Sequence[Witness], seconds: float | None = None
+    entries: Sequence[Entry], engines: Sequence[Engine], seconds: float | None = None
 ) -> tuple[Guest, ...]:
     """Make the environments of engines and read each hello; an adapter of ours is held to what it is held to here."""
     programs = [(entry.adapter or entry.name, entry.name, prepare_program(entry, seconds)) for entry in entries]
-    held = {witness.name: witness for witness in witnesses}
+    held = {engine.name: engine for engine in engines}
     guests = []
     for entry, guest in zip(entries, name_guests(programs, held), strict=True):
         kept = HELD if entry.adapter in held else ()

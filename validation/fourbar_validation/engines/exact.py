@@ -67,8 +67,7 @@ def compute_sines(linkage: FourBar, command: Command) -> Array:
     """Compute sin(theta_4 - theta_3) of each position in many digits, (n,); NaN where the loop does not close."""
     from flint import arb, ctx
 
-    from fourbar_validation.engines.ball_vectors import wedge
-    from fourbar_validation.engines.balls import BITS, closure
+    from fourbar_validation.engines.balls import BITS, closure, wedge
 
     ctx.prec = BITS
     x = {name: arb(length) for name, length in zip("dabc", linkage.lengths, strict=True)}

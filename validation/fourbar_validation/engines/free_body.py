@@ -25,7 +25,7 @@ from fourbar_validation.engines.description import (
     find_unknown,
     list_speeds,
 )
-from fourbar_validation.engines.free_body_closure import Complex, close, cross
+from fourbar_validation.engines.free_body_closure import Complex, close, cross, find_angle, measure_cylinder
 from fourbar_validation.engines.free_body_effects import (
     WRENCH_OF,
     BodyMotion,
@@ -35,7 +35,6 @@ from fourbar_validation.engines.free_body_effects import (
     make_vector,
     sum_acting,
 )
-from fourbar_validation.engines.free_body_stroke import find_angle, measure_cylinder
 
 NAME = "free-body"
 COLUMN = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}

@@ -24,14 +24,14 @@ from typing import IO, Any
 from fourbar.errors import FourBarError, InputError
 from fourbar.quantities import ANGLES, OF_DRY_FRICTION
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer, WitnessError
+from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
 from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.rows import FORMULAS, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines import keeper, protocol
-from fourbar_validation.engines.memory import WORKER_MEMORY
 from fourbar_validation.engines.output import KEPT, print_kept
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.processes import WORKER_MEMORY
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.places import CHECKOUT, PACKAGE
 
 CLASS = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*", re.ASCII)
@@ -58,7 +58,7 @@ ENDING = 5.0
 """Seconds for a program that is told to end; then it is killed."""
 
 
-class _KilledError(WitnessError):
+class _KilledError(EngineError):
     """The program was killed, by itself or from outside."""
 
 
@@ -94,7 +94,7 @@ class Hello:
 
 
 @dataclass(frozen=True, slots=True)
-class Guest(Witness):
+class Guest(Engine):
     """Engine in a process outside."""
 
     code: str = ""
@@ -111,7 +111,7 @@ class Guest(Witness):
 
     def at_step(self, step: float) -> "Asked":
         """Return the engine that integrates with this step, s."""
-        engine = self.engine()
+        engine = self.start()
         assert isinstance(engine, Asked)
         engine.step = step
         return engine
@@ -120,7 +120,7 @@ class Guest(Witness):
         """Return the guest that is asked with this setting, under the name that was chosen before."""
         name = setting.pop("name", self.setting)
         asked = {"name": name, **setting} if name else setting
-        return replace(self, setting=name, engine=partial(self.engine, setting=asked))  # type: ignore[call-arg]
+        return replace(self, setting=name, start=partial(self.start, setting=asked))  # type: ignore[call-arg]
 
 
 def read_guests(entries: Sequence[str], known: Iterable[str], seconds: float | None = None) -> tuple[Guest, ...]:
@@ -137,7 +137,7 @@ def name_guests(entries: Sequence[tuple[str, str, Program]], known: Iterable[str
             hello = ask_hello(program)
         except InputError as error:
             trouble = str(error)
-        except WitnessError as error:
+        except EngineError as error:
             trouble = str(error)
             if CLASS.fullmatch(entry) and trouble.startswith(f"exit status {NOT_FOUND}: "):
                 raise InputError("--witness", entry, trouble.partition(": ")[2]) from None
@@ -167,9 +167,9 @@ def _make_guest(name: str, program: Program, hello: Hello, trouble: str, number:
     )
 
 
-def list_numbers(witnesses: Iterable[Witness]) -> dict[str, int]:
+def list_numbers(engines: Iterable[Engine]) -> dict[str, int]:
     """List the numbers of the guests, by name."""
-    return {guest.name: guest.number for guest in witnesses if isinstance(guest, Guest)}
+    return {guest.name: guest.number for guest in engines if isinstance(guest, Guest)}
 
 
 def make_program(entry: str, seconds: float | None = None) -> Program:
@@ -235,7 +235,7 @@ def read_hello(data: dict[str, Any]) -> Hello:
         return write_one_line(value)
 
     if "error" in data:
-        raise WitnessError(text("error") or "it broke down without a word")
+        raise EngineError(text("error") or "it broke down without a word")
     name = text("engine")
     if not name or name != data["engine"]:
         raise InputError("engine", data.get("engine"), "must be a name of printable characters in one line")
@@ -266,7 +266,7 @@ def _read_tolerance(stated: Any) -> ErrorBound:
         allowed = f'must be "{EQUIVALENCE.name}", or [relative error above 0 and below 1, its reason]'
         raise InputError("tolerance", stated, allowed)
     reason = f"{error:g} of the scale: {write_one_line(reason)}"
-    return ErrorBound("as the witness states", reason, error, conditioned=False)
+    return ErrorBound("as the engine states", reason, error, conditioned=False)
 
 
 def find_needs(scene: Scene) -> list[str]:
@@ -290,7 +290,7 @@ class Asked:
         """Step of a released motion, s."""
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Return its answer; WitnessError says how it broke down."""
+        """Return its answer; EngineError says how it broke down."""
         if refusal := self._explain_refusal(find_needs(scene)):
             return Answer(self.name, "exact", refusal=refusal)
         data = {
@@ -302,7 +302,7 @@ class Asked:
         try:
             return protocol.answer_from_json(self.name, command, self._ask(data, len(command.angle)))
         except InputError as error:
-            raise WitnessError(str(error)) from None
+            raise EngineError(str(error)) from None
 
     def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Return the released motion as the guest integrates it."""
@@ -313,11 +313,11 @@ class Asked:
         try:
             return protocol.released_from_json(self.name, len(times), self._ask(data, len(times)))
         except InputError as error:
-            raise WitnessError(str(error)) from None
+            raise EngineError(str(error)) from None
 
     def _explain_refusal(self, needs: Iterable[str]) -> str:
         if self._trouble:
-            raise WitnessError(self._trouble)
+            raise EngineError(self._trouble)
         lacking = [need for need in needs if need not in self._hello.effects]
         name = self._setting.get("setting", {}).get("name")
         if name is not None and name not in self._hello.settings:
@@ -359,7 +359,7 @@ class Running:
         """Begin with hello, which must be as before; a program that fails to say so is ended."""
         try:
             if read_hello(self._ask(HELLO, 0)) != hello:
-                raise WitnessError("its hello is another than before")
+                raise EngineError("its hello is another than before")
         except FourBarError:
             self.end()
             raise
@@ -395,16 +395,16 @@ class Running:
             print_kept(self._take_errors())
 
     def _read(self, reply: bytes) -> dict[str, Any]:
-        """Read a line; WitnessError where it is not the answer that was asked for."""
+        """Read a line; EngineError where it is not the answer that was asked for."""
         said = write_one_line(reply[:KEPT].decode(errors="backslashreplace"))
         try:
             data = json.loads(reply, object_pairs_hook=_make_object, parse_constant=_refuse_constant)
         except (ValueError, RecursionError) as error:
-            raise WitnessError(f"said what is no JSON ({write_one_line(str(error))}): {said}") from None
+            raise EngineError(f"said what is no JSON ({write_one_line(str(error))}): {said}") from None
         if not isinstance(data, dict) or type(data.get("id")) is not int:
-            raise WitnessError(f"said what is no object with an id: {said}")
+            raise EngineError(f"said what is no object with an id: {said}")
         if data["id"] != self._number:
-            raise WitnessError(f"answered question {data['id']} where {self._number} was asked")
+            raise EngineError(f"answered question {data['id']} where {self._number} was asked")
         return data
 
     def _start(self) -> "subprocess.Popen[bytes]":
@@ -451,16 +451,16 @@ class Running:
         self._errors.seek(0)
         return text
 
-    def _find_end(self, process: "subprocess.Popen[bytes]", reply: bytes, most: int) -> WitnessError:
+    def _find_end(self, process: "subprocess.Popen[bytes]", reply: bytes, most: int) -> EngineError:
         """Say in one line how a program ended, or that it did not end its line."""
         if self._stopped:
-            return WitnessError(self._stopped)
+            return EngineError(self._stopped)
         if len(reply) > most:
-            return WitnessError(f"said more than {most} bytes without an end of line")
+            return EngineError(f"said more than {most} bytes without an end of line")
         try:
             status = process.wait(1.0)
         except subprocess.TimeoutExpired:
-            return WitnessError("closed its standard output")
+            return EngineError("closed its standard output")
         errors = self._take_errors()
         print_kept(errors)
         lines = errors.decode(errors="backslashreplace").strip().splitlines()
@@ -468,7 +468,7 @@ class Running:
         if status in KILLED:
             return _KilledError(f"was killed{said}")
         how = f"exit status {status}" if status >= 0 else f"ended by signal {-status}"
-        return WitnessError(how + " in the middle of a line" * bool(reply) + said)
+        return EngineError(how + " in the middle of a line" * bool(reply) + said)
 
     def end(self) -> None:
         """End the program and all that it started."""

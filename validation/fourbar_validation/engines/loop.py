@@ -14,8 +14,7 @@ from fourbar.quantities import ANGLES, OF_LINE, PIN_FORCES, STAGE_OF, STAGES, VE
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.description import SHARED, list_speeds, list_unknowns, name_driving, reduce_angle
-from fourbar_validation.engines.free_body_closure import LONGEST_STEP, NEWTON_STEPS, STARTS
-from fourbar_validation.engines.free_body_stroke import find_angle
+from fourbar_validation.engines.free_body_closure import LONGEST_STEP, NEWTON_STEPS, STARTS, find_angle
 from fourbar_validation.engines.loaded import Assembled, EngineBars, Values
 
 START_ANGLES = np.radians(STARTS).tolist()

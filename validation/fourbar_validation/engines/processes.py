@@ -1,13 +1,28 @@
-"""Run other programs to their end."""
+"""Run other programs to their end, and bound the memory of this process: past the bound it gets a MemoryError."""
 
 import os
 import subprocess
 from collections.abc import Container, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from fourbar_validation.compare.rows import write_one_line
 from fourbar_validation.places import import_path
+
+WORKER_MEMORY = 8 * 2**30
+"""Bytes of address space of one process; a scene takes a hundredth, most of it libraries."""
+
+
+def bound_memory() -> None:
+    """Bound this process's address space; where the system cannot, nothing happens."""
+    try:
+        import resource
+    except ImportError:  # only systems of the Unix family have it
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    with suppress(ValueError, OSError):  # macOS knows the limit and sets none
+        resource.setrlimit(resource.RLIMIT_AS, (WORKER_MEMORY if hard < 0 else min(WORKER_MEMORY, hard), hard))
 
 
 class Ended(NamedTuple):

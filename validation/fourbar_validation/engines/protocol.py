@@ -20,7 +20,7 @@ from fourbar.formulas.many_digits import DIGITS
 from fourbar.quantities import VECTORS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, Free, Motion
-from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer, WitnessError
+from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
 from fourbar_validation.compare.rows import write_one_line
 
 PROTOCOL = 1
@@ -233,7 +233,7 @@ def _write_array(array: Array) -> list[Any]:
 def answer_from_json(engine: str, command: Command, data: Any) -> Answer:
     """Read and check what an engine answered to a command.
 
-    Raises InputError for what is no answer, and WitnessError with the engine's words where it broke down.
+    Raises InputError for what is no answer, and EngineError with the engine's words where it broke down.
     """
     data = _read_reply(data)
     setting = _read_text("setting", data.get("setting", "exact"))
@@ -261,11 +261,11 @@ def answer_from_json(engine: str, command: Command, data: Any) -> Answer:
 
 
 def _read_reply(data: Any) -> dict[str, Any]:
-    """Return the object that an engine replied with; WitnessError with its own words where it broke down."""
+    """Return the object that an engine replied with; EngineError with its own words where it broke down."""
     if not isinstance(data, dict):
         raise InputError("answer", data, "must be an object")
     if "error" in data:
-        raise WitnessError(_read_text("error", data["error"]) or "it broke down without a word")
+        raise EngineError(_read_text("error", data["error"]) or "it broke down without a word")
     return data
 
 

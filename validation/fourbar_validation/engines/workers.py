@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 
 from fourbar.errors import DependencyError
-from fourbar_validation.compare.answer import WitnessError
+from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.rows import say_error
-from fourbar_validation.engines.memory import bound_memory
 from fourbar_validation.engines.output import keep_output
+from fourbar_validation.engines.processes import bound_memory
 
 if TYPE_CHECKING:
     from pebble import ProcessPool
@@ -84,7 +84,7 @@ def apply_watched(seconds: float | None, function: Callable[[Any], Any], items: 
             except Exception:
                 raise
             except BaseException as error:  # in the parent it would end the run
-                raise WitnessError(say_error(error)) from None
+                raise EngineError(say_error(error)) from None
             finally:
                 faulthandler.cancel_dump_traceback_later()
     return results

@@ -19,7 +19,7 @@ from fourbar_validation.compare.columns import count_rows, read_column, read_col
 from fourbar_validation.compare.rows import Row, make_plain, read_cell_text
 from fourbar_validation.compare.tolerance import SIMULATED, K
 from fourbar_validation.engines.guests import Guest
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import find_kernels, list_versions, name_machine
 
@@ -56,20 +56,18 @@ class About:
         return None if names is None else set(filter(None, names.split(", ")))
 
 
-def describe_run(
-    witnesses: Sequence[Witness], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None
-) -> About:
+def describe_run(engines: Sequence[Engine], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None) -> About:
     """Describe a run made here and now."""
-    simulated = next((each.tolerance.factor for each in witnesses if each.tolerance.in_time), SIMULATED.factor)
+    simulated = next((each.tolerance.factor for each in engines if each.tolerance.in_time), SIMULATED.factor)
     settings = {
-        "engines": ", ".join(each.name for each in witnesses),
+        "engines": ", ".join(each.name for each in engines),
         "suite": suite,
         "K": repr(K),
         "simulated": repr(simulated),
     }
     described = {name: dict(entries) for name, entries in (scenes or {}).items()}
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    versions = {guest.name: guest.version for guest in witnesses if isinstance(guest, Guest) and guest.version}
+    versions = {guest.name: guest.version for guest in engines if isinstance(guest, Guest) and guest.version}
     return About(list_versions() | find_kernels() | versions, name_machine(), settings, described, now, _find_commit())
 
 

@@ -11,9 +11,8 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, divide, find_condition, find_error, magnitude
-from fourbar_validation.engines.hard_suite import HARD_WITNESSES
 from fourbar_validation.engines.prediction import predict_in_world_axes
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.registry import HARD_ENGINES, Engine
 from fourbar_validation.report.svg import choose_style, write_svg
 from fourbar_validation.scenes.hard_families import (
     CHANGE_POINTS,
@@ -62,13 +61,13 @@ def list_approaches() -> list[Approach]:
     ]
 
 
-def list_errors(scene: Scene, quantity: str, witness: Witness) -> tuple[Array, Array] | None:
+def list_errors(scene: Scene, quantity: str, engine: Engine) -> tuple[Array, Array] | None:
     """Return (theta_2, error relative to the value itself) of one engine, or None where it refuses."""
     where = command(scene)
-    if witness.through_time:
+    if engine.through_time:
         psi = np.abs(where.theta_2 - where.theta_2[0]) - abs(where.theta_2[-1] - where.theta_2[0])
         where = Command(where.theta_2[-psi > SIMULATED_FROM], where.branch[-psi > SIMULATED_FROM], *where[2:4])
-    answer: Answer = witness.engine().answer(scene, where)
+    answer: Answer = engine.start().answer(scene, where)
     if answer.refusal is not None or quantity not in answer.quantities or answer.at is None:
         return None
     ours = solve(scene, "force", at=answer.at)
@@ -114,10 +113,10 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
         linewidth=0,
         label="computed: predicted to ten times that",
     )
-    for witness in HARD_WITNESSES:
-        found = list_errors(approach.scene, quantity, witness)
+    for engine in HARD_ENGINES:
+        found = list_errors(approach.scene, quantity, engine)
         if found is not None and len(found[0]):
-            axes.loglog(np.abs(found[0] - singular), found[1], label=witness.name, **choose_style(witness.name).line)
+            axes.loglog(np.abs(found[0] - singular), found[1], label=engine.name, **choose_style(engine.name).line)
     axes.set_xlim(approach.distances[0] * 2, approach.distances[-1] / 2)
     axes.set_ylim(FLOOR, 1e3)
     axes.grid(visible=True, color=INK, alpha=0.2)

@@ -25,7 +25,7 @@ from fourbar_validation.compare.tolerance import (
     K,
     find_used,
 )
-from fourbar_validation.engines.witnesses import WORK
+from fourbar_validation.engines.registry import WORK
 from fourbar_validation.report.machine import list_versions, name_machine
 from fourbar_validation.report.record import Record
 

@@ -10,41 +10,41 @@ from fourbar.formulas import mobility
 from fourbar.mjcf.settings import LIGHT
 from fourbar.quantities import COUPLE, FORCES
 from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Answer, Engine
+from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.compare.compare import Comparison, Predicted
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
 from fourbar_validation.compare.scales import has_angles
 from fourbar_validation.compare.statements import limit_positions, transmission
 from fourbar_validation.compare.statements.finding import look, make_worst_row
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.witnesses import Witness, make_nearby, make_prediction
+from fourbar_validation.engines.registry import Engine, make_nearby, make_prediction
 from fourbar_validation.run.question import Question, remove_angles
 
 
 def compare_answers(question: Question) -> Iterator[Row]:
     """Compare every engine's answer with the formulas."""
-    for witness in question.witnesses:
-        yield from question.attempt(partial(_answer, question, witness), witness.name)
+    for engine in question.engines:
+        yield from question.attempt(partial(_answer, question, engine), engine.name)
 
 
-def _answer(question: Question, witness: Witness) -> Iterator[Row]:
-    answer = question.answer(witness)
+def _answer(question: Question, engine: Engine) -> Iterator[Row]:
+    answer = question.answer(engine)
     if answer.refusal is not None:
         question.left_out.append(f"{answer.engine}: {answer.refusal}")
-    yield from compare_answer(question, witness, answer)
-    if question.order and witness.order and answer.refusal is None:
-        answer.evidence |= _observe_order(question, witness)
+    yield from compare_answer(question, engine, answer)
+    if question.order and engine.order and answer.refusal is None:
+        answer.evidence |= _observe_order(question, engine)
 
 
-def compare_answer(question: Question, witness: Witness, answer: Answer) -> list[Row]:
+def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[Row]:
     """Compare one answer with the formulas, at the motion that the engine really made."""
     if answer.at is not None and answer.at is not question.at:
         question = Question(question.name, question.scene, answer.at)
     name, scene, formulas = question.name, question.scene, question.solution
-    predicted = make_prediction(witness, scene, question.at, answer)
-    nearby = make_nearby(witness, scene, question.at, formulas)
-    of_witness, of_scene = (witness.tolerance, witness.expected, predicted), (question.reference, question.scales)
-    comparison = Comparison(name, scene, answer, formulas, *of_witness, *of_scene, nearby)
+    predicted = make_prediction(engine, scene, question.at, answer)
+    nearby = make_nearby(engine, scene, question.at, formulas)
+    of_engine, of_scene = (engine.tolerance, engine.expected, predicted), (question.reference, question.scales)
+    comparison = Comparison(name, scene, answer, formulas, *of_engine, *of_scene, nearby)
     rows = comparison.rows()
     if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
@@ -55,15 +55,15 @@ def compare_answer(question: Question, witness: Witness, answer: Answer) -> list
     return rows
 
 
-def _observe_order(question: Question, witness: Witness) -> dict[str, float]:
+def _observe_order(question: Question, engine: Engine) -> dict[str, float]:
     """Measure the worst error of the torque and the pin forces at 4h and 2h, and the order in h that they show."""
 
     def error(answer: Answer) -> float:
-        rows = compare_answer(question, replace(witness, expected=FORCES), answer)
+        rows = compare_answer(question, replace(engine, expected=FORCES), answer)
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
-    assert witness.order is not None
-    coarse, fine, order = witness.order(question.scene, remove_angles(question.at), error)
+    assert engine.order is not None
+    coarse, fine, order = engine.order(question.scene, remove_angles(question.at), error)
     seen = {"error_at_4h": coarse, "error_at_2h": fine, "observed_order": order}
     return seen if all(map(math.isfinite, seen.values())) else {}  # a coarse run may leave what the scene covers
 
@@ -72,24 +72,24 @@ def compare_statements(question: Question) -> Iterator[Row]:
     """Compare what the formulas state of the linkage, whatever its motion, with every exact engine."""
     stated, part = limit_positions.Stated.of(question.scene.linkage), "statements of the linkage"
 
-    def rows(witness: Witness, answer: Answer) -> list[Row]:
-        predicted = make_prediction(witness, question.scene, question.at, answer)
+    def rows(engine: Engine, answer: Answer) -> list[Row]:
+        predicted = make_prediction(engine, question.scene, question.at, answer)
         try:
-            return check_statements(question.name, question.scene, question.engine(witness), answer, stated, predicted)
+            return check_statements(question.name, question.scene, question.adapter(engine), answer, stated, predicted)
         except LimitError as limit:
-            return [Row.unmeasured(question.name, witness.name, part, "all", REFUSES, str(limit))]
+            return [Row.unmeasured(question.name, engine.name, part, "all", REFUSES, str(limit))]
 
-    for witness in question.witnesses:
-        answer, _ = question.answered.get(witness.name, (None, 0.0))
-        exact = witness.stated and witness.tolerance.conditioned and "theta_3" in witness.expected
+    for engine in question.engines:
+        answer, _ = question.answered.get(engine.name, (None, 0.0))
+        exact = engine.stated and engine.tolerance.conditioned and "theta_3" in engine.expected
         if exact and answer is not None and answer.refusal is None:
-            yield from question.attempt(partial(rows, witness, answer), witness.name, part)
+            yield from question.attempt(partial(rows, engine, answer), engine.name, part)
 
 
 def check_statements(
     name: str,
     scene: Scene,
-    engine: Engine,
+    engine: Adapter,
     answer: Answer,
     stated: limit_positions.Stated | None = None,
     predicted: Predicted | None = None,
@@ -127,17 +127,17 @@ def compare_inertia(question: Question) -> Iterator[Row]:
     for name, (answer, seconds) in question.answered.items():
         if f"{name_driving(scene)}_inertia" in answer.quantities:
             bare.answered[name] = _take_inertia(answer, name_driving(scene)), seconds
-    for witness in question.witnesses:
-        if COUPLE.value in witness.expected and witness.name in question.answered:  # one that broke down has its row
-            yield from question.attempt(partial(_check_inertia, question, bare, witness), witness.name, "inertia alone")
+    for engine in question.engines:
+        if COUPLE.value in engine.expected and engine.name in question.answered:  # one that broke down has its row
+            yield from question.attempt(partial(_check_inertia, question, bare, engine), engine.name, "inertia alone")
 
 
-def _check_inertia(question: Question, bare: Question, witness: Witness) -> Iterator[Row]:
-    answer, (loaded, _) = bare.answer(witness), question.answered.get(witness.name, (None, 0.0))
+def _check_inertia(question: Question, bare: Question, engine: Engine) -> Iterator[Row]:
+    answer, (loaded, _) = bare.answer(engine), question.answered.get(engine.name, (None, 0.0))
     if answer.refusal is not None and loaded is not None and loaded.refusal is not None:
         return  # the refusal has its row
     drive = name_driving(question.scene)
-    rows = compare_answer(bare, replace(witness, expected=(drive,)), answer)
+    rows = compare_answer(bare, replace(engine, expected=(drive,)), answer)
     rows = [row for row in rows if row.quantity == drive or row.verdict in (REFUSES, FAILS)]
     rows = [row for row in rows if row.quantity != "undecided"]
     if rows:  # a failure besides the torque, or in place of it, is not left out
@@ -155,12 +155,12 @@ def _take_inertia(answer: Answer, drive: str) -> Answer:
 
 def check_mjcf(question: Question) -> Iterator[Row]:
     """Check the generated MJCF as it is shipped, if one is, by the engine that runs it."""
-    for witness in question.witnesses:
-        if witness.generated:
+    for engine in question.engines:
+        if engine.generated:
             from fourbar_validation.engines.mujoco.shipped import compare_shipped
 
             def rows() -> list[Row]:
                 row = compare_shipped(question.name, question.scene, question.at)
                 return [] if row is None else [row]
 
-            yield from question.attempt(rows, witness.name, "MJCF as shipped")
+            yield from question.attempt(rows, engine.name, "MJCF as shipped")

@@ -13,15 +13,14 @@ from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.environments import read_engines, start_engines
-from fourbar_validation.engines.further import FURTHER
 from fourbar_validation.engines.guests import Guest, read_guests
-from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard, hold_fully
-from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES, Engine, hold_fully, load_further
 from fourbar_validation.places import PROGRAM
 from fourbar_validation.regression.accept import FORMS, add_output_options, report_differences
 from fourbar_validation.regression.record import COLUMNS, find_baseline, open_run
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.run.run import DRAWING, SAMPLE, WORKERS, Progress, RunOptions, run
+from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType
 from fourbar_validation.scenes.suites import Random, Suite, read_default_suite, read_scene_files, read_suite
 
@@ -139,13 +138,13 @@ def command(**stated: Any) -> int:
 
     request = Request(**stated)
     request.require_consistent()
-    suite, witnesses = select_scenes(request)
+    suite, engines = select_scenes(request)
     if request.error is not None:
-        from fourbar_validation.engines.mujoco.required_error import adjust_witnesses
+        from fourbar_validation.engines.mujoco.required_error import adjust_engines
 
-        witnesses = adjust_witnesses(witnesses, request.error)
+        engines = adjust_engines(engines, request.error)
     folders = [path.parent for path in request.scenes]
-    chosen = choose_witnesses(request.engines, witnesses, folders, request.time_limit)
+    chosen = choose_engines(request.engines, engines, folders, request.time_limit)
     present, missing = find_askable(chosen, by_name=request.engines is not None)
     options = RunOptions(request.workers, request.scheduler, not request.no_pictures, request.sample_shipped)
     with ShownProgress(len(suite)) as progress:
@@ -159,19 +158,17 @@ def command(**stated: Any) -> int:
     if summary.counts[FAILS] or worse:
         return FAILED
     if missing:
-        names = ",".join(witness.name for witness in present)
+        names = ",".join(engine.name for engine in present)
         raise DependencyError(f"{missing[0][1]}, or say --engines {names} where those are all that is wanted")
     return summary.counts.status
 
 
-def select_scenes(request: Request) -> tuple[Suite, tuple[Witness, ...]]:
+def select_scenes(request: Request) -> tuple[Suite, tuple[Engine, ...]]:
     """Select the scenes, and all engines that may answer there: of the harness, further ones, and guests."""
-    witnesses: tuple[Witness, ...] = (*WITNESSES, *FURTHER)
+    engines: tuple[Engine, ...] = (*ENGINES, *load_further())
     if hard := request.suite == "hard":
-        witnesses = (*HARD_WITNESSES, *map(hold_fully, FURTHER))
-    guests: tuple[Witness, ...] = read_guests(
-        request.witness, [witness.name for witness in witnesses], request.time_limit
-    )
+        engines = (*HARD_ENGINES, *map(hold_fully, load_further()))
+    guests: tuple[Engine, ...] = read_guests(request.witness, [engine.name for engine in engines], request.time_limit)
     suite: Suite
     if hard:
         suite, guests = Hard(), tuple(map(hold_fully, guests))
@@ -181,7 +178,7 @@ def select_scenes(request: Request) -> tuple[Suite, tuple[Witness, ...]]:
         suite = Random(request.random, request.seed or 0, read_linkage_types(request.type or ALL_TYPES))
     else:
         suite = read_scene_files(request.scenes) if request.scenes else read_default_suite()
-    return suite, (*witnesses, *guests)
+    return suite, (*engines, *guests)
 
 
 def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
@@ -195,36 +192,36 @@ def read_linkage_types(text: str) -> tuple[DrawnType, ...]:
         raise InputError("--type", text, f"must be {UNEVEN_TYPE} or a comma-separated list of {allowed}") from None
 
 
-def choose_witnesses(
-    engines: str | None,
-    witnesses: tuple[Witness, ...] = WITNESSES,
+def choose_engines(
+    named: str | None,
+    engines: tuple[Engine, ...] = ENGINES,
     folders: Sequence[Path] = (),
     seconds: float | None = None,
-) -> tuple[Witness, ...]:
+) -> tuple[Engine, ...]:
     """Choose the engines named in a comma-separated list, and the guests, which are named by being given.
 
-    Without a list these are all but those that need not be installed. A name that is no witness's is sought in the
+    Without a list these are all but those that need not be installed. A name that is no engine's is sought in the
     engines.toml of these folders and of the package; `seconds`: in which such an engine must answer.
     """
-    if engines is None:
-        further = {witness.name for witness in FURTHER}
-        return tuple(witness for witness in witnesses if witness.name not in further or not witness.missing())
-    offered = {witness.name: witness for witness in witnesses}
-    names = [name.strip() for name in engines.split(",") if name.strip()]
+    if named is None:
+        further = {engine.name for engine in load_further()}
+        return tuple(engine for engine in engines if engine.name not in further or not engine.missing())
+    offered = {engine.name: engine for engine in engines}
+    names = [name.strip() for name in named.split(",") if name.strip()]
     described = read_engines(folders)
-    for name in names or [engines]:
+    for name in names or [named]:
         if name not in offered and name not in described:
             raise InputError("--engines", name, "must be among " + ", ".join([*offered, *described]))
-    chosen = tuple(witness for name, witness in offered.items() if name in names or isinstance(witness, Guest))
-    return (*chosen, *start_engines([described[name] for name in names if name not in offered], witnesses, seconds))
+    chosen = tuple(engine for name, engine in offered.items() if name in names or isinstance(engine, Guest))
+    return (*chosen, *start_engines([described[name] for name in names if name not in offered], engines, seconds))
 
 
-def find_askable(witnesses: tuple[Witness, ...], *, by_name: bool) -> tuple[tuple[Witness, ...], list[tuple[str, str]]]:
+def find_askable(engines: tuple[Engine, ...], *, by_name: bool) -> tuple[tuple[Engine, ...], list[tuple[str, str]]]:
     """Find those that can answer here, and the others with the reason; DependencyError where those were named."""
-    missing = [(witness.name, reason) for witness in witnesses if (reason := witness.missing())]
+    missing = [(engine.name, reason) for engine in engines if (reason := engine.missing())]
     if missing and by_name:
         raise DependencyError("; ".join(f"{name}: {reason}" for name, reason in missing))
-    return tuple(witness for witness in witnesses if not witness.missing()), missing
+    return tuple(engine for engine in engines if not engine.missing()), missing
 
 
 class ShownProgress(Progress):

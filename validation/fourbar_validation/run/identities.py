@@ -39,7 +39,7 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.engines.exact import compute_sines
 from fourbar_validation.engines.free_body import count_solutions
-from fourbar_validation.engines.witnesses import find_missing
+from fourbar_validation.engines.registry import find_missing
 from fourbar_validation.run.question import Question, select_positions
 
 STAGES = ("omega_3", "alpha_3", COUPLE.value, LINE.value)

@@ -11,7 +11,7 @@ import numpy as np
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.engines.guests import list_numbers
-from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.svg import NUMBERS
 from fourbar_validation.run.answers import check_mjcf, compare_answers, compare_inertia, compare_statements
@@ -64,7 +64,7 @@ OUTPUT = "output.txt"
 def judge_for_report(
     name: str,
     scene: Scene,
-    witnesses: Sequence[Witness] = WITNESSES,
+    engines: Sequence[Engine] = ENGINES,
     *,
     draw: bool = True,
     shipped: bool = False,
@@ -73,7 +73,7 @@ def judge_for_report(
 
     `draw`: with its pictures and observed orders. `shipped`: with what else is shipped.
     """
-    record = judge(name, scene, witnesses, order=draw, shipped=shipped)
+    record = judge(name, scene, engines, order=draw, shipped=shipped)
     for i, row in enumerate(record.rows):
         if row.failed and row.engine in record.output:
             record.rows[i] = replace(row, reason=f"{row.reason}; what it printed: {OUTPUT}")
@@ -81,20 +81,20 @@ def judge_for_report(
     if draw:
         from fourbar_validation.report.figures import draw_scene_figure
 
-        NUMBERS.update(list_numbers(witnesses))
+        NUMBERS.update(list_numbers(engines))
         figure = draw_scene_figure(record)
     return record.kept(figure)
 
 
 def judge(
-    name: str, scene: Scene, witnesses: Sequence[Witness] = WITNESSES, *, order: bool = True, shipped: bool = False
+    name: str, scene: Scene, engines: Sequence[Engine] = ENGINES, *, order: bool = True, shipped: bool = False
 ) -> Record:
     """Make every check of one scene.
 
     `order`: measure the observed order of what is simulated, which takes two more simulations and changes no row.
     `shipped`: check what else is shipped (studies, sensitivities, files of other simulators), which takes a second.
     """
-    question, free = ask(name, scene, witnesses), scene.motion.free is not None
+    question, free = ask(name, scene, engines), scene.motion.free is not None
     question.order = order
     begin = time.perf_counter()
     question.solution  # noqa: B018 - timed
@@ -115,32 +115,32 @@ def judge(
     return question.record(rows, seconds)
 
 
-def ask(name: str, scene: Scene, witnesses: Sequence[Witness]) -> Question:
+def ask(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
     """Put a scene to the engines that it needs, each position once; say what is left out."""
     at = command(scene)
     if scene.motion.free is not None:
-        return Question(name, scene, at, witnesses)
+        return Question(name, scene, at, engines)
     question = Question(name, scene, at)
     numbers = (at.angle, at.branch, 0.0 if at.speed is None else at.speed, at.acceleration)
     if len(at.angle) > 1 and all(np.ptp(values) == 0 for values in numbers):  # constant conditions are not swept
         question.left_out.append("positions: all are the same, one is evaluated")
         question.at = select_positions(at, np.array([0]))._replace(time=None)
-    question.witnesses = list(_choose_called_for(witnesses, question.at, question.left_out))
+    question.engines = list(_choose_called_for(engines, question.at, question.left_out))
     question.solve()  # untimed: the first call of a process pays for what every later one finds loaded
     return question
 
 
-def _choose_called_for(witnesses: Iterable[Witness], at: Command, left_out: list[str]) -> Iterator[Witness]:
+def _choose_called_for(engines: Iterable[Engine], at: Command, left_out: list[str]) -> Iterator[Engine]:
     """Choose the engines that the question needs; the others are left out before they are imported."""
-    for witness in witnesses:
+    for engine in engines:
         reason = None
         if at.speed is None:
-            reason = None if witness.positions else "the scene states positions only, and it gives forces"
-        elif witness.through_time and not np.any(at.speed):
+            reason = None if engine.positions else "the scene states positions only, and it gives forces"
+        elif engine.through_time and not np.any(at.speed):
             reason = "omega_2 is 0: nothing moves through time"
-        elif witness.through_time and len(at.angle) == 1:
+        elif engine.through_time and len(at.angle) == 1:
             reason = "one position is no motion through time"
         if reason is None:
-            yield witness if at.speed is not None else replace(witness, expected=witness.positions)
+            yield engine if at.speed is not None else replace(engine, expected=engine.positions)
         else:
-            left_out.append(f"{witness.name}: {reason}")
+            left_out.append(f"{engine.name}: {reason}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from fourbar_validation.compare.rows import make_breakdown, make_plain
 from fourbar_validation.engines import workers as processes
 from fourbar_validation.engines.guests import QUESTIONS, Guest
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.scenes.suites import Files, Suite
@@ -25,7 +25,7 @@ class Job:
 
     suite: Suite
     scene: int
-    witnesses: Sequence[Witness]
+    engines: Sequence[Engine]
     draw: bool
     shipped: bool
 
@@ -35,9 +35,7 @@ class Job:
         return make_plain(self.suite.name(self.scene))
 
 
-def make_jobs(
-    suite: Suite, scenes: Iterable[int], witnesses: Sequence[Witness], draw: bool, sample: int = 0
-) -> list[Job]:
+def make_jobs(suite: Suite, scenes: Iterable[int], engines: Sequence[Engine], draw: bool, sample: int = 0) -> list[Job]:
     """Make the jobs of some scenes; one of a file carries its own text alone.
 
     `sample`: number of scenes of the suite, evenly chosen, in which what else is shipped is judged too.
@@ -47,36 +45,36 @@ def make_jobs(
         shipped = (i + 1) * sample // len(suite) > i * sample // len(suite)
         if isinstance(suite, Files):
             drawn = draw and suite.name(i) not in suite.not_drawn
-            jobs.append(Job(replace(suite, texts=(suite.texts[i],)), 0, witnesses, drawn, shipped))
+            jobs.append(Job(replace(suite, texts=(suite.texts[i],)), 0, engines, drawn, shipped))
         else:
-            jobs.append(Job(suite, i, witnesses, draw, shipped))
+            jobs.append(Job(suite, i, engines, draw, shipped))
     return jobs
 
 
 def judge_job(job: Job) -> Record:
     """Judge one scene; runs in a worker."""
     scene = job.suite.scene(job.scene)
-    return judge_for_report(job.name, scene, job.witnesses, draw=job.draw, shipped=job.shipped)
+    return judge_for_report(job.name, scene, job.engines, draw=job.draw, shipped=job.shipped)
 
 
 def judge_by_engine(job: Job, _: Exception, attempt: processes.Attempt) -> Record:
     """Judge a scene that broke down one engine at a time; those at fault have a row that says of what."""
     record: Record | None = None
     breakdowns = []
-    for witnesses in ([], *([witness] for witness in job.witnesses)):
-        outcome = attempt(replace(job, witnesses=witnesses))
+    for engines in ([], *([engine] for engine in job.engines)):
+        outcome = attempt(replace(job, engines=engines))
         if isinstance(outcome, Record):
             record = outcome if record is None else record.joined(outcome)
         else:
-            breakdowns.append(make_breakdown(job.name, witnesses[0].name if witnesses else "formulas", outcome))
+            breakdowns.append(make_breakdown(job.name, engines[0].name if engines else "formulas", outcome))
     record = record or Record(job.name)
     return replace(record, rows=[*record.rows, *breakdowns])
 
 
-def find_time_limit(suite: Suite, witnesses: Iterable[Witness]) -> float:
+def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
     """Return the seconds after which a scene of the suite is taken to hang; guests have limits of their own besides."""
     limit = processes.SECONDS + SECONDS_PER_POSITION * (suite.positions if isinstance(suite, Files) else 0)
-    return limit + QUESTIONS * sum(guest.seconds or limit for guest in witnesses if isinstance(guest, Guest))
+    return limit + QUESTIONS * sum(guest.seconds or limit for guest in engines if isinstance(guest, Guest))
 
 
 def judge_chunks(

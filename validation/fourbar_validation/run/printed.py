@@ -41,7 +41,7 @@ from fourbar_validation.engines.exact import BallArithmetic, find_refusal
 from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_effects import sum_acting
 from fourbar_validation.engines.prediction import predict_from_data
-from fourbar_validation.engines.witnesses import find_missing
+from fourbar_validation.engines.registry import find_missing
 from fourbar_validation.run.question import Question, select_positions
 
 SAMPLE = 5

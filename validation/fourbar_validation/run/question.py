@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solve import solve
-from fourbar_validation.compare.answer import Answer, Engine, explain_refusal
+from fourbar_validation.compare.answer import Adapter, Answer, explain_refusal
 from fourbar_validation.compare.compare import Scales
 from fourbar_validation.compare.reversals import Reversal, find_reversals, mark_reversing
 from fourbar_validation.compare.rows import FORMULAS, Row, make_breakdown, make_plain
@@ -20,10 +20,10 @@ from fourbar_validation.compare.tolerance import Array, Mask
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.output import keep_printed
 from fourbar_validation.engines.protocol import require_near
-from fourbar_validation.engines.witnesses import WITNESSES, Witness
+from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.record import Record, Timing
 
-FREE_BODY = next(witness for witness in WITNESSES if witness.name == FreeBody.name)
+FREE_BODY = next(engine for engine in ENGINES if engine.name == FreeBody.name)
 """The free-body solution supplies the condition numbers, so that no allowed error depends on the formulas it tests."""
 
 
@@ -38,7 +38,7 @@ class Question:
     name: str
     scene: Scene
     at: Command
-    witnesses: Sequence[Witness] = ()
+    engines: Sequence[Engine] = ()
     """Engines that are to answer."""
     order: bool = False
     """True if the observed order of what is simulated is wanted, which takes two more simulations."""
@@ -53,7 +53,7 @@ class Question:
     """Answer of each engine, by its name, and the seconds that it took."""
     scales: Scales = field(default_factory=dict)
     """Size and condition of each quantity that was compared."""
-    started: dict[str, Engine] = field(default_factory=dict)
+    started: dict[str, Adapter] = field(default_factory=dict)
 
     def solve(self) -> Solution:
         """Solve the scene as far as anything is compared: error bars take ten times as long as all the rest."""
@@ -84,23 +84,23 @@ class Question:
         except ArithmeticError:
             return None
 
-    def engine(self, witness: Witness) -> Engine:
+    def adapter(self, engine: Engine) -> Adapter:
         """Start an engine, once."""
-        if witness.name not in self.started:
-            self.started[witness.name] = witness.engine()
-        return self.started[witness.name]
+        if engine.name not in self.started:
+            self.started[engine.name] = engine.start()
+        return self.started[engine.name]
 
-    def answer(self, witness: Witness) -> Answer:
+    def answer(self, engine: Engine) -> Answer:
         """Ask an engine, once."""
-        if witness.name not in self.answered:
-            with keep_printed(self.output, witness.name):
-                engine, begin = self.engine(witness), time.perf_counter()
-                if refusal := explain_refusal(engine, self.at):
-                    answer = Answer(witness.name, "exact", refusal=refusal)
+        if engine.name not in self.answered:
+            with keep_printed(self.output, engine.name):
+                adapter, begin = self.adapter(engine), time.perf_counter()
+                if refusal := explain_refusal(adapter, self.at):
+                    answer = Answer(engine.name, "exact", refusal=refusal)
                 else:
-                    answer = ask_at(engine, self.scene, self.at)
-                self.answered[witness.name] = answer, time.perf_counter() - begin
-        return self.answered[witness.name][0]
+                    answer = ask_at(adapter, self.scene, self.at)
+                self.answered[engine.name] = answer, time.perf_counter() - begin
+        return self.answered[engine.name][0]
 
     def find_reversals(self) -> tuple[()]:
         """Find where dry friction reverses; what is drawn there is no comparison."""
@@ -132,7 +132,7 @@ class Question:
 
     def record(self, rows: list[Row], seconds: float) -> Record:
         """Make the record of the scene; `seconds`: that the formulas took."""
-        answered = [self.answered[witness.name] for witness in self.witnesses if witness.name in self.answered]
+        answered = [self.answered[engine.name] for engine in self.engines if engine.name in self.answered]
         timings = [Timing(self.name, FORMULAS, "exact", len(self.solution), seconds), *self.timings]
         n = len(self.at.angle)
         timings += [Timing(self.name, answer.engine, answer.setting, n, took) for answer, took in answered]
@@ -160,10 +160,10 @@ class Question:
             yield make_breakdown(self.name, engine, error, part)
 
 
-def ask_at(engine: Engine, scene: Scene, at: Command) -> Answer:
+def ask_at(adapter: Adapter, scene: Scene, at: Command) -> Answer:
     """Give an engine what is commanded, and nothing that the formulas computed from it."""
     given = remove_angles(at)
-    answer = engine.answer(scene, given)
+    answer = adapter.answer(scene, given)
     if answer.at is given:
         return replace(answer, at=at)
     if at.stroke is not None and answer.at is not None:

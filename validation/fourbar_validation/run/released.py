@@ -27,7 +27,7 @@ from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import EQUIVALENCE, divide, find_worst, replace_zero_size
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import Guest
-from fourbar_validation.engines.witnesses import Witness, find_missing, make_prediction
+from fourbar_validation.engines.registry import Engine, find_missing, make_prediction
 from fourbar_validation.report.record import Timing
 from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.shipped.variants import keep_worst, take_member
@@ -45,7 +45,7 @@ def _answer_pinocchio(step: float) -> Any:
     return PinocchioReleased(step)
 
 
-ENGINES = {
+FORWARD = {
     "mujoco-forward": (_answer_mujoco, 1e-3, "mujoco"),
     "pinocchio-forward": (_answer_pinocchio, 2e-3, "pinocchio"),
 }
@@ -124,26 +124,26 @@ def check_released(question: Question) -> Iterator[Row]:
         ours = ReleasedAnswer("formulas", "exact", solution.theta_2, solution.omega_2, none, none)
         yield from _make_rows(question, ours, None, truth)
 
-    def rows(engine: Callable[[float], Any], longest: float) -> list[Row]:
+    def rows(start: Callable[[float], Any], longest: float) -> list[Row]:
         pairs = math.ceil(free.duration / free.steps / (2.0 * longest) - 1e-6)
         step = free.duration / free.steps / (2.0 * pairs)  # two of them, or more, from one instant to the next
         begin = time.perf_counter()
-        fine = engine(step).release(scene, times)
+        fine = start(step).release(scene, times)
         seconds = time.perf_counter() - begin
-        coarse = None if fine.refusal else engine(2.0 * step).release(scene, times)
+        coarse = None if fine.refusal else start(2.0 * step).release(scene, times)
         question.timings.append(Timing(name, fine.engine, fine.setting, len(times), seconds))
         if fine.refusal is not None:
             question.left_out.append(f"{fine.engine}: {fine.refusal}")
         return _make_rows(question, fine, coarse, truth)
 
-    for witness in question.witnesses:
-        if isinstance(witness, Guest) and witness.releases:
-            yield from question.attempt(partial(rows, witness.at_step, LONGEST_STEP), witness.name)
-    for engine, (start, longest, library) in ENGINES.items():
+    for engine in question.engines:
+        if isinstance(engine, Guest) and engine.releases:
+            yield from question.attempt(partial(rows, engine.at_step, LONGEST_STEP), engine.name)
+    for adapter, (start, longest, library) in FORWARD.items():
         if reason := find_missing(library):
-            question.left_out.append(f"{engine}: {reason}")
+            question.left_out.append(f"{adapter}: {reason}")
         else:
-            yield from question.attempt(partial(rows, start, longest), engine)
+            yield from question.attempt(partial(rows, start, longest), adapter)
 
 
 def _compare_forces(question: Question) -> Iterator[Row]:
@@ -162,20 +162,20 @@ def _compare_forces(question: Question) -> Iterator[Row]:
         (Question(name, own, select_positions(at, where), output=question.output), take_member(solution, where))
         for own, where in _prescribe(held, at)
     ]
-    for witness in question.witnesses:
-        if witness.tolerance == EQUIVALENCE and "theta_3" in witness.expected and not witness.missing():
-            rows = partial(_keep_worst_forces, witness, driven_ones)
-            yield from question.attempt(rows, witness.name, "forces")
+    for engine in question.engines:
+        if engine.tolerance == EQUIVALENCE and "theta_3" in engine.expected and not engine.missing():
+            rows = partial(_keep_worst_forces, engine, driven_ones)
+            yield from question.attempt(rows, engine.name, "forces")
 
 
-def _keep_worst_forces(witness: Witness, driven: list[tuple[Question, Solution]]) -> list[Row]:
+def _keep_worst_forces(engine: Engine, driven: list[tuple[Question, Solution]]) -> list[Row]:
     """Compare what one engine answers to each part of the motion, and keep the worst row of each quantity."""
-    return keep_worst(row for own, solution in driven for row in _compare_forces_by(witness, own, solution))
+    return keep_worst(row for own, solution in driven for row in _compare_forces_by(engine, own, solution))
 
 
-def _compare_forces_by(witness: Witness, driven: Question, solution: Solution) -> list[Row]:
+def _compare_forces_by(engine: Engine, driven: Question, solution: Solution) -> list[Row]:
     """Compare what one engine answers to the motion as a prescribed one."""
-    answer, scene = driven.answer(witness), driven.scene
+    answer, scene = driven.answer(engine), driven.scene
     if answer.refusal is not None:
         return [Row.unmeasured(driven.name, answer.engine, answer.setting, "all", REFUSES, answer.refusal)]
     reference = make_reference(scene, answer)
@@ -183,10 +183,10 @@ def _compare_forces_by(witness: Witness, driven: Question, solution: Solution) -
     # the formulas are conditioned by the angle that is independent there, an engine by theta_2
     conditioned = replace(solution, condition=reference.condition, drive_condition=reference.drive_condition)
     conditioned.drive_bar, conditioned.at = 2, driven.at
-    names = [q for q in UNKNOWNS if q in witness.expected]
+    names = [q for q in UNKNOWNS if q in engine.expected]
     # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
-    predicted = make_prediction(witness, scene, driven.at, answer)
-    rows = Comparison(driven.name, scene, answer, conditioned, witness.tolerance, names, predicted, reference).rows()
+    predicted = make_prediction(engine, scene, driven.at, answer)
+    rows = Comparison(driven.name, scene, answer, conditioned, engine.tolerance, names, predicted, reference).rows()
     return [row for row in rows if row.quantity != "undecided"]
 
 

@@ -15,9 +15,8 @@ from fourbar_validation.compare.columns import Columns, read_columns
 from fourbar_validation.compare.rows import FAILS, FORMULAS, Row, make_plain, write_csv
 from fourbar_validation.compare.tolerance import IDENTITY
 from fourbar_validation.engines.guests import Guest, list_numbers
-from fourbar_validation.engines.hard_suite import Hard
 from fourbar_validation.engines.mujoco.picture import render_pictures
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import ABOUT, COLUMNS, TABLE, describe_run, write_about
 from fourbar_validation.regression.scenes import describe_scenes
 from fourbar_validation.report.html import write_html, write_markdown
@@ -30,6 +29,7 @@ from fourbar_validation.run import pool
 from fourbar_validation.run.judge import OUTPUT
 from fourbar_validation.run.machines import Cluster
 from fourbar_validation.run.store import Store
+from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.suites import Files, Suite
 
 WORKERS = 2
@@ -78,7 +78,7 @@ UNHEARD = Progress()
 def run(
     suite: Suite,
     out: Path,
-    witnesses: tuple[Witness, ...],
+    engines: tuple[Engine, ...],
     options: RunOptions = RunOptions(),
     missing: Sequence[tuple[str, str]] = (),
     progress: Progress = UNHEARD,
@@ -89,20 +89,20 @@ def run(
     """
     without_pictures = len(suite.not_drawn) if isinstance(suite, Files) else 0
     draw_at_once = options.drawn and len(suite) - without_pictures <= PICTURED
-    simulated = any(witness.through_time for witness in witnesses)
+    simulated = any(engine.through_time for engine in engines)
     size = max(CHUNK[draw_at_once or simulated], math.ceil(len(suite) / MOST_PARTS))
     chunks = [range(start, min(start + size, len(suite))) for start in range(0, len(suite), size)]
     identity = {
         "scenes": suite.fingerprint(),
-        "witnesses": [witness.fingerprint() for witness in witnesses],
+        "engines": [engine.fingerprint() for engine in engines],
         **name_code(),
         "draw": draw_at_once,
         "sample": options.sample,
     }
     summary = Summary()
-    summary.tolerances = list(dict.fromkeys((IDENTITY, *(witness.tolerance for witness in witnesses))))
+    summary.tolerances = list(dict.fromkeys((IDENTITY, *(engine.tolerance for engine in engines))))
     summary.missing = missing
-    summary.stated = {guest.name: guest.version for guest in witnesses if isinstance(guest, Guest)}
+    summary.stated = {guest.name: guest.version for guest in engines if isinstance(guest, Guest)}
     with Store(out, identity, OUTCOME).held() as store:
         for name in OUTCOME:
             (out / name).unlink(missing_ok=True)
@@ -112,8 +112,8 @@ def run(
         progress.advance(JUDGING, sum(len(chunks[number]) for number in done))
         cluster = None if options.scheduler is None else Cluster(options.scheduler)
         todo = (number for number in range(len(chunks)) if number not in done)
-        jobs = ((n, pool.make_jobs(suite, chunks[n], witnesses, draw_at_once, options.sample)) for n in todo)
-        limit = pool.find_time_limit(suite, witnesses)
+        jobs = ((n, pool.make_jobs(suite, chunks[n], engines, draw_at_once, options.sample)) for n in todo)
+        limit = pool.find_time_limit(suite, engines)
         for number, records in pool.judge_chunks(jobs, limit, options.workers, cluster):
             store.put(number, [record.kept_all() for record in records])
             progress.advance(JUDGING, len(records))
@@ -121,19 +121,19 @@ def run(
         pictured = {record.name for record in summary.pictured} if options.drawn else set()
         shown = [index for index in range(len(suite)) if make_plain(suite.name(index)) in pictured]
         if shown and not draw_at_once:
-            jobs = ((index, [_redraw(suite, index, summary, witnesses)]) for index in shown)
+            jobs = ((index, [_redraw(suite, index, summary, engines)]) for index in shown)
             for _, records in pool.judge_chunks(jobs, limit, options.workers):
                 summary.picture(*records)
                 progress.advance(DRAWING, 1)
-        about = describe_run(witnesses, suite.fingerprint(), describe_scenes(suite))
+        about = describe_run(engines, suite.fingerprint(), describe_scenes(suite))
         if cluster is not None:
             about.settings["machines"] = cluster.machines
         write_about(about, out)
         write_text(out / "report.md", write_markdown(summary))
-        generated = any(witness.generated for witness in witnesses)
+        generated = any(engine.generated for engine in engines)
         models, why_not = picture_models(suite, shown) if generated else ({}, "")
         sections = collect_sections(read_columns(out / COLUMNS) if isinstance(suite, Hard) else None, out)
-        NUMBERS.update(list_numbers(witnesses))
+        NUMBERS.update(list_numbers(engines))
         page = write_html(summary, first_lines, pictures=models, no_pictures=why_not, sections=sections)
         write_text(out / "report.html", page)
         store.finish()
@@ -160,7 +160,7 @@ def _collect(
     return columns.first_lines
 
 
-def _redraw(suite: Suite, scene: int, summary: Summary, witnesses: Sequence[Witness]) -> pool.Job:
+def _redraw(suite: Suite, scene: int, summary: Summary, engines: Sequence[Engine]) -> pool.Job:
     """Make the job of judging a scene once more, now with its pictures: its answers were not kept.
 
     An engine that broke down, or hung, in the scene is not started in it again.
@@ -168,7 +168,7 @@ def _redraw(suite: Suite, scene: int, summary: Summary, witnesses: Sequence[Witn
     name = make_plain(suite.name(scene))
     rows = next(record.rows for record in summary.pictured if record.name == name)
     broken = {row.engine for row in rows if row.failed and row.quantity == "all"}
-    (job,) = pool.make_jobs(suite, [scene], [one for one in witnesses if one.name not in broken], draw=True)
+    (job,) = pool.make_jobs(suite, [scene], [one for one in engines if one.name not in broken], draw=True)
     return job
 
 

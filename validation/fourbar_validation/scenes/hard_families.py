@@ -4,6 +4,7 @@ import math
 import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -312,3 +313,33 @@ FAMILIES = tuple(
         "released": released,
     }.items()
 )
+
+
+class Hard:
+    """Every scene of every family, by name; a worker makes them again from the parameters alone."""
+
+    def __len__(self) -> int:
+        return len(_make_scenes())
+
+    def name(self, index: int) -> str:
+        """Name a scene; ascending."""
+        return _make_scenes()[index][0]
+
+    def scene(self, index: int) -> Scene:
+        """Return the scene itself."""
+        return _make_scenes()[index][1]
+
+    def fingerprint(self) -> str:
+        """Name the families and count their scenes."""
+        return f"hard {' '.join(family.name for family in FAMILIES)} {len(self)}"
+
+
+@cache
+def _make_scenes() -> list[tuple[str, Scene]]:
+    """Make the scenes, by name."""
+    result = []
+    for family in FAMILIES:
+        for label, scene in family.scenes():
+            titled = replace(scene, title=f"{family.name}: {label}", source=family.statement)
+            result.append((f"{family.name} {label}".replace(" ", "-"), titled))
+    return sorted(result, key=lambda pair: pair[0])

@@ -18,7 +18,7 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.mujoco.inverse import MujocoInverse
 from fourbar_validation.engines.pinocchio import PinocchioInverse
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.registry import Engine
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
@@ -41,8 +41,8 @@ def judged(
     linkage = fourbar.FourBar(bars.ground, bars.input, bars.coupler, bars.output, theta_1)
     low, high = mobility.choose_range(linkage)
     scene = Scene(linkage, fourbar.Motion(fourbar.Sweep(low + 0.01, high - 0.01, 7), 2.0), drive_bar=4)
-    witness = engine()
-    rows = check_statements("scene", scene, witness, witness.answer(scene, command(scene)))
+    adapter = engine()
+    rows = check_statements("scene", scene, adapter, adapter.answer(scene, command(scene)))
     return {row.quantity: row for row in rows}
 
 
@@ -190,7 +190,7 @@ class Shy:
 
 
 def test_an_engine_that_refuses_the_positions_of_the_statements_refuses_them_in_a_row() -> None:
-    rows = judge("scene", crank_rocker(), [Witness("shy", Shy, EQUIVALENCE)]).rows
+    rows = judge("scene", crank_rocker(), [Engine("shy", Shy, EQUIVALENCE)]).rows
     (row,) = (row for row in rows if row.setting == "statements of the linkage")
     assert (row.verdict, row.reason) == (REFUSES, "too near a limit")
     assert not any(row.failed for row in rows)

@@ -16,13 +16,13 @@ from fourbar.scene.motion import Law
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.engines.mujoco import motions, simulate
 from fourbar_validation.engines.mujoco.called_back import OVERRUN, clip_angles
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
 
 KINK = 1e-5
 """rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by h^2: measured 3e-6 here."""
-SIMULATED = [replace(witness, order=None) for witness in WITNESSES if witness.through_time]
+SIMULATED = [replace(engine, order=None) for engine in ENGINES if engine.through_time]
 LAWS = {
     "periodic": Law((0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 3.5, 2.0 * math.pi), 24, "periodic"),
     "from rest to rest, turning back between": Law((0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 0.2, 2.0), 24, "rest"),

@@ -21,7 +21,7 @@ from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.led import Lead
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observe_order
-from fourbar_validation.engines.witnesses import WITNESSES
+from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.answers import compare_answer
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import Question
@@ -181,7 +181,7 @@ def hood(links: float, output: float | None = None) -> fourbar.Scene:
     return fourbar.Scene(fourbar.FourBar(0.11, *bars), motion, effects=(fourbar.Gravity(),), title="hood")
 
 
-SIMULATION = [replace(witness, order=None) for witness in WITNESSES if witness.name == "mujoco-simulated"]
+SIMULATION = [replace(engine, order=None) for engine in ENGINES if engine.name == "mujoco-simulated"]
 
 
 @pytest.mark.parametrize("links", [1e-2, 1e-8])
@@ -218,7 +218,7 @@ def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
 ) -> None:
     drive = fourbar.LinearDrive(SpringEnd(one, 0.17, -1.1), SpringEnd(other, 0.09, 0.7))
     scene = crank_rocker(motion=fourbar.Motion(TURN, 10.0, 5.0), drive=drive, effects=(fourbar.Gravity(),))
-    (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
+    (simulated,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
     rows = {
         row.quantity: row for row in judge("", scene, [simulated], order=False).rows if row.engine == simulated.name
     }
@@ -245,7 +245,7 @@ def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["theta_3", "theta_4", "stroke of bar 2", "stroke of bar 4"])
 def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
+    (simulated,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
     for branch in (1, -1):
         scene = commanded(what, branch)
         question = Question("", scene, fourbar.command(scene))
@@ -268,7 +268,7 @@ def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(what: str, mon
 
 def test_an_input_that_must_hurry_is_not_led() -> None:
     near = float(fourbar.formulas.mobility.find_limit_angles(crank_rocker().linkage, 4)[0])
-    (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
+    (simulated,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
     motion = fourbar.Motion(theta_4=near + np.linspace(0.3, 1e-6, 20), omega_4=-1.0)
     rows = judge("", crank_rocker(motion=motion), [simulated], order=False).rows
     assert [row.reason for row in rows if row.verdict == REFUSES and "as fast as on the mean" in row.reason]
@@ -278,5 +278,5 @@ def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused() -> N
     """One of ten thousand random linkages stands 1.5e-3 rad from where omega_3 vanishes: T3 and every force diverge."""
     scene = draw_random_scene(2026, 2265, tuple(DrawnType))
     assert np.nanmin(fourbar.solve(scene).drive_condition) < 0.003
-    (simulated,) = [witness for witness in WITNESSES if witness.name == "mujoco-simulated"]
+    (simulated,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
     assert not [row for row in judge("", scene, [simulated]).rows if row.failed]

@@ -11,7 +11,7 @@ from fourbar.linkage import FourBar, uniform
 from fourbar.quantities import FORCES, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
-from fourbar_validation.compare.answer import Answer, Engine
+from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE, count_half_turns, find_used, wrap_angle
 
@@ -40,7 +40,7 @@ def make_worst_row(name: str, answer: Answer, quantity: str, findings: Sequence[
     return Row.judged(who, quantity, error, allowed, worst.what, theta_2, condition)
 
 
-def look(engine: Engine, linkage: FourBar, places: Iterable[Place]) -> Seen:
+def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
     """Ask an engine at some places where bar 2 turns at 1 rad/s; the bars are uniform: masses play no part."""
     # neighbours in turn: an engine starts from the position before
     each = sorted(set(places), key=lambda place: place[::-1])
@@ -54,7 +54,7 @@ def look(engine: Engine, linkage: FourBar, places: Iterable[Place]) -> Seen:
     return {place: {name: float(answer[name][i]) for name in names} for i, place in enumerate(each)}
 
 
-def require_answer(engine: Engine, scene: Scene, at: Command) -> Answer:
+def require_answer(engine: Adapter, scene: Scene, at: Command) -> Answer:
     """Give an engine's answer; LimitError where it refuses those positions."""
     answer = engine.answer(scene, at)
     if answer.refusal is not None:

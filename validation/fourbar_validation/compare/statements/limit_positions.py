@@ -16,7 +16,7 @@ import numpy as np
 from fourbar.formulas import mobility
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Engine
+from fourbar_validation.compare.answer import Adapter
 from fourbar_validation.compare.statements.finding import Finding, Place, Seen, compare_angles, look, require_answer
 from fourbar_validation.compare.tolerance import (
     EPS,
@@ -150,7 +150,7 @@ class Stated(NamedTuple):
         return [limit for limit, collinear in limits if not collinear and limit.branch != 0]
 
 
-def compare_ranges(stated: Stated, engine: Engine) -> Iterator[Finding]:
+def compare_ranges(stated: Stated, engine: Adapter) -> Iterator[Finding]:
     """Ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
     for bar, tried in stated.trials.items():
         closes = require_answer(engine, tried.scene, tried.command).assembled
@@ -233,7 +233,7 @@ def _check_dead_centres(stated: Stated, bar: int, seen: Seen) -> Iterator[Findin
         yield Finding(abs({3: omega_3, 4: omega_4}[bar]), at_rest, limit.theta_2, f"{what}: at rest")
 
 
-def check_through(linkage: FourBar, engine: Engine) -> Iterator[Finding]:
+def check_through(linkage: FourBar, engine: Adapter) -> Iterator[Finding]:
     """Through a change point two motions go on: the smooth one is that whose speeds the engine finds unbroken.
 
     Every change point, in both senses and from both branches, with a position on the point itself and without.

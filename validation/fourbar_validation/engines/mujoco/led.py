@@ -19,7 +19,7 @@ from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.settings import FULL_TURN
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
-from fourbar_validation.engines.free_body_stroke import find_angle
+from fourbar_validation.engines.free_body_closure import find_angle
 from fourbar_validation.engines.limits import compute_least_sine
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.called_back import take_full_size

@@ -16,7 +16,7 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED, mark_turning
 from fourbar_validation.compare.tolerance import divide, hold_simulated, magnitude
 from fourbar_validation.engines.guests import Guest
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines.registry import Engine
 
 ROUNDS = 6
 """Simulations of a scene at most; the laws are seldom wrong by more than one."""
@@ -26,18 +26,18 @@ LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
 """Factor on the steps from one round to the next."""
 
 
-def adjust_witnesses(witnesses: Sequence[Witness], error: float) -> tuple[Witness, ...]:
+def adjust_engines(engines: Sequence[Engine], error: float) -> tuple[Engine, ...]:
     """Lay out simulations for `error`, and hold those of the harness to it.
 
     Exact engines stay exact. A guest is asked for this error; one that states its own tolerance keeps it.
     """
     tolerance = hold_simulated(error, "steps and softness are laid out for it")
-    adjusted: list[Witness] = []
-    for witness in witnesses:
-        laid_out: dict[str, Any] = {"tolerance": tolerance, "order": None} if witness.through_time else {}
-        if witness.through_time and not isinstance(witness, Guest):
-            laid_out["engine"] = partial(Dialled, error)
-        adjusted.append(replace(witness.at_setting(error=error) if isinstance(witness, Guest) else witness, **laid_out))
+    adjusted: list[Engine] = []
+    for engine in engines:
+        laid_out: dict[str, Any] = {"tolerance": tolerance, "order": None} if engine.through_time else {}
+        if engine.through_time and not isinstance(engine, Guest):
+            laid_out["start"] = partial(Dialled, error)
+        adjusted.append(replace(engine.at_setting(error=error) if isinstance(engine, Guest) else engine, **laid_out))
     return tuple(adjusted)
 
 

@@ -24,7 +24,7 @@ from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, WELL_CONDITIONE
 from fourbar_validation.engines.description import find_centre, find_inertia
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import FIRST_ORDER
-from fourbar_validation.engines.witnesses import find_missing
+from fourbar_validation.engines.registry import find_missing
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import make_row
 

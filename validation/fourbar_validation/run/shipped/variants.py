@@ -22,7 +22,7 @@ from fourbar_validation.compare.rows import VERDICTS, Row
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import EQUIVALENCE, WELL_CONDITIONED, ErrorBound, find_used, magnitude
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.witnesses import make_prediction
+from fourbar_validation.engines.registry import make_prediction
 from fourbar_validation.run.printed import compare_points
 from fourbar_validation.run.question import FREE_BODY, NotAskedError, Question, ask_at
 

@@ -1,8 +1,13 @@
 """Register the engines (independent solvers): what starts each, what it needs, and how it is judged."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+import tomllib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields, replace
+from functools import cache
 from importlib import import_module
+from importlib.metadata import EntryPoint, PackageNotFoundError, distribution
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 
@@ -10,15 +15,16 @@ from fourbar.errors import say_install
 from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
-from fourbar_validation.compare.answer import Answer, Engine
+from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.compare.compare import COMPARED, Nearby, Predicted
 from fourbar_validation.compare.rows import say_error
-from fourbar_validation.compare.tolerance import EQUIVALENCE, SIMULATED, Array, ErrorBound, Mask
+from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY, SIMULATED, Array, ErrorBound, Mask
 from fourbar_validation.engines.description import list_speeds
-from fourbar_validation.engines.exact import find_refusal, shift_to
+from fourbar_validation.engines.exact import BallArithmetic, find_refusal, shift_to
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.loop import make_blank
 from fourbar_validation.engines.prediction import predict_about_mass_centre, predict_from_data, predict_in_world_axes
+from fourbar_validation.places import CHECKOUT
 
 Predictor = Callable[[Scene, Command, str, Mask], Array]
 """Predicts the absolute error of a quantity at the positions of a mask, (n,)."""
@@ -27,11 +33,11 @@ Order = Callable[[Scene, Command, Callable[[Answer], float]], tuple[float, float
 
 
 @dataclass(frozen=True, slots=True)
-class Witness:
+class Engine:
     """An independent solver, and what it is held to."""
 
     name: str
-    engine: Callable[[], Engine]
+    start: Callable[[], Adapter]
     """Starts it; importable by name, and imports the library itself: a missing one costs only its own rows."""
     tolerance: ErrorBound
     expected: tuple[str, ...] = COMPARED
@@ -114,19 +120,19 @@ WORK = {
 OF_A_POSITION = tuple(name for name in COMPARED if STAGE_OF[name] == "position")
 
 
-def _make_pinocchio() -> Engine:
+def _make_pinocchio() -> Adapter:
     from fourbar_validation.engines.pinocchio import PinocchioInverse
 
     return PinocchioInverse()
 
 
-def _make_mujoco() -> Engine:
+def _make_mujoco() -> Adapter:
     from fourbar_validation.engines.mujoco.inverse import MujocoInverse
 
     return MujocoInverse()
 
 
-def _make_simulation() -> Engine:
+def _make_simulation() -> Adapter:
     from fourbar_validation.engines.mujoco.simulate import MujocoSimulated
 
     return MujocoSimulated()
@@ -140,10 +146,10 @@ def _observe_order_of_simulation(
     return observe_order(scene, at, error)
 
 
-WITNESSES = (
-    Witness("pinocchio-inverse", _make_pinocchio, EQUIVALENCE, predictor=predict_in_world_axes, library="pinocchio"),
-    Witness("mujoco-inverse", _make_mujoco, EQUIVALENCE, predictor=predict_about_mass_centre, library="mujoco"),
-    Witness(
+ENGINES = (
+    Engine("pinocchio-inverse", _make_pinocchio, EQUIVALENCE, predictor=predict_in_world_axes, library="pinocchio"),
+    Engine("mujoco-inverse", _make_mujoco, EQUIVALENCE, predictor=predict_about_mass_centre, library="mujoco"),
+    Engine(
         "mujoco-simulated",
         _make_simulation,
         SIMULATED,
@@ -154,7 +160,7 @@ WITNESSES = (
         residuals=True,
         library="mujoco",
     ),
-    Witness(
+    Engine(
         "free-body",
         FreeBody,
         EQUIVALENCE,
@@ -165,23 +171,56 @@ WITNESSES = (
 )
 
 
-def make_prediction(witness: Witness, scene: Scene, at: Command, answer: Answer) -> Predicted | None:
+BALLS = Engine("ball-arithmetic", BallArithmetic, FULL_ACCURACY, nearby=True, library="flint")
+
+
+def hold_fully(engine: Engine) -> Engine:
+    """Hold the engine to full accuracy, or else to the error predicted for each position."""
+    if engine.tolerance not in (EQUIVALENCE, FULL_ACCURACY):
+        return engine
+    return replace(engine, tolerance=FULL_ACCURACY, predictor=engine.predictor or predict_from_data)
+
+
+HARD_ENGINES = tuple(hold_fully(engine) for engine in (BALLS, *ENGINES))
+LAB, GROUP = "fourbar-lab", "fourbar.engines"
+"""Distribution and group of its entry points; no other distribution adds an engine to the judge's process."""
+
+
+@cache
+def load_further() -> tuple[Engine, ...]:
+    """Load the engines that the lab registers; none if it is not installed."""
+    try:
+        registered: Iterable[EntryPoint] = distribution(LAB).entry_points.select(group=GROUP)
+    except PackageNotFoundError:  # the environment of one engine has the lab of a checkout on its path alone
+        if CHECKOUT is None or find_spec(LAB.replace("-", "_")) is None:
+            return ()
+        project = tomllib.loads((CHECKOUT / "lab" / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+        registered = [EntryPoint(name, value, GROUP) for name, value in project["entry-points"][GROUP].items()]
+    return tuple(entry.load() for entry in sorted(registered))
+
+
+FOLDERS = tuple(Path(folder) for spec in [find_spec(LAB.replace("-", "_"))] if spec is not None
+                for folder in spec.submodule_search_locations or ())  # fmt: skip
+"""Folder of the lab, whose engines.toml a run reads too; none if the lab is not installed."""
+
+
+def make_prediction(engine: Engine, scene: Scene, at: Command, answer: Answer) -> Predicted | None:
     """Give what computes the errors to be expected, should any be called for; an alarm leaves no own excuse."""
     if answer.refusal is not None:
         return None
-    if witness.residuals:
+    if engine.residuals:
         if answer.alarms:
             return None
         return lambda quantity, where: answer.predicted.get(quantity, np.zeros(len(where)))
-    predict = witness.predictor
+    predict = engine.predictor
     if at.bar != 2 or at.stroke is not None:
         return None  # the prediction knows the command of bar 2 alone
-    if predict is None or (witness.tolerance.conditioned and (find_missing("flint") or find_refusal(scene))):
+    if predict is None or (engine.tolerance.conditioned and (find_missing("flint") or find_refusal(scene))):
         return None  # the law in the condition stands alone
     return lambda quantity, where: predict(scene, at, quantity, where)
 
 
-def make_nearby(witness: Witness, scene: Scene, at: Command, formulas: Solution) -> Nearby | None:
+def make_nearby(engine: Engine, scene: Scene, at: Command, formulas: Solution) -> Nearby | None:
     """Give what answers within the rounding of the theta_2 that are stated, if the engine does.
 
     Near a limit position the last digits of theta_2 decide sin(theta_4 - theta_3), and with it every other number:
@@ -189,18 +228,18 @@ def make_nearby(witness: Witness, scene: Scene, at: Command, formulas: Solution)
 
     A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine does not correct.
     """
-    if not witness.nearby or scene.drive_bar != 2 or at.remainder is not None or at.speed is None or at.bar != 2:
+    if not engine.nearby or scene.drive_bar != 2 or at.remainder is not None or at.speed is None or at.bar != 2:
         return None
     omega, alpha = list_speeds(at)
 
     def answer(where: Mask) -> dict[str, Array]:
-        engine, out = witness.engine(), make_blank(len(where), COMPARED)
+        adapter, out = engine.start(), make_blank(len(where), COMPARED)
         for i in np.flatnonzero(where & np.isfinite(formulas.sin_mu)).tolist():
             shift = shift_to(scene.linkage, float(at.theta_2[i]), float(formulas.sin_mu[i]))
             if shift is not None:
                 one = slice(i, i + 1)
                 moved = Command(at.theta_2[one], at.branch[one], omega[one], alpha[one], shift)
-                for name, values in engine.answer(scene, moved).quantities.items():
+                for name, values in adapter.answer(scene, moved).quantities.items():
                     out[name][one] = values
         return out
 

@@ -1,13 +1,14 @@
 """Engines of the lab join a run where it is installed; no other distribution adds one."""
 
+from collections.abc import Iterator
 from importlib.metadata import Distribution, PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from fourbar_validation.engines import further
-from fourbar_validation.engines.witnesses import Witness
+from fourbar_validation.engines import registry
+from fourbar_validation.engines.registry import Engine
 from tests.whole.test_imports import ROOT
 
 
@@ -19,7 +20,7 @@ def installed(folder: Path, name: str, entries: str) -> None:
 
 
 @pytest.fixture
-def only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder that has all distributions."""
 
     def find(name: str) -> Any:
@@ -28,22 +29,28 @@ def only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
                 return one
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr(further, "distribution", find)
-    return tmp_path
+    monkeypatch.setattr(registry, "distribution", find)
+    yield tmp_path
+    registry.load_further.cache_clear()
+
+
+def load() -> tuple[Engine, ...]:
+    registry.load_further.cache_clear()
+    return registry.load_further()
 
 
 NAMES = ["exudyn-constraints", "opensim-constraints", "drake-inverse"]
 
 
 def test_the_lab_alone_adds_engines(only: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert [each.name for each in further.load_further()] == NAMES  # of the checkout, where it lies on the path
-    monkeypatch.setattr(further, "CHECKOUT", None)
-    assert further.load_further() == ()
+    assert [each.name for each in load()] == NAMES  # of the checkout, where it lies on the path
+    monkeypatch.setattr(registry, "CHECKOUT", None)
+    assert load() == ()
     installed(only, "stranger", "[fourbar.engines]\nmine = os:abort\n")
-    assert further.load_further() == ()
+    assert load() == ()
     project = (ROOT / "lab" / "pyproject.toml").read_text()
     lines = project.partition('entry-points."fourbar.engines"]')[2].partition("[")[0].replace('"', "").splitlines()[1:]
     installed(only, "fourbar-lab", "[fourbar.engines]\n" + "\n".join(lines) + "\n[other]\nmine = os:abort\n")
-    found = further.load_further()
+    found = load()
     assert [each.name for each in found] == NAMES
-    assert all(isinstance(each, Witness) and each.code in each.fingerprint() and each.code for each in found)
+    assert all(isinstance(each, Engine) and each.code in each.fingerprint() and each.code for each in found)

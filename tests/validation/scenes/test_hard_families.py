@@ -16,13 +16,12 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
 from fourbar_validation.compare.tolerance import FULL_ACCURACY
-from fourbar_validation.engines.hard_suite import HARD_WITNESSES, Hard
 from fourbar_validation.engines.limits import LIMITS
 from fourbar_validation.engines.mujoco import simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.shipped import compare_shipped
 from fourbar_validation.engines.prediction import predict_from_data, predict_in_world_axes
-from fourbar_validation.engines.witnesses import Predictor, Witness, make_nearby
+from fourbar_validation.engines.registry import HARD_ENGINES, Engine, Predictor, make_nearby
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.released import make_pendulum
 from fourbar_validation.scenes import hard_families as families
@@ -30,6 +29,7 @@ from fourbar_validation.scenes.hard_families import (
     FAMILIES,
     TOGGLE,
     Family,
+    Hard,
     draw_linkage,
     dress,
     find_collinear_3_4,
@@ -40,7 +40,7 @@ from fourbar_validation.scenes.random import DrawnType
 from tests.support.engine_limits import MEASURED, Measured
 from tests.support.scenes import crank_rocker
 
-EXACT = tuple(w for w in HARD_WITNESSES if not w.through_time)
+EXACT = tuple(w for w in HARD_ENGINES if not w.through_time)
 SWEEP = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0))
 
 
@@ -74,12 +74,12 @@ def test_beyond_a_toggle_no_engine_finds_a_position() -> None:
     (psi, stretched), *_ = find_collinear_3_4(lengths)
     beyond = set_angles(dress(lengths), psi + (1.0 if stretched else -1.0) * np.array(TOGGLE))
     assert not fourbar.solve(beyond).assembled.any()
-    for witness in EXACT:
-        answer = witness.engine().answer(beyond, fourbar.command(beyond))
-        assert answer.assembled is not None and not answer.assembled.any(), witness.name
+    for engine in EXACT:
+        answer = engine.start().answer(beyond, fourbar.command(beyond))
+        assert answer.assembled is not None and not answer.assembled.any(), engine.name
         of_input = ("theta_2", "omega_2", "alpha_2", "A", "G2", "v_A", "v_G2", "a_A", "a_G2")  # where it is commanded
         for name, values in answer.quantities.items():
-            assert name in of_input or np.isnan(values).all(), (witness.name, name)
+            assert name in of_input or np.isnan(values).all(), (engine.name, name)
 
 
 def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
@@ -89,7 +89,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     lengths, true = draw_linkage(DrawnType.TRIPLE_ROCKER, 0), fourbar_validation.run.question.solve
     (psi, stretched), *_ = find_collinear_3_4(lengths)
     near = set_angles(dress(lengths), psi + (-1.0 if stretched else 1.0) * np.array([*families.REGULAR, 1e-9]))
-    balls = [witness for witness in HARD_WITNESSES if witness.nearby]
+    balls = [engine for engine in HARD_ENGINES if engine.nearby]
 
     def verdicts() -> dict[str, str]:
         return {row.quantity: row.verdict for row in judge("", near, balls).rows if row.engine == balls[0].name}
@@ -111,7 +111,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
 def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2() -> None:
     scene = dress(families.PLAIN)
     command = fourbar.command(set_angles(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13]))
-    formulas, balls = fourbar.solve(set_angles(scene, [0.7] * 3)), HARD_WITNESSES[0]
+    formulas, balls = fourbar.solve(set_angles(scene, [0.7] * 3)), HARD_ENGINES[0]
     nearby = make_nearby(balls, scene, command, formulas)
     assert nearby is not None and np.isfinite(nearby(np.ones(3, dtype=bool))["torque"]).tolist() == [True, True, False]
 
@@ -122,7 +122,7 @@ def test_an_answer_nearby_has_the_sine_of_the_formulas() -> None:
     (psi, stretched), *_ = find_collinear_3_4(lengths)
     near = set_angles(dress(lengths), psi + (-1.0 if stretched else 1.0) * np.array([0.3, 1e-3, 1e-9]))
     command, formulas = fourbar.command(near), fourbar.solve(near)
-    nearby = make_nearby(HARD_WITNESSES[0], near, command, formulas)
+    nearby = make_nearby(HARD_ENGINES[0], near, command, formulas)
     assert nearby is not None
     np.testing.assert_allclose(nearby(np.ones(3, dtype=bool))["sin_mu"], formulas.sin_mu, rtol=1e-15)
 
@@ -147,10 +147,10 @@ class AlmostRight(Spoiled):
     part = 1e-10
 
 
-def verdict_of(engine: type, scene: Scene, predictor: Predictor | None) -> tuple[str, float]:
+def verdict_of(adapter: type, scene: Scene, predictor: Predictor | None) -> tuple[str, float]:
     tolerance = FULL_ACCURACY if predictor else _equivalence()
-    witness = Witness("spoiled", engine, tolerance, predictor=predictor)
-    row = next(r for r in judge("scene", scene, [witness]).rows if r.engine == "spoiled" and r.quantity == "F32")
+    engine = Engine("spoiled", adapter, tolerance, predictor=predictor)
+    row = next(r for r in judge("scene", scene, [engine]).rows if r.engine == "spoiled" and r.quantity == "F32")
     return row.verdict, row.allowed
 
 
@@ -258,7 +258,7 @@ def test_a_reset_and_what_caused_it_are_seen(what: str, monkeypatch: pytest.Monk
 
 def test_an_alarm_fails_its_row(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulate, "list_alarms", lambda *_: ["the sky falls"])
-    rows = [r for r in judge("scene", SWEEP, [w for w in HARD_WITNESSES if w.through_time]).rows]
+    rows = [r for r in judge("scene", SWEEP, [w for w in HARD_ENGINES if w.through_time]).rows]
     assert any(row.verdict == FAILS and row.reason == "the sky falls" for row in rows)
 
 
