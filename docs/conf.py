@@ -30,13 +30,13 @@ SPACE = '<mspace width="0.17em" />'
 
 
 def append_reference(app, page, source):
-    """Append signatures and docstrings to the page of the API."""
-    if page == "api":
-        source[0] += "\n" + runpy.run_path(str(Path(__file__).with_name("api.py")))["text"]()
+    """Append to a page what is made of the code: docstrings, and options of commands."""
+    if page in ("api", "commands"):
+        source[0] += "\n" + runpy.run_path(str(Path(__file__).with_name(f"{page}.py")))["text"]()
 
 
 def setup(app):
-    """Write formulas as MathML, in the line or below it, and complete the page of the API."""
+    """Write formulas as MathML, in the line or below it, and complete the pages of reference."""
 
     def written(display):
         def write(page, node):

@@ -259,8 +259,19 @@ def test_paragraphs_are_short_and_tables_hold_the_rest() -> None:
                 assert len(paragraph.split()) <= 112, (page.name, len(paragraph.split()), paragraph[:80])
 
 
-def test_the_page_of_the_commands_is_the_one_that_is_written() -> None:
-    assert read("docs/commands.md") == runpy.run_path(str(DOCS / "commands.py"))["text"]()
+def test_the_page_of_the_commands_lists_each_and_its_reference_describes_every_option() -> None:
+    table = read("docs/commands.md").partition("| command | result |")[2].partition("\n\n")[0]
+    listed = [name for row in table.splitlines()[2:] for name in re.findall(r"`([a-z]+)`", row.split("|")[1])]
+    commands = fourbar.cli.group.list_commands(click.Context(fourbar.cli.group))
+    assert sorted(listed) == commands
+    reference = runpy.run_path(str(DOCS / "commands.py"))["text"]()
+    assert re.findall(r"^## (\w+)$", reference, re.MULTILINE) == commands
+    described = {name for row in re.findall(r"^\| `(-.*?)` \|", reference, re.MULTILINE) for name in row.split(", ")}
+    context = click.Context(fourbar.cli.group)
+    for command in commands:
+        for option in fourbar.cli.group.get_command(context, command).params:  # type: ignore[union-attr]
+            assert {name.split()[0] for name in described} >= {name for name in option.opts if name[0] == "-"}, option
+    assert "None |" not in reference
 
 
 def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
