@@ -1,4 +1,4 @@
-"""MuJoCo Warp builds (dJ/dt) v of an equality constraint `connect` from the velocities of the evaluation before.
+"""MuJoCo Warp builds (dJ/dt) v of `connect` and `weld` from the velocities of the evaluation before.
 
 Engine: mujoco-warp (mujoco_warp)
 With: mujoco=={version}

@@ -55,6 +55,7 @@ class TestFourBar(unittest.TestCase):
         return a, datas[0].contact_force.linear[:2].copy()
 
     def check(self, name, tolerance):
+        """Compare with m a_G = sum(F) and I_G alpha = sum(r x F) + tau of each bar, of the largest force, 133 N."""
         for theta_2, (theta_3, theta_4, torque, force) in EXPECTED.items():
             q = np.array([np.deg2rad(theta_2), theta_3 - np.deg2rad(theta_2), theta_4])
             a, found = self.dynamics(name, q, np.array([OMEGA, -OMEGA, OMEGA]), np.array([torque, 0.0, 0.0]))
@@ -62,9 +63,11 @@ class TestFourBar(unittest.TestCase):
             np.testing.assert_allclose(found, force, atol=tolerance * 133.0)
 
     def test_constraint_dynamics(self):
+        """Verify acceleration and closing force; 1e-8 is the tolerance that the proximal settings ask for."""
         self.check("constraintDynamics", 1e-8)
 
     def test_lcaba_finds_the_force_of_constraint_dynamics(self):
+        """Compare the closing forces of two algorithms for one constraint; their accelerations agree to 1e-6."""
         for theta_2, (theta_3, theta_4, torque, _) in EXPECTED.items():
             q = np.array([np.deg2rad(theta_2), theta_3 - np.deg2rad(theta_2), theta_4])
             state = q, np.array([OMEGA, -OMEGA, OMEGA]), np.array([torque, 0.0, 0.0])

@@ -11,7 +11,9 @@ import pytest
 from fourbar_lab.simulators.problems import PROBLEMS
 from tests.whole.test_imports import ROOT, imported
 
-FILES = sorted((ROOT / "docs/upstream").glob("*/*four_bar*.py")) + sorted((ROOT / "docs/upstream").glob("*/*fourbar*"))
+UPSTREAM = ROOT / "docs/upstream"
+FILES = sorted(UPSTREAM.glob("*/*four_bar*.py"))
+NEWTON = UPSTREAM / "newton" / "test_fourbar_forces.py"
 DIGITS = 1e-8
 """Of the ten digits that the files state."""
 
@@ -28,10 +30,34 @@ def literals(path: Path) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.parametrize("quantity", ["torque", "F14"])
+def test_newton_s_free_bodies_find_our_answers(quantity: str) -> None:
+    numbers = [
+        node
+        for node in ast.parse(NEWTON.read_text()).body
+        if isinstance(node, ast.Assign) or (isinstance(node, ast.FunctionDef) and node.name.startswith("solve"))
+    ]
+    names: dict[str, Any] = {"np": np}
+    exec(compile(ast.Module(numbers, []), str(NEWTON), "exec"), names)
+    problem = json.loads((PROBLEMS / "newton_128.json").read_text())
+    command, answers = problem["command"], np.array(problem["answers"][quantity])
+    solved = [names["solve_free_bodies"](theta, command["omega_2"], 0.0) for theta in command["theta_2"]]
+    theirs = np.array([torque if quantity == "torque" else force for torque, force in solved])
+    assert len(theirs) == 37 and np.abs(theirs - answers).max() <= DIGITS * np.abs(answers).max()
+
+
+@pytest.mark.parametrize("path", [path for path in UPSTREAM.glob("*/*.py") if path.name != "conftest.py"], ids=str)
+def test_every_test_for_another_project_says_what_it_compares(path: Path) -> None:
+    tree = ast.parse(path.read_text())
+    tests = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")]
+    assert tests and all(ast.get_docstring(node) for node in tests) and ast.get_docstring(tree)
+    assert "expectedFailure" not in path.read_text()
+    assert not any(name.startswith("fourbar") for name in imported(path))
+
+
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.parent.name)
 def test_a_file_for_another_project_states_our_answers(path: Path) -> None:
     text, stated = path.read_text(), literals(path)
-    assert not any(name.startswith("fourbar") for name in imported(path))
     named = [file.stem for file in PROBLEMS.glob("*.json") if file.stem in text]
     tables = stated["EXPECTED"] if isinstance(next(iter(stated["EXPECTED"])), str) else {named[0]: stated["EXPECTED"]}
     assert set(tables) <= set(named)
@@ -50,5 +76,7 @@ def test_a_file_for_another_project_states_our_answers(path: Path) -> None:
 
 
 def test_each_project_has_its_file() -> None:
-    assert {path.parent.name for path in FILES} == {"drake", "genesis", "mujoco_warp", "newton", "pinocchio"}
-    assert all(path.parent.name in (ROOT / "docs/findings.md").read_text() for path in FILES)
+    projects = {path.parent.name for path in UPSTREAM.glob("*/*.py")}
+    assert projects == {"drake", "genesis", "mujoco_warp", "newton", "pinocchio"}
+    page = (ROOT / "docs/findings.md").read_text()
+    assert all(f"(upstream/{path.relative_to(UPSTREAM).as_posix()})" in page for path in [*FILES, NEWTON])
