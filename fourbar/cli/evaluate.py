@@ -27,7 +27,7 @@ def classify(lengths: tuple[str, ...], everything: bool, as_json: bool, out: Pat
     D A B C are ground, input, coupler and output: four bare numbers are ratios; lengths like 30cm work too.
     """
     from fourbar.linkage import Bar, FourBar
-    from fourbar.show.block import write_type, write_type_json
+    from fourbar.show.studies import write_type, write_type_json
     from fourbar.show.units import suit_units
 
     ratios = [given.is_bare(text) for text in lengths]
@@ -164,14 +164,12 @@ def _write_solution(
     scene: Scene, solution: Solution, form: Form, units: Conversion, pressure: float | None, out: Path | None
 ) -> str:
     from fourbar.show.block import write_block
-    from fourbar.show.duty import write_motor
-    from fourbar.show.summary import locate_between
+    from fourbar.show.summary import write_motor
     from fourbar.show.tables import print_positions
     from fourbar.solution import write_csv, write_json
 
     if form.kind == "json":
-        located = locate_between(scene, solution).solution
-        return write_json(solution, units, motor=write_motor(solution, units, located))
+        return write_json(solution, units, motor=write_motor(scene, solution, units))
     if form.kind == "csv":
         return write_csv(solution, units, form.decimal)
     if form.kind == "table":

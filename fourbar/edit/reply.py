@@ -14,7 +14,8 @@ from fourbar.edit.dragging import list_handles
 from fourbar.errors import NotAssembledError
 from fourbar.scene import Scene
 from fourbar.show.animate import collect_live_data
-from fourbar.show.block import write_block, write_type
+from fourbar.show.block import write_block
+from fourbar.show.studies import write_type
 from fourbar.show.units import COMMON
 from fourbar.solution import Conversion, Solution
 from fourbar.solve import find_last_stage, solve

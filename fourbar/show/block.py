@@ -1,25 +1,13 @@
-"""Output of `analyze` and `classify`: one block of aligned lines, at most 80 columns wide."""
+"""Output of `analyze`: one block of aligned lines, at most 80 columns wide."""
 
 import math
-from collections.abc import Callable, Iterator
-from functools import partial
 from textwrap import wrap
 
 import numpy as np
 
 from fourbar.errors import clean_line
-from fourbar.formulas.mobility import (
-    change_points,
-    circuits,
-    classify,
-    limit_positions,
-    reach_of,
-    swing,
-    time_ratio,
-    turns_fully,
-)
-from fourbar.formulas.transmission import transmission_extremes
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar
+from fourbar.formulas.mobility import classify
+from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
@@ -27,7 +15,6 @@ from fourbar.show.duty import describe_drive
 from fourbar.show.summary import Facts, summarize
 from fourbar.show.units import COMMON, choose_unit, write_digits, write_short
 from fourbar.solution import Conversion, Solution
-from fourbar.writing import write_object
 
 WIDTH = 80
 TIED = "\u00a0"
@@ -40,6 +27,8 @@ FOUR_DIGITS = 5e-5
 """Error bar as a part of the value from which on it changes four digits."""
 FEW_DIGITS = 1e-8
 """Error bar as a part of the value from which on the block says where digits are lost: half of those of a double."""
+ALIKE = 1e-3
+"""Ratio of the smallest to the largest of several quantities from which on they share a prefix."""
 LOST = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 """Bars that are in line where a command of a bar, or a drive on it, loses digits."""
 
@@ -51,8 +40,8 @@ def write_block(
 
     Parameters
     ----------
-    units : in which numbers are shown; what is left out has the SI unit with a prefix.
-    pressure : of a cylinder, Pa: the bore that it takes is added.
+    units : units of the numbers; one that is left out is the SI unit with a prefix.
+    pressure : pressure of a cylinder, Pa; adds the bore that it needs.
     """
     return _Block(summarize(scene, solution), units).write(pressure)
 
@@ -70,16 +59,13 @@ class _Block:
             self.unit = "rad" if facts.solution.at.stroke is None else "m"
 
     def write(self, pressure: float | None) -> list[str]:
-        """Write all paragraphs, a blank line between two."""
-        paragraphs = [self._write_motion(), self._write_drive(pressure), self._write_pins()]
-        paragraphs += [self._write_bending(), self._write_remarks()]
+        """Write all paragraphs; a blank line parts the motion from the loads."""
+        loads = [*self._write_drive(pressure), *self._write_pins(), *self._write_bending(), *self._write_remarks()]
         lines: list[str] = []
-        for paragraph in (paragraph for paragraph in paragraphs if paragraph):
-            for line in paragraph:
-                aligned = len(line) <= WIDTH
-                lines += [line] if aligned else wrap(line, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
-            lines.append("")
-        return [line.replace(TIED, " ") for line in lines[:-1]]
+        for line in [*self._write_motion(), *([""] if loads else []), *loads]:
+            aligned = len(line) <= WIDTH
+            lines += [line] if aligned else wrap(line, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+        return [line.replace(TIED, " ") for line in lines]
 
     def _value(self, value: float, unit: str, largest: float | None = None) -> str:
         """Write a quantity of an SI unit, with the prefix that suits it or the largest of its kind."""
@@ -107,11 +93,11 @@ class _Block:
         if len(lines[0]) > WIDTH:
             lines = [head, f"    {lengths} {unit}"]
         if facts.kind == "position":
-            at = facts.solution
+            one = facts.solution
             angles = ", ".join(
-                f"theta_{bar} = {self._angle(float(getattr(at, f'theta_{bar}')[0]))}" for bar in (2, 3, 4)
+                f"theta_{bar} = {self._angle(float(getattr(one, f'theta_{bar}')[0]))}" for bar in (2, 3, 4)
             )
-            stroke = "" if at.stroke is None else f"stroke {self._value(float(at.stroke[0]), 'm')}: "
+            stroke = "" if one.stroke is None else f"stroke {self._value(float(one.stroke[0]), 'm')}: "
             lines += [stroke + angles, f"transmission angle {self._angle(facts.transmission.value)}"]
         else:
             lines += [self._write_ranges()]
@@ -124,7 +110,7 @@ class _Block:
         lines += self._write_stretches()
         acted_on = scene.loads or scene.effects or any(bar.mass > 0.0 for bar in scene.linkage.moving)
         if facts.solution.F12 is None and acted_on:
-            lines += [f"positions only, since {scene.motion.names[1]} is left out:", f"    {static(scene)}"]
+            lines += [f"positions only, since {scene.motion.names[1]} is left out:", f"    {explain_static(scene)}"]
         return lines
 
     def _write_ranges(self) -> str:
@@ -142,8 +128,8 @@ class _Block:
         else:
             name = "stroke" if self.unit == "m" else BAR_NAMES[bar]
             begin = f"{name} from {self._place(first, named=False)} to {self._place(last, named=False)}"
-        others = [2, 4] if facts.kind == "released" else [4 if bar != 4 else 2]
-        return "; ".join([begin, *(f"{BAR_NAMES[other]} {self._write_swing(other)}" for other in others)])
+        following = [2, 4] if facts.kind == "released" else [4 if bar != 4 else 2]
+        return "; ".join([begin, *(f"{BAR_NAMES[number]} {self._write_swing(number)}" for number in following)])
 
     def _write_swing(self, bar: int) -> str:
         low, high = self.facts.angles[bar]
@@ -240,9 +226,9 @@ class _Block:
         if motion.speed is None:
             return head if motion.law is None else f"{head}, by a law over time"
         si = "rad/s" if motion.stroke is None else "m/s"
-        own = motion.stroke is not None or (scene.drive is None and scene.drive_bar == motion.bar)
+        drives = motion.stroke is not None or (scene.drive is None and scene.drive_bar == motion.bar)
         speed = "at rest" if motion.speed == 0.0 else self._value(motion.speed, si)
-        if not own:
+        if not drives:
             speed = f"the {BAR_NAMES[motion.bar]} {'' if motion.speed == 0.0 else 'at '}{speed}"
         if motion.acceleration:
             speed += f", {motion.names[2]} = {self._value(motion.acceleration, f'{si}^2')}"
@@ -280,54 +266,52 @@ class _Block:
 
     def _write_pins(self) -> list[str]:
         """Write the loads of the four pins, side by side."""
-        facts = self.facts
-        if not facts.pins:
+        facts, loads = self.facts, self.facts.pins.values()
+        if not loads:
             return []
-        one = facts.kind == "position"
-        most = max(load.peak.value for load in facts.pins.values())
-
-        def force(value: float) -> str:
-            return self._value(value, "N", most)
-
-        rows = [("pins", list(facts.pins))]
-        rows.append(("  force" if one else "  peak", [force(load.peak.value) for load in facts.pins.values()]))
-        if not one:
-            rows.append(("  at", [self._place(load.peak.place, named=False) for load in facts.pins.values()]))
-            rows.append(("  RMS", [force(load.rms) for load in facts.pins.values()]))
-        lines = _align(rows)
-        if facts.kind == "list":
-            lines.append("  peak and RMS are those of these positions")
-        elif not one and (
-            rough := [pin for pin, name in zip(facts.pins, PIN_FORCES, strict=True) if self._is_rough(name)]
-        ):
-            lines.append(f"  between these positions the loads of {', '.join(rough)} grow without bound")
-        return lines
+        peaks = self._cells([load.peak.value for load in loads], "N")
+        if facts.kind == "position":
+            return _align([("pins", list(facts.pins)), ("  force", peaks)])
+        places = [self._place(load.peak.place, named=False) for load in loads]
+        means = self._cells([load.rms for load in loads], "N")
+        lines = _align([("pins", list(facts.pins)), ("  peak", peaks), ("  at", places), ("  RMS", means)])
+        return [*lines, "  peak and RMS are those of these positions"] if facts.kind == "list" else lines
 
     def _write_bending(self) -> list[str]:
         """Write the largest bending moment of each bar, where along the bar, and where in the motion."""
-        facts = self.facts
-        most = max((peak.value for peak, _ in facts.bending.values()), default=0.0)
-        if not most:
+        facts, bending = self.facts, self.facts.bending.values()
+        if not any(bar.peak.value for bar in bending):
             return []
-        ends = facts.bending.values()
-        rows = [("bending", [f"bar {bar}" for bar in facts.bending])]
-        rows.append(("  moment", [self._value(peak.value, "N m", most) for peak, _ in ends]))
-        rows.append(("  at x", [self._value(x, "m", self.longest) for _, x in ends]))
+        places = [self._value(bar.x, "m", self.longest) for bar in bending]
         if facts.kind != "position":
-            rows.append(("  at", [self._place(peak.place, named=False) for peak, _ in ends]))
-        return _align(rows)
+            where = [self._place(bar.peak.place, named=False) for bar in bending]
+            places = [f"{x}, {place}" for x, place in zip(places, where, strict=True)]
+        moments = self._cells([bar.peak.value for bar in bending], "N m")
+        return _align([("bending", [f"bar {bar}" for bar in facts.bending]), ("  moment", moments), ("  at x", places)])
+
+    def _cells(self, values: list[float], unit: str) -> list[str]:
+        """Write quantities of one kind with the prefix of the largest; each with its own if they lie far apart."""
+        sizes = [abs(value) for value in values if value]
+        alike = bool(sizes) and min(sizes) > ALIKE * max(sizes)
+        return [self._value(value, unit, max(sizes) if alike or not value else None) for value in values]
 
     def _is_rough(self, name: str) -> bool:
         """Tell whether a peak is that of the positions alone: between them it grows, or nothing was looked for."""
         return self.facts.kind not in ("position", "released") and name in self.facts.between.growing
 
     def _write_remarks(self) -> list[str]:
-        """Write where pin forces jump, and what rounding does."""
+        """Write what grows between the positions, where pin forces jump, and what rounding does."""
         facts, lines = self.facts, list[str]()
+        pins = [pin for pin, name in zip(facts.pins, PIN_FORCES, strict=False) if self._is_rough(name)]
+        bars = [f"bar {bar}" for bar, bending in facts.bending.items() if bending.grows and bending.peak.value]
+        if facts.kind not in ("position", "list", "released") and (pins or bars):
+            parts = [("the loads of ", pins), ("the bending of ", bars)]
+            grow = " and ".join(head + ", ".join(names) for head, names in parts if names)
+            lines.append(f"growing without bound between these positions: {grow}")
         if facts.between.reversals:
-            where = ", ".join(f"{self._place(place, named=False)} ({pin})" for place, pin in facts.between.reversals)
+            places = ", ".join(f"{self._place(place, named=False)} ({pin})" for place, pin in facts.between.reversals)
             name = facts.solution.commanded
-            lines.append(f"dry friction reverses, and the pin forces jump, at {name} = {where}")
+            lines.append(f"dry friction reverses, and the pin forces jump, at {name} = {places}")
         lines += self._warn()
         if facts.error is not None:
             below = f"below 1e{math.ceil(math.log10(facts.error)):+03d}" if facts.error else "zero"
@@ -346,18 +330,18 @@ class _Block:
         if not np.nanmax(share, initial=0.0) > FEW_DIGITS:
             return []
         worst = int(np.nanargmax(share))
-        left = max(math.floor(-math.log10(share[worst])), 0)
+        digits = max(math.floor(-math.log10(share[worst])), 0)
         place = solution.at.places if solution.time is None else solution.time
-        where = f"{left} digits left of {drive.symbol} at {self._place(float(place[worst]))}"
+        start = f"{digits} digits left of {drive.symbol} at {self._place(float(place[worst]))}"
         commanded = LOST[solution.at.bar]
         sines = {commanded: solution.condition[worst]}
         if solution.drive is not None:
             lever, sine = solution.drive_condition[worst], sines[commanded]
-            return [f"{where}: of its lever {lever:.2g}, of the sine of bars {commanded} {sine:.2g} is left"]
+            return [f"{start}: of its lever {lever:.2g}, of the sine of bars {commanded} {sine:.2g} is left"]
         sines[LOST[solution.drive_bar]] = solution.drive_condition[worst]
         bars = min(sines, key=lambda pair: sines[pair])
         gap = math.asin(min(sines[bars], 1.0))
-        return [f"{where}: bars {bars} are {gap:.2g} rad from being in line"]
+        return [f"{start}: bars {bars} are {gap:.2g} rad from being in line"]
 
     @staticmethod
     def _row(label: str, text: str) -> str:
@@ -370,102 +354,7 @@ def _align(rows: list[tuple[str, list[str]]]) -> list[str]:
     return [f"{label:<{LABEL}}{''.join(f'{cell:<{width}}' for cell in cells)}".rstrip() for label, cells in rows]
 
 
-def static(scene: Scene) -> str:
+def explain_static(scene: Scene) -> str:
     """Say what asks for forces where a scene states positions alone."""
     unit, what = ("rad/s", "torque") if scene.motion.stroke is None else ("m/s", "force")
     return f'{scene.motion.names[1]} = "0 {unit}" gives the static {what} and pin forces'
-
-
-BRANCHES = {**BRANCH_NAMES, 0: "both"}
-
-
-def write_type(linkage: FourBar, units: Conversion | None = COMMON, *, everything: bool = False) -> Iterator[str]:
-    """Write the type of a linkage, the condition that decides it, what turns, how far, and between which limits.
-
-    `units`: of the lengths; None where they are ratios. `everything`: the limits of all bars, not of the output alone.
-    """
-    found = classify(linkage)
-    relation = "<" if found.surplus > 0.0 else ">" if found.surplus < 0.0 else "="
-    outer = min(linkage.lengths) + max(linkage.lengths)
-    write = partial(_write_length, linkage=linkage, units=units)
-    yield found.name
-    yield f"s + l = {write(outer)} {relation} p + q = {write(sum(linkage.lengths) - outer)}"
-    yield "bars that turn fully: " + (", ".join(BAR_NAMES[number] for number in found.turning) or "none")
-    if found.barker is not None:  # a structure does not move
-        yield from _write_mobility(linkage, write, everything)
-
-
-def _write_length(length: float, linkage: FourBar, units: Conversion | None) -> str:
-    if units is None:
-        return f"{length:.6g}"
-    factor, name = choose_unit(max(linkage.lengths), "m", units)
-    return f"{factor * length:.6g} {name}"
-
-
-def write_type_json(linkage: FourBar) -> str:
-    """Write the type as JSON: SI and radians, null where there is nothing; positions as `LimitPosition` has them."""
-    found, more = classify(linkage), dict[str, object]()
-    if found.barker is not None:
-        transmission = transmission_extremes(linkage)
-        more = {
-            "swing": {BAR_NAMES[bar]: swing(linkage, bar) for bar in MOVING_BARS},
-            "limit_positions": {BAR_NAMES[bar]: limit_positions(linkage, bar) for bar in MOVING_BARS},
-            "change_points": change_points(linkage),
-            "circuits": circuits(linkage),
-            "transmission": {**transmission._asdict(), "worst": transmission.worst},
-            "time_ratio": time_ratio(linkage),
-        }
-    lengths = dict(zip(BAR_NAMES.values(), linkage.lengths, strict=True))
-    return write_object("fourbar-classify/1", lengths=lengths, **found._asdict(), **more)
-
-
-def _write_mobility(linkage: FourBar, write: Callable[[float], str], everything: bool) -> Iterator[str]:
-    """Line by line; angles in deg, digits as far as a drawing needs them."""
-    swings = [
-        f"{BAR_NAMES[bar]} {_write_degrees(swing(linkage, bar))}"
-        for bar in MOVING_BARS
-        if not turns_fully(linkage, bar)
-    ]
-    if swings:
-        yield f"bars that swing: {', '.join(swings)}"
-    limits = [(bar, limit) for bar in (MOVING_BARS if everything else (4,)) for limit in limit_positions(linkage, bar)]
-    if limits:
-        names = "".join(f"{name:>10}" for name in ("theta_2", "theta_3", "theta_4"))
-        yield f"{'limit positions (deg)':<34}{names}  branch"
-    for bar, limit in limits:
-        one, other = (BAR_NAMES[number] for number in MOVING_BARS if number != bar)
-        what = f"  {BAR_NAMES[bar]}: {one}, {other} {'stretched' if limit.stretched else 'folded'}"
-        angles = "".join(f"{math.degrees(angle):10.4f}" for angle in limit[:3])
-        yield f"{what:<34}{angles}  {BRANCHES[limit.branch]}"
-    for bar in MOVING_BARS:
-        if turns_fully(linkage, bar):
-            yield from _explain_turning(linkage, bar, write)
-    if points := change_points(linkage):
-        yield f"change points: theta_2 = {' and '.join(_write_degrees(point) for point in points)}"
-    found = transmission_extremes(linkage)
-    yield (
-        f"angle between coupler and output: {_write_degrees(found.least)} "
-        f"at theta_2 = {_write_degrees(found.theta_2_least)}"
-    )
-    yield f"    to {_write_degrees(found.greatest)} at {_write_degrees(found.theta_2_greatest)}"
-    if found.worst > 0.0:
-        yield f"smallest transmission angle: {_write_degrees(found.worst)}"
-    if (ratio := time_ratio(linkage)) is not None:
-        yield f"slower stroke of the output over the faster, at constant omega_2: {ratio:.4f}"
-
-
-def _explain_turning(linkage: FourBar, bar: int, write: Callable[[float], str]) -> Iterator[str]:
-    """Say why a bar has no limits: the two others would have to be in line, stretched or folded."""
-    reach, d, own = reach_of(linkage, bar), linkage.ground, linkage.lengths[bar - 1]
-    (one, x), (other, y) = ((BAR_NAMES[k], linkage.lengths[k - 1]) for k in MOVING_BARS if k != bar)
-    name, touches = BAR_NAMES[bar], reach.beyond_stretched == 0.0 or reach.beyond_folded == 0.0
-    when = "are in line at change points alone" if touches else "are never in line"
-    yield f"{name}: no limits, {one} and {other} {when}:"
-    relation = "=" if reach.beyond_stretched == 0.0 else "<"
-    yield f"    ground + {name} = {write(d + own)} {relation} {one} + {other} = {write(x + y)}"
-    relation = "=" if reach.beyond_folded == 0.0 else ">"
-    yield f"    |ground - {name}| = {write(abs(d - own))} {relation} |{one} - {other}| = {write(abs(x - y))}"
-
-
-def _write_degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.4f} deg"

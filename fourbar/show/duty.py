@@ -1,4 +1,4 @@
-"""Loads of frame and pins over a motion, and the power and energy of the drive, to choose bearings and a motor."""
+"""Loads of frame and pins over a motion, and the duty of the drive, to choose bearings and a motor."""
 
 import warnings
 from typing import Any, NamedTuple
@@ -9,11 +9,10 @@ from fourbar.effects.actions import Actions, list_bodies
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.evaluation.case import compute_state
 from fourbar.formulas.arithmetic import dot
-from fourbar.formulas.motion import State
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
 from fourbar.quantities import COUPLE, LINE, UNITS, DriveNames
 from fourbar.scene import Command, Scene
-from fourbar.solution import Array, Conversion, Solution, find_unit_in
+from fourbar.solution import Array, Solution
 
 
 class BearingLoad(NamedTuple):
@@ -25,132 +24,6 @@ class BearingLoad(NamedTuple):
     """Root mean square over the positions, N; a closed sweep counts its two equal ends once."""
     where: float
     """theta_2 of the largest load, rad."""
-
-
-def _require_evaluated(solution: Solution, name: str) -> Array:
-    expect("solution", solution, Solution)
-    force: Array | None = getattr(solution, name)
-    if force is None:
-        raise InputError("solution", name, "was not evaluated: solve up to the stage 'force'")
-    return force
-
-
-def shaking_force(solution: Solution) -> Array:
-    """Force of the bars on the frame through its pins, F21 + F41 = -(F12 + F14), N, (n, 2), of a study (m, n, 2).
-
-    A linear drive with an end on the ground adds its own; a spring pulls there besides.
-    """
-    return -(_require_evaluated(solution, "F12") + _require_evaluated(solution, "F14")) + _compute_push(solution)
-
-
-def _compute_push(solution: Solution) -> Array:
-    """Force of a linear drive on the frame, N, (n, 2)."""
-    ends = () if solution.drive is None else solution.drive.ends
-    sense = sum(sense for sense, point in ends if point.bar == 1)
-    if not sense:
-        return np.zeros((*solution.theta_2.shape, 2))
-    return np.asarray(
-        sense * _require_evaluated(solution, "drive_force")[..., None] * _require_evaluated(solution, "drive_line")
-    )
-
-
-def shaking_moment(solution: Solution) -> Array:
-    """Moment of the bars and of the drive on the frame about O2, -T - O4 x F14, N m, (n,), of a study (m, n).
-
-    The moment of a linear drive with an end on the ground takes the place of -T.
-
-    Couples that effects exert between the bars and ground (pin damping or friction at O2, O4)
-    are not part of it.
-    """
-    F14 = _require_evaluated(solution, "F14")
-    of_drive = 0.0 if solution.drive is not None else -_require_evaluated(solution, "torque")
-    assert solution.ground is not None
-    length, angle = solution.ground
-    for _, point in () if solution.drive is None else solution.drive.ends:
-        if point.bar == 1:
-            of_drive = _compute_moment(point.distance, point.angle + angle, _compute_push(solution))
-    return np.asarray(of_drive - _compute_moment(length, angle, F14))
-
-
-def _compute_moment(distance: Any, angle: Any, force: Array) -> Array:
-    """Compute the moment of a force at a place about O2, N m, (n,), of a study (m, n)."""
-    return np.asarray(distance * (np.cos(angle) * force[..., 1] - np.sin(angle) * force[..., 0]))
-
-
-class Driving(NamedTuple):
-    """Torque or force of the drive, as it is shown."""
-
-    name: str
-    symbol: str
-    unit: str
-    values: Array | None
-    """(n,); None where only positions are known."""
-    error: Array | None
-    keys: DriveNames
-    """Names of its torque or force among the quantities."""
-    speed_key: str
-    speed: Array | None
-    """rad/s of the driven bar, or m/s of the stroke."""
-
-
-def read_drive(solution: Solution) -> Driving:
-    """Torque or force of the drive, with its error bar and speed."""
-    names, symbol, word, speed = COUPLE, f"T{solution.drive_bar}", "torque", f"omega_{solution.drive_bar}"
-    if solution.drive is not None:
-        names, symbol, word, speed = LINE, "F", "drive force", "stroke_speed"
-    values, error = (getattr(solution, name) for name in names[:2])
-    return Driving(word, symbol, UNITS[names.value], values, error, names, speed, getattr(solution, speed))
-
-
-def describe_drive(scene: Scene) -> str:
-    """Say what is driven."""
-    if scene.drive is not None:
-        start, end = scene.drive.start.bar, scene.drive.end.bar
-        return f"along a line from bar {start} ({BAR_NAMES[start]}) to bar {end} ({BAR_NAMES[end]})"
-    return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
-
-
-def is_once_round(solution: Solution) -> Any:
-    """Return True if a sweep covers whole turns, so that its last position repeats the first; for a study (m,)."""
-    angle = solution.at.angle
-    if angle.shape[-1] == 1:
-        return np.zeros(angle.shape[:-1], dtype=bool)
-    turns = np.abs(angle[..., -1] - angle[..., 0]) / (2.0 * np.pi)
-    return (turns > 0.5) & np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
-
-
-def _count_once(solution: Solution, values: Array) -> Array:
-    """Values at each position once: NaN at the end of whole turns."""
-    last = np.arange(values.shape[-1]) == values.shape[-1] - 1
-    return np.where(is_once_round(solution)[..., None] & last, np.nan, values)
-
-
-def _make_plain(value: Any) -> Any:
-    """Return a number, or of a study an array (m,)."""
-    return float(value) if np.ndim(value) == 0 else value
-
-
-def _reduce_known(reduce: Any, values: Array) -> Any:
-    """Reduce over the positions that have a value; NaN where none has."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of a member without any
-        return _make_plain(reduce(values, axis=-1))
-
-
-def bearing_load(solution: Solution, pin: str) -> BearingLoad:
-    """Largest and root mean square load of pin "O2", "A", "B" or "O4", and where; of a study arrays (m,).
-
-    Positions without a value are left out.
-    """
-    if not isinstance(pin, str) or pin not in PIN_FORCE:
-        raise InputError("pin", pin, "the pins are " + ", ".join(PIN_FORCE))
-    force = _require_evaluated(solution, PIN_FORCE[pin])
-    load = _count_once(solution, np.hypot(force[..., 0], force[..., 1]))
-    known = np.isfinite(load)
-    worst = np.argmax(np.where(known, load, -1.0), axis=-1)[..., None]
-    where = np.where(known.any(axis=-1), np.take_along_axis(solution.theta_2, worst, axis=-1)[..., 0], np.nan)
-    load = np.where(known, load, np.nan)
-    return BearingLoad(_find_peak(load), _compute_rms(load), _make_plain(where))
 
 
 class MotorDuty(NamedTuple):
@@ -184,11 +57,65 @@ DUTY_UNITS = {
     **{"peak_torque": "N m", "rms_torque": "N m", "peak_speed": "rad/s", "peak_power": "W", "rms_power": "W"},
     **{"energy_in": "J", "energy_out": "J", "peak_force": "N", "rms_force": "N"},
 }
-"""The speed of a linear drive is in m/s."""
+"""SI unit of each number of `MotorDuty`; the speed of a linear drive is in m/s."""
+
+
+def shaking_force(solution: Solution) -> Array:
+    """Return the force of the bars on the frame, F21 + F41 = -(F12 + F14), N, (n, 2), of a study (m, n, 2).
+
+    A linear drive with an end on the ground adds its own; a spring pulls there besides.
+    """
+    return -(_require(solution, "F12") + _require(solution, "F14")) + _find_push(solution)
+
+
+def shaking_moment(solution: Solution) -> Array:
+    """Return the moment of bars and drive on the frame about O2, -T - O4 x F14, N m, (n,), of a study (m, n).
+
+    The moment of a linear drive with an end on the ground takes the place of -T.
+
+    Couples that effects exert between the bars and ground (pin damping or friction at O2, O4)
+    are not part of it.
+    """
+
+    def moment(distance: Any, angle: Any, force: Array) -> Array:
+        return np.asarray(distance * (np.cos(angle) * force[..., 1] - np.sin(angle) * force[..., 0]))
+
+    F14, drive = _require(solution, "F14"), solution.drive
+    assert solution.ground is not None
+    length, angle = solution.ground
+    of_drive = -_require(solution, "torque") if drive is None else np.zeros(())
+    for point in [] if drive is None else [point for _, point in drive.ends if point.bar == 1]:
+        of_drive = moment(point.distance, point.angle + angle, _find_push(solution))
+    return np.asarray(of_drive - moment(length, angle, F14))
+
+
+def _find_push(solution: Solution) -> Array:
+    """Return the force of a linear drive on the frame, N, (n, 2)."""
+    ends = () if solution.drive is None else solution.drive.ends
+    sense = sum(sense for sense, point in ends if point.bar == 1)
+    if not sense:
+        return np.zeros((*solution.theta_2.shape, 2))
+    return np.asarray(sense * _require(solution, "drive_force")[..., None] * _require(solution, "drive_line"))
+
+
+def bearing_load(solution: Solution, pin: str) -> BearingLoad:
+    """Return largest and root mean square load of pin "O2", "A", "B" or "O4", and where; of a study arrays (m,).
+
+    Positions without a value are left out.
+    """
+    if not isinstance(pin, str) or pin not in PIN_FORCE:
+        raise InputError("pin", pin, "the pins are " + ", ".join(PIN_FORCE))
+    force = _require(solution, PIN_FORCE[pin])
+    load = np.hypot(force[..., 0], force[..., 1])
+    load = np.where(np.isfinite(load), load, np.nan)
+    worst = np.argmax(np.nan_to_num(load, nan=-1.0), axis=-1)[..., None]
+    theta_2 = np.where(np.isfinite(load), solution.theta_2, np.nan)
+    place = np.take_along_axis(theta_2, worst, axis=-1)[..., 0]
+    return BearingLoad(_find_peak(load), _find_rms(solution, load), _make_plain(place))
 
 
 def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty | None:
-    """Peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
+    """Return peak and RMS torque and power, peak speed, and the energy in and out by the trapezoidal rule.
 
     E = integral of P dt, dt = d theta/omega of the commanded bar, or ds/speed of the stroke, in a sweep; E_in of the
     positive part of P, E_out of the negative.
@@ -202,74 +129,116 @@ def motor_duty(solution: Solution, located: Solution | None = None) -> MotorDuty
     located : the same with the positions of the peaks among its own, of which the peaks are taken.
     """
     expect("solution", solution, Solution)
-    drive = read_drive(solution)
+    drive, located = read_drive(solution), solution if located is None else located
     if drive.values is None or not np.isfinite(drive.values).any():
         return None
-    power = _require_evaluated(solution, "power")
-    closed, peak = is_once_round(solution), solution if located is None else located
-    linear, largest = solution.drive is not None, _find_peak(_require_evaluated(peak, drive.keys.value))
-    rms = _compute_rms(_count_once(solution, drive.values))
+    power, closed, linear = _require(solution, "power"), is_once_round(solution), solution.drive is not None
+    peak, rms = _find_peak(_require(located, drive.keys.value)), _find_rms(solution, drive.values)
     energy_in, energy_out = _integrate_power(solution, power)
     return MotorDuty(
-        None if linear else largest,
-        None if linear else rms,
-        _find_peak(_require_evaluated(peak, drive.speed_key)),
-        _find_peak(_require_evaluated(peak, "power")),
-        _compute_rms(_count_once(solution, power)),
-        energy_in,
-        energy_out,
-        bool(closed) if np.ndim(closed) == 0 else closed,
-        largest if linear else None,
-        rms if linear else None,
+        peak_torque=None if linear else peak,
+        rms_torque=None if linear else rms,
+        peak_speed=_find_peak(_require(located, drive.speed_key)),
+        peak_power=_find_peak(_require(located, "power")),
+        rms_power=_find_rms(solution, power),
+        energy_in=energy_in,
+        energy_out=energy_out,
+        closed=bool(closed) if np.ndim(closed) == 0 else closed,
+        peak_force=peak if linear else None,
+        rms_force=rms if linear else None,
     )
+
+
+def is_once_round(solution: Solution) -> Any:
+    """Return True if a sweep covers whole turns, so that its last position repeats the first; for a study (m,)."""
+    angle = solution.at.angle
+    if angle.shape[-1] == 1:
+        return np.zeros(angle.shape[:-1], dtype=bool)
+    turns = np.abs(angle[..., -1] - angle[..., 0]) / (2.0 * np.pi)
+    return (turns > 0.5) & np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0)
+
+
+def _require(solution: Solution, name: str) -> Array:
+    expect("solution", solution, Solution)
+    values: Array | None = getattr(solution, name)
+    if values is None:
+        raise InputError("solution", name, "was not evaluated: solve up to the stage 'force'")
+    return values
 
 
 def _integrate_power(solution: Solution, power: Array) -> tuple[float | None, float | None]:
     """Integrate the positive and the negative part of the power, each over time."""
     stroke, bar = solution.at.stroke, solution.at.bar
-    omega = getattr(solution, f"omega_{bar}") if stroke is None else solution.stroke_speed
     if solution.time is not None:
         spans = np.diff(solution.time)
     else:
-        angle = solution.at.angle if stroke is None else stroke
-        steps, omega = np.diff(angle), np.broadcast_to(np.asarray(omega), power.shape)[..., :-1]
-        spans = np.abs(np.divide(steps, omega, out=np.full(omega.shape, np.nan), where=omega != 0.0))
+        speed = getattr(solution, f"omega_{bar}") if stroke is None else solution.stroke_speed
+        steps, speed = np.diff(solution.at.places), np.broadcast_to(np.asarray(speed), power.shape)[..., :-1]
+        spans = np.abs(np.divide(steps, speed, out=np.full(speed.shape, np.nan), where=speed != 0.0))
     parts = [
         0.5 * spans * (part[..., :-1] + part[..., 1:]) for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0))
     ]
-    known = np.isfinite(parts[0]).any(axis=-1)
-    if not known.any():
+    moves = np.isfinite(parts[0]).any(axis=-1)
+    if not moves.any():
         return None, None
-    energy_in, energy_out = (_make_plain(np.where(known, np.nansum(part, axis=-1), np.nan)) for part in parts)
+    energy_in, energy_out = (_make_plain(np.where(moves, np.nansum(part, axis=-1), np.nan)) for part in parts)
     return energy_in, energy_out
 
 
-def _find_peak(values: Array) -> float:
-    return _reduce_known(np.nanmax, np.abs(values))  # type: ignore[no-any-return]
+def _find_peak(values: Array) -> Any:
+    return _reduce(np.nanmax, np.abs(values))
 
 
-def _compute_rms(values: Array) -> float:
-    return _make_plain(np.sqrt(_reduce_known(np.nanmean, np.square(values))))  # type: ignore[no-any-return]
+def _find_rms(solution: Solution, values: Array) -> Any:
+    """Return the root mean square over the positions; whole turns count their two equal ends once."""
+    repeated = np.arange(values.shape[-1]) == values.shape[-1] - 1
+    once = np.where(is_once_round(solution)[..., None] & repeated, np.nan, values)
+    return _make_plain(np.sqrt(_reduce(np.nanmean, np.square(once))))
 
 
-def write_motor(solution: Solution, units: Conversion, located: Solution) -> dict[str, Any] | None:
-    """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
-    duty = motor_duty(solution, located)
-    if duty is None:
-        return None
-    entry: dict[str, Any] = {"closed": duty.closed}
-    own = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
-    for name, unit in own.items():
-        number = getattr(duty, name)
-        entry[name] = None if number is None else number * find_unit_in(unit, units)[1]
-    force, angle = find_unit_in("N", units)[1], find_unit_in("rad", units)[1]
-    loads = {pin: (bearing_load(located, pin), bearing_load(solution, pin).rms) for pin in PIN_FORCE}
-    entry["pins"] = {
-        pin: {"peak": peak.largest * force, "rms": rms * force, "theta_2": peak.where * angle}
-        for pin, (peak, rms) in loads.items()
-    }
-    entry["units"] = {name: find_unit_in(unit, units)[0] for name, unit in own.items()}
-    return entry
+def _reduce(reduce: Any, values: Array) -> Any:
+    """Reduce over the positions that have a value; NaN where none has."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of a member without any
+        return _make_plain(reduce(values, axis=-1))
+
+
+def _make_plain(value: Any) -> Any:
+    """Return a number, or of a study an array (m,)."""
+    return float(value) if np.ndim(value) == 0 else value
+
+
+class Driving(NamedTuple):
+    """Torque or force of the drive, as it is shown."""
+
+    name: str
+    symbol: str
+    unit: str
+    values: Array | None
+    """(n,); None where only positions are known."""
+    error: Array | None
+    keys: DriveNames
+    """Names of its torque or force among the quantities."""
+    speed_key: str
+    speed: Array | None
+    """rad/s of the driven bar, or m/s of the stroke."""
+
+
+def read_drive(solution: Solution) -> Driving:
+    """Return torque or force of the drive, with its error bar and speed."""
+    names, symbol, word, speed = COUPLE, f"T{solution.drive_bar}", "torque", f"omega_{solution.drive_bar}"
+    if solution.drive is not None:
+        names, symbol, word, speed = LINE, "F", "drive force", "stroke_speed"
+    values, error = (getattr(solution, name) for name in names[:2])
+    return Driving(word, symbol, UNITS[names.value], values, error, names, speed, getattr(solution, speed))
+
+
+def describe_drive(scene: Scene) -> str:
+    """Say what is driven."""
+    if scene.drive is not None:
+        start, end = scene.drive.start.bar, scene.drive.end.bar
+        return f"along a line from bar {start} ({BAR_NAMES[start]}) to bar {end} ({BAR_NAMES[end]})"
+    return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
 
 
 class Energies(NamedTuple):
@@ -282,7 +251,7 @@ class Energies(NamedTuple):
 
 
 def compute_energies(scene: Scene, motion: Solution) -> Energies:
-    """Kinetic energy, and the work of each effect and of the loads.
+    """Compute the kinetic energy, and the work of each effect and of the loads.
 
     T = sum of m v_G^2/2 + I omega^2/2;   W(t) = integral of the power, by a cubic spline through the instants.
 
@@ -299,15 +268,11 @@ def compute_energies(scene: Scene, motion: Solution) -> Energies:
     for name, terms in groups.items():
         actions = Actions(state, list_bodies(scene.linkage)).add(terms)
         power = np.zeros(len(motion)) + actions.work()[0] * motion.omega_2
-        known = np.isfinite(power)  # bars 3 and 4 in line: the velocities are 0/0
-        if np.count_nonzero(known) > 1 and np.any(power[known]):
-            work[name] = CubicSpline(motion.time[known], power[known]).antiderivative()(motion.time)
-    return Energies(_compute_kinetic(scene, state), work)
-
-
-def _compute_kinetic(scene: Scene, state: State) -> Array:
-    total = np.zeros(len(state.theta_2))
+        finite = np.isfinite(power)  # bars 3 and 4 in line: the velocities are 0/0
+        if np.count_nonzero(finite) > 1 and np.any(power[finite]):
+            work[name] = CubicSpline(motion.time[finite], power[finite]).antiderivative()(motion.time)
+    kinetic = np.zeros(len(motion))
     for number, body in zip(MOVING_BARS, list_bodies(scene.linkage, scene.effects), strict=True):
         v = state.velocity(number, body.z)
-        total = total + 0.5 * body.m * dot(v, v) + 0.5 * body.I * np.square(state.omega(number))
-    return total
+        kinetic = kinetic + 0.5 * body.m * dot(v, v) + 0.5 * body.I * np.square(state.omega(number))
+    return Energies(kinetic, work)

@@ -1,14 +1,14 @@
 """Summary of a solved scene: ranges, peaks and their places, needs of the drive, ends of the motion.
 
 `locate_between` finds what the steps of a sweep pass over: reversals of dry friction, and the largest torque and pin
-forces. `summarize` computes the facts; `fourbar.show.block` prints them.
+forces; `locate_bending` the largest bending moments. `summarize` computes the facts; `fourbar.show.block` prints them.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,10 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import COUPLE, LINE, OK, PIN_FORCES, STATUS_NAMES
 from fourbar.scene import Scene, command_at
 from fourbar.scene.motion import Motion
-from fourbar.show.duty import Driving, MotorDuty, bearing_load, is_once_round, motor_duty, read_drive
-from fourbar.solution import Array, Solution
+from fourbar.show.duty import DUTY_UNITS, Driving, MotorDuty, bearing_load, is_once_round, motor_duty, read_drive
+from fourbar.solution import Array, Conversion, Solution, find_unit_in
 from fourbar.solve import solve
-from fourbar.studies.internal_forces import internal_forces
+from fourbar.studies.internal_forces import Bending, internal_forces
 
 CUTS = 40
 """Parts into which one call of `solve` cuts every interval that is looked at."""
@@ -29,6 +29,8 @@ ROUNDS = 5
 """Calls: a step of 5 degrees is cut down to 5e-8 degrees, less than a largest value can be told from the next by."""
 MOST_PEAKS = 6
 """Number of peaks of one quantity that are listed, the highest."""
+BENDING_PEAKS, BENDING_ROUNDS = 3, 3
+"""The same for bending moments: only the largest of a bar is shown, with four digits."""
 GROWING = 1e-3
 """Part of itself by which what has a largest value grows no more in the last two calls; towards a pole it grows on."""
 AT_REST = 1e-12
@@ -36,25 +38,59 @@ AT_REST = 1e-12
 Branch = NDArray[np.int8]
 At = Callable[[Array, Branch, str], Solution]
 """Solve at places (of what is commanded, or of a motion law the time) and branches, up to a stage."""
+Sizes = Callable[[Solution], dict[str, Array]]
+"""List magnitudes at the positions of a solution, by name."""
+
+
+class Peak(NamedTuple):
+    """Largest or smallest value of a quantity, and where it is taken."""
+
+    value: float
+    place: float
+    """Commanded angle or stroke at the peak, rad or m; for a motion over time the time, s."""
+
+
+class BarBending(NamedTuple):
+    """Largest size of the bending moment of a bar, N m."""
+
+    peak: Peak
+    x: float
+    """Place of the peak along the bar, m from its first pin."""
+    solution: Solution
+    row: int
+    """Index of the peak's position in `solution`."""
+    grows: bool
+    """True if the moment grows without bound between the positions, or nothing was searched between them."""
 
 
 class Between(NamedTuple):
     """A sweep with what its steps pass over."""
 
+    sweep: Solution
+    """Solution at the positions of the sweep alone."""
     solution: Solution
     """Solution at its positions and also at both sides of each reversal and where each of `list_sizes` is largest."""
     reversals: list[tuple[float, str]]
     """Commanded angle or stroke, rad or m, and the pin at which dry friction reverses there: the pin forces jump."""
     growing: set[str]
-    """Names in `list_sizes` that grow without bound within a step; all of them where no step was searched."""
+    """Names of the sizes that grow without bound within a step; all of them where no step was searched."""
+
+    @property
+    def drive(self) -> Solution:
+        """Solution that holds the peaks of the drive."""
+        return self.bounded(*list(list_sizes(self.sweep))[:3])
+
+    def bounded(self, *names: str) -> Solution:
+        """Return the solution that holds the peaks of these sizes: the sweep alone where one of them has none."""
+        return self.sweep if self.growing.intersection(names) else self.solution
 
 
 def list_sizes(solution: Solution) -> dict[str, Array]:
     """List the magnitudes whose largest values are located: torque, power and speed of the drive, and pin forces."""
-    of_drive = read_drive(solution)
-    drive = {of_drive.keys.value: of_drive.keys.value, "power": "power", "speed": of_drive.speed_key}
+    drive = read_drive(solution)
+    keys = {drive.keys.value: drive.keys.value, "power": "power", "speed": drive.speed_key}
     forces = {name: np.hypot(*getattr(solution, name).T) for name in PIN_FORCES}
-    return {**{name: np.abs(getattr(solution, key)) for name, key in drive.items()}, **forces}
+    return {**{name: np.abs(getattr(solution, key)) for name, key in keys.items()}, **forces}
 
 
 def locate_between(scene: Scene, solution: Solution) -> Between:
@@ -64,13 +100,9 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
 
     `solution`: of the scene's positions, or of its sweep in rising order, to the stage "force".
     """
-    motion = scene.motion
-    if motion.free is not None or isinstance(motion.angle, np.ndarray) or solution.F12 is None or len(solution) < 2:
-        return Between(solution, [], {COUPLE.value, LINE.value, *PIN_FORCES})
-
-    def at(places: Array, branch: Branch, stage: str = "force") -> Solution:
-        return solve(scene, stage, at=command_at(scene, places, branch))
-
+    if not _has_between(scene, solution):
+        return Between(solution, solution, [], {COUPLE.value, LINE.value, *PIN_FORCES})
+    at = _solve_of(scene)
     pins, low, high, branch = _find_reversing(scene, solution)
     for _ in range(ROUNDS if pins else 0):
         places = _cut(low, high)
@@ -80,10 +112,52 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
         rows = np.arange(len(pins))
         low, high = places[rows, turned - 1], places[rows, turned]
     merged = _merge(at, solution, np.concatenate([low, high]), np.concatenate([branch, branch]))
-    angles = low if motion.law is None else motion.law.at(low)[0]
-    found, branch, growing = _find_largest(at, merged)
+    angles = low if scene.motion.law is None else scene.motion.law.at(low)[0]
+    peaks, branch, growing = _find_largest(at, merged, list_sizes)
     reversals = sorted(zip(angles.tolist(), pins, strict=True))
-    return Between(_merge(at, merged, found, branch), reversals, growing)
+    return Between(solution, _merge(at, merged, peaks, branch), reversals, growing)
+
+
+def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
+    """Locate the largest bending moment of each bar, between the positions too: for `analyze` and its figure alone.
+
+    Empty where no position has forces.
+    """
+    solution = between.bounded(*between.growing)
+    if solution.F12 is None or not np.isfinite(solution.F12).any():
+        return {}
+
+    def find(solution: Solution) -> dict[str, Bending]:
+        return {str(bar): internal_forces(scene, solution, bar, np.zeros(1)).largest for bar in MOVING_BARS}
+
+    growing, searched = {str(bar) for bar in MOVING_BARS}, [(solution, find(solution))]
+    if _has_between(scene, solution):
+
+        def list_moments(solution: Solution) -> dict[str, Array]:
+            largest = searched[0][1] if solution is searched[0][0] else find(solution)
+            return {bar: np.abs(bending.moment) for bar, bending in largest.items()}
+
+        at = _solve_of(scene)
+        places, branch, growing = _find_largest(at, solution, list_moments, BENDING_PEAKS, BENDING_ROUNDS)
+        searched += [(peaks := at(places, branch, "force"), find(peaks))] if len(places) else []
+    bending = dict[int, BarBending]()
+    for bar in MOVING_BARS:
+        grows = str(bar) in growing
+        for solution, largest in searched[:1] if grows else searched:  # the peak of another bar may stand beside a pole
+            moment, x = largest[str(bar)]
+            peak, row = _find_peak(solution, np.abs(moment)), int(np.argmax(np.nan_to_num(np.abs(moment), nan=-1.0)))
+            if bar not in bending or peak.value > bending[bar].peak.value:
+                bending[bar] = BarBending(peak, float(x[row]), solution, row, grows)
+    return bending
+
+
+def _has_between(scene: Scene, solution: Solution) -> bool:
+    listed = isinstance(scene.motion.angle, np.ndarray)
+    return scene.motion.free is None and not listed and solution.F12 is not None and len(solution) > 1
+
+
+def _solve_of(scene: Scene) -> At:
+    return lambda places, branch, stage: solve(scene, stage, at=command_at(scene, places, branch))
 
 
 def _cut(low: Array, high: Array) -> Array:
@@ -101,8 +175,8 @@ def _merge(at: At, solution: Solution, places: Array, branch: Branch) -> Solutio
 
 def _compute_slip(solution: Solution, pin: str) -> Array:
     """Compute omega_j - omega_i of the bars that meet at a pin."""
-    one, other = (0.0 if bar == 1 else getattr(solution, f"omega_{bar}") for bar in PINS[pin])
-    return np.asarray(other - one)
+    first, second = (0.0 if bar == 1 else getattr(solution, f"omega_{bar}") for bar in PINS[pin])
+    return np.asarray(second - first)
 
 
 def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array, Branch]:
@@ -120,36 +194,64 @@ def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array,
     return [pin for pin, *_ in steps], over[first], over[last], branch[first]
 
 
-def _find_largest(at: At, solution: Solution) -> tuple[Array, Branch, set[str]]:
+def _find_largest(
+    at: At, solution: Solution, sizes: Sizes, most: int = MOST_PEAKS, rounds: int = ROUNDS
+) -> tuple[Array, Branch, set[str]]:
     """Find where each size is largest between positions that it has a local maximum at: places, branches, growing."""
     over, branch, peaks = solution.at.places, solution.at.branch, list[tuple[str, int, int, int]]()
-    for name, size in list_sizes(solution).items():
-        known = np.concatenate([[-1.0], np.nan_to_num(size, nan=-1.0, posinf=-1.0), [-1.0]])
-        before, here, after = known[:-2], known[1:-1], known[2:]
+    present = sizes(solution)
+    for name, size in present.items():
+        padded = np.concatenate([[-1.0], np.nan_to_num(size, nan=-1.0, posinf=-1.0), [-1.0]])
+        before, here, after = padded[:-2], padded[1:-1], padded[2:]
         tops = np.flatnonzero((here >= before) & (here >= after) & (here > np.minimum(before, after)) & (here > 0.0))
-        for i in tops[np.argsort(-here[tops], kind="stable")][:MOST_PEAKS]:
-            left = i - (before[i] >= 0.0 and branch[i - 1] == branch[i])
-            right = i + (after[i] >= 0.0 and branch[min(i + 1, len(branch) - 1)] == branch[i])
-            peaks.append((name, i, left, right))
+        for i in tops[np.argsort(-here[tops], kind="stable")][:most]:
+            start = i - (before[i] >= 0.0 and branch[i - 1] == branch[i])
+            stop = i + (after[i] >= 0.0 and branch[min(i + 1, len(branch) - 1)] == branch[i])
+            peaks.append((name, i, start, stop))
         for i, j in pairwise(range(len(branch))):  # towards a gap it may grow whatever it is beside it
-            if known[i + 1] * known[j + 1] < 0.0 and branch[i] == branch[j]:
-                peaks.append((name, i if known[j + 1] < 0.0 else j, i, j))
+            if padded[i + 1] * padded[j + 1] < 0.0 and branch[i] == branch[j]:
+                peaks.append((name, i if padded[j + 1] < 0.0 else j, i, j))
     rows, names = np.arange(len(peaks)), [name for name, *_ in peaks]
-    at_grid, left, right = (np.array([peak[k] for peak in peaks], dtype=int) for k in (1, 2, 3))
-    opens = ~(solution.assembled[left] & solution.assembled[right])
-    low, high, places = over[left], over[right], over[at_grid]
-    reached = [np.array([list_sizes(solution)[name][i] for name, i, *_ in peaks])]
-    for _ in range(ROUNDS if len(peaks) else 0):
+    top, start, stop = (np.array([peak[k] for peak in peaks], dtype=int) for k in (1, 2, 3))
+    opens = ~(solution.assembled[start] & solution.assembled[stop])
+    low, high, places = over[start], over[stop], over[top]
+    reached = [np.array([present[name][i] for name, i, *_ in peaks])]
+    for _ in range(rounds if len(peaks) else 0):
         cut = _cut(low, high)
-        found = list_sizes(at(cut.ravel(), np.repeat(branch[at_grid], CUTS + 1), "force"))
-        values = np.array([np.nan_to_num(found[n].reshape(cut.shape)[k], nan=-1.0) for k, n in enumerate(names)])
-        inwards = np.abs(np.arange(CUTS + 1) - np.where(solution.assembled[left], 0, CUTS)[:, None])
+        inside = sizes(at(cut.ravel(), np.repeat(branch[top], CUTS + 1), "force"))
+        values = np.array([np.nan_to_num(inside[n].reshape(cut.shape)[k], nan=-1.0) for k, n in enumerate(names)])
+        inwards = np.abs(np.arange(CUTS + 1) - np.where(solution.assembled[start], 0, CUTS)[:, None])
         best = np.argmax(np.where(opens[:, None] & (values >= 0.0), inwards, values), axis=1)
         places, low, high = (cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1))
         reached.append(values[rows, best])
     growing = reached[-1] > (1.0 + GROWING) * reached[-3] if len(peaks) else rows > 0
     kept = ~growing & (reached[-1] > reached[0]) & ~opens  # beside a gap others grow
-    return places[kept], branch[at_grid][kept], {name for name, grows in zip(names, growing, strict=True) if grows}
+    return places[kept], branch[top][kept], {name for name, grows in zip(names, growing, strict=True) if grows}
+
+
+def write_motor(scene: Scene, solution: Solution, units: Conversion) -> dict[str, Any] | None:
+    """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
+    if motor_duty(solution) is None:
+        return None
+    between = locate_between(scene, solution)
+    duty = motor_duty(solution, between.drive)
+    assert duty is not None
+    si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
+    shown = {name: find_unit_in(unit, units) for name, unit in si.items()}
+    numbers = {name: getattr(duty, name) for name in si}
+    force, angle = find_unit_in("N", units)[1], find_unit_in("rad", units)[1]
+    loads = {
+        pin: (bearing_load(between.bounded(name), pin), bearing_load(solution, pin)) for pin, name in PIN_FORCE.items()
+    }
+    return {
+        "closed": duty.closed,
+        **{name: None if number is None else number * shown[name][1] for name, number in numbers.items()},
+        "pins": {
+            pin: {"peak": peak.largest * force, "rms": load.rms * force, "theta_2": peak.where * angle}
+            for pin, (peak, load) in loads.items()
+        },
+        "units": {name: unit for name, (unit, _) in shown.items()},
+    }
 
 
 FINE = 7200
@@ -164,14 +266,6 @@ IN_LINE = 1e-6
 
 Stretch = tuple[float | None, float | None]
 """Places from which and up to which a linkage assembles; None at an end of the motion."""
-
-
-class Peak(NamedTuple):
-    """Largest or smallest value of a quantity, and where it is taken."""
-
-    value: float
-    place: float
-    """Commanded angle or stroke at the peak, rad or m; for a motion over time the time, s."""
 
 
 class PinLoad(NamedTuple):
@@ -207,8 +301,7 @@ class Facts:
     held: tuple[float, float] | None
     """Least and greatest torque or force while dry friction holds a pin that is at rest."""
     pins: dict[str, PinLoad]
-    bending: dict[int, tuple[Peak, float]]
-    """Largest size of the bending moment of each bar, N m, and where along it, m from its first pin."""
+    bending: dict[int, BarBending]
     stroke: tuple[Peak, Peak] | None
     """Smallest and largest stroke of the motion."""
     strokes: tuple[float, float] | None
@@ -244,10 +337,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     drive = None if kind == "released" or solution.F12 is None else read_drive(solution)
     peak = None
     if drive is not None and np.isfinite(drive.values).any():  # type: ignore[arg-type]
-        values = read_drive(between.solution).values
-        assert values is not None
-        worst = int(np.nanargmax(np.abs(values)))
-        peak = Peak(float(values[worst]), float(_list_places(between.solution)[worst]))
+        peak = _find_peak(between.drive, read_drive(between.drive).values)
     return Facts(
         scene,
         solution,
@@ -259,10 +349,10 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         stretches,
         drive if peak is not None else None,
         peak,
-        motor_duty(solution, between.solution) if peak is not None and kind != "position" else None,
+        motor_duty(solution, between.drive) if peak is not None and kind != "position" else None,
         None if drive is None else _find_held(solution, drive),
         _list_pin_loads(solution, between),
-        _list_bending(scene, between.solution),
+        locate_bending(scene, between),
         None if fine.stroke is None else find_range(fine.stroke),
         None if solution.stroke is None else _find_strokes(scene, solution),
         between,
@@ -280,8 +370,8 @@ def _find_kind(scene: Scene, solution: Solution) -> str:
         return "position"
     if isinstance(motion.angle, np.ndarray):
         return "list"
-    whole = solution.at.stroke is None and is_once_round(solution) and solution.assembled.all()
-    return "turn" if whole else "sweep"
+    once_round = solution.at.stroke is None and is_once_round(solution) and solution.assembled.all()
+    return "turn" if once_round else "sweep"
 
 
 def _list_places(solution: Solution) -> Array:
@@ -291,10 +381,10 @@ def _list_places(solution: Solution) -> Array:
 
 def _solve_positions(scene: Scene, places: Array, like: Solution) -> Solution:
     """Solve positions at other places, each on the branch of the nearest of a solution."""
-    own = like.at.places
-    order = np.argsort(own, kind="stable")
-    nearest = np.clip(np.searchsorted(own[order], places), 1, len(own) - 1)
-    nearest -= np.abs(places - own[order][nearest - 1]) < np.abs(places - own[order][nearest])
+    order = np.argsort(like.at.places, kind="stable")
+    rising = like.at.places[order]
+    nearest = np.clip(np.searchsorted(rising, places), 1, len(rising) - 1)
+    nearest -= np.abs(places - rising[nearest - 1]) < np.abs(places - rising[nearest])
     return solve(scene, "position", at=command_at(scene, places, like.at.branch[order][nearest]))
 
 
@@ -332,32 +422,28 @@ def _list_stretches(scene: Scene, fine: Solution) -> list[Stretch]:
 
 def _find_held(solution: Solution, drive: Driving) -> tuple[float, float] | None:
     low, high = (getattr(solution, name) for name in (drive.keys.low, drive.keys.high))
-    if low is None or not (known := np.isfinite(low) & np.isfinite(high) & (low < high)).any():
+    if low is None or not (held := np.isfinite(low) & np.isfinite(high) & (low < high)).any():
         return None
-    return float(low[known].min()), float(high[known].max())
+    return float(low[held].min()), float(high[held].max())
+
+
+def _find_peak(solution: Solution, values: Array | None) -> Peak:
+    """Find the value that is largest in size, and its place."""
+    assert values is not None
+    worst = int(np.nanargmax(np.abs(values)))
+    return Peak(float(values[worst]), float(_list_places(solution)[worst]))
 
 
 def _list_pin_loads(solution: Solution, between: Between) -> dict[str, PinLoad]:
     if solution.F12 is None or not np.isfinite(solution.F12).any():
         return {}
-    loads, places = dict[str, PinLoad](), _list_places(between.solution)
+    loads = dict[str, PinLoad]()
     for pin, name in PIN_FORCE.items():
-        size = np.hypot(*getattr(between.solution, name).T)
-        worst = int(np.nanargmax(np.where(np.isfinite(size), size, np.nan)))
-        loads[pin] = PinLoad(Peak(float(size[worst]), float(places[worst])), bearing_load(solution, pin).rms)
+        bounded = between.bounded(name)
+        size = np.hypot(*getattr(bounded, name).T)
+        peak = _find_peak(bounded, np.where(np.isfinite(size), size, np.nan))
+        loads[pin] = PinLoad(peak, bearing_load(solution, pin).rms)
     return loads
-
-
-def _list_bending(scene: Scene, solution: Solution) -> dict[int, tuple[Peak, float]]:
-    if solution.F12 is None or not np.isfinite(solution.F12).any():
-        return {}
-    bending = dict[int, tuple[Peak, float]]()
-    for bar in MOVING_BARS:
-        moment, x = internal_forces(scene, solution, bar).largest
-        worst = int(np.nanargmax(np.abs(moment)))
-        place = float(_list_places(solution)[worst])
-        bending[bar] = Peak(abs(float(moment[worst])), place), float(x[worst])
-    return bending
 
 
 def _find_strokes(scene: Scene, solution: Solution) -> tuple[float, float]:
@@ -392,7 +478,7 @@ def _find_error(solution: Solution, drive: Driving | None) -> float | None:
         pairs.append((drive.error, np.abs(drive.values)))
     shares = []
     for error, size in pairs:
-        known = np.isfinite(error) & np.isfinite(size) & (solution.status_code == OK)
-        if known.any() and size[known].max() > 0.0:
-            shares.append(float((error[known] / np.maximum(size[known], np.median(size[known]))).max()))
+        solved = np.isfinite(error) & np.isfinite(size) & (solution.status_code == OK)
+        if solved.any() and size[solved].max() > 0.0:
+            shares.append(float((error[solved] / np.maximum(size[solved], np.median(size[solved]))).max()))
     return max(shares, default=None)

@@ -25,7 +25,7 @@ from fourbar.solution import Array, Solution
 STATIONS = 41
 """Equal stations from pin to pin, where none are given."""
 SAME = 1e-9
-"""Part of the bar's length within which a foot is at a pin."""
+"""Part of the bar's length within which two feet are one: a load and the inertia, both at G, differ by round-off."""
 Complex = NDArray[np.complex128]
 
 
@@ -103,11 +103,12 @@ class _Beam(NamedTuple):
     def at(self, x: Array, *, before: bool = False) -> tuple[Array, Array, Array]:
         """Compute N, V, M at x, (n, k); with what acts at x itself, or just `before` it."""
         N, V, M = (np.zeros(x.shape) for _ in range(3))
+        end = x + (-SAME if before else SAME) * self.length
         for foot, force, couple in zip(self.foot.T, self.force.T, self.couple.T, strict=True):
-            own = foot[:, None] < x if before else foot[:, None] <= x
-            N -= np.where(own, force.real[:, None], 0.0)
-            V += np.where(own, force.imag[:, None], 0.0)
-            M += np.where(own, force.imag[:, None] * (x - foot[:, None]) - couple[:, None], 0.0)
+            acts = foot[:, None] < end
+            N -= np.where(acts, force.real[:, None], 0.0)
+            V += np.where(acts, force.imag[:, None], 0.0)
+            M += np.where(acts, force.imag[:, None] * (x - foot[:, None]) - couple[:, None], 0.0)
         s, rest = np.clip(x, 0.0, self.length), np.maximum(x - self.length, 0.0)
         along, across = self.pull.real[:, None], self.pull.imag[:, None]
         omega, alpha = self.omega[:, None], self.alpha[:, None]
@@ -210,15 +211,22 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
             recorder.items.append((described.to_centre, 0.0j, -described.moment_of_inertia * alpha))
         for term in terms:  # a flywheel turns about the bar's ground pin
             recorder.items += [(0.0j, 0.0j, -inertia * alpha) for on, inertia in term.carried.items() if on == bar]
-        zero = np.zeros(n)
-        rows = [(zero + place, zero + force, zero + couple) for place, force, couple in recorder.items]
-        place, force, couple = (np.stack(column, axis=1) for column in zip(*rows, strict=True))
-        foot = place.real
-        for pin in (0.0, described.length):
-            foot = np.where(np.abs(foot - pin) <= SAME * described.length, pin, foot)
-        beside = couple + cross(-force, 1j * place.imag)  # the couple of a force beside the line
+        foot, force, couple = _sum_by_foot(recorder.items, np.zeros(n), SAME * described.length)
         density = described.mass / described.length if uniform else 0.0
-        return _Beam(described.length, foot, force, beside, uniform, density, own * back, omega, alpha)
+        return _Beam(described.length, foot, force, couple, uniform, density, own * back, omega, alpha)
+
+
+def _sum_by_foot(items: list[tuple[Any, Any, Any]], zero: Array, same: float) -> tuple[Array, Complex, Array]:
+    """Sum what acts at the same foot at every position: feet, forces and couples, each (n, f)."""
+    feet, forces, couples = list[Array](), list[Any](), list[Array]()
+    for place, force, couple in items:
+        foot = zero + np.real(place)
+        beside = couple + cross(-force, 1j * np.imag(place))  # the couple of a force beside the line
+        k = next((k for k, stated in enumerate(feet) if (np.abs(stated - foot) <= same).all()), len(feet))
+        if k == len(feet):
+            feet, forces, couples = [*feet, foot], [*forces, 0.0j * zero], [*couples, zero]
+        forces[k], couples[k] = forces[k] + force, couples[k] + beside
+    return np.stack(feet, axis=1), np.stack(forces, axis=1), np.stack(couples, axis=1)
 
 
 def _record_pins(recorder: _Recorder, solution: Solution) -> None:

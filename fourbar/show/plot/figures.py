@@ -11,7 +11,7 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
-from fourbar.show.block import static
+from fourbar.show.block import explain_static
 from fourbar.show.plot import curves, freebody, linkage, studies
 from fourbar.show.plot.curves import draw_transmission
 from fourbar.show.plot.labels import Labels
@@ -113,7 +113,7 @@ def _choose_painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, 
     painter, size, dynamic = FIGURES[figure]
     if dynamic and scene.motion.speed is None and not is_over_time(scene):
         raise InputError(
-            f"motion.{scene.motion.names[1]}", None, f"is needed for the figure {figure!r}; {static(scene)}"
+            f"motion.{scene.motion.names[1]}", None, f"is needed for the figure {figure!r}; {explain_static(scene)}"
         )
     if figure == "stroke" and (scene.drive is None or scene.motion.stroke is not None):
         raise InputError("figure", figure, "needs a linear drive (drive.from, drive.to) whose stroke is not commanded")

@@ -30,6 +30,7 @@ from fourbar.show.plot.style import (
 )
 from fourbar.show.plot.symbols import place_of, split_components
 from fourbar.show.plot.view import View, where_in_words
+from fourbar.show.summary import locate_bending, locate_between
 from fourbar.show.units import choose_unit
 from fourbar.solution import Conversion
 from fourbar.studies.internal_forces import internal_forces
@@ -171,27 +172,27 @@ def draw_free_bodies(figure: "SubFigure", view: View, labels: Labels) -> None:
 def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> None:
     """Draw N, V and M along each bar at the position where its bending moment is largest."""
     panels = figure.subplots(3, 3, sharex="col")
-    for column, bar in zip(panels.T, MOVING_BARS, strict=True):
-        rough = internal_forces(view.scene, view.sweep, bar)
-        if not np.isfinite(rough.largest.moment).any():
-            raise InputError("figure", "bars", f"needs forces, and {NOWHERE}")
-        worst = int(np.nanargmax(np.abs(rough.largest.moment)))
+    bending = locate_bending(view.scene, locate_between(view.scene, view.sweep))
+    if not bending:
+        raise InputError("figure", "bars", f"needs forces, and {NOWHERE}")
+    for column, (bar, worst) in zip(panels.T, bending.items(), strict=True):
         x = np.linspace(0.0, view.scene.linkage.bar(bar).length, FINE)
-        found = internal_forces(view.scene, view.sweep, bar, x)
+        forces = internal_forces(view.scene, worst.solution, bar, x)
         factor, unit = choose_unit(float(x[-1]), "m", view.units)
-        place = view.axis.words(float(view.sweep.at.places[worst]))
-        for axes, (name, si, curve) in zip(column, zip("NVM", ("N", "N", "N m"), found[1:4], strict=True), strict=True):
-            scale, shown = choose_unit(find_greatest(curve[worst]), si, view.units)
-            axes.plot(factor * x, scale * curve[worst], color=BAR_COLOURS[bar])
-            axes.fill_between(factor * x, scale * curve[worst], color=BAR_COLOURS[bar], alpha=0.15, lw=0.0)
+        place = view.axis.words(float(worst.solution.at.places[worst.row]))
+        for axes, (name, si) in zip(column, {"N": "N", "V": "N", "M": "N m"}.items(), strict=True):
+            curve = getattr(forces, name)[worst.row]
+            scale, shown = choose_unit(find_greatest(curve), si, view.units)
+            axes.plot(factor * x, scale * curve, color=BAR_COLOURS[bar])
+            axes.fill_between(factor * x, scale * curve, color=BAR_COLOURS[bar], alpha=0.15, lw=0.0)
             axes.axhline(0.0, color=INK, lw=0.6)
             axes.set_ylabel(f"${name}$ ({shown})")
         column[0].set_title(f"Bar {bar} ({BAR_NAMES[bar]})\n{place}")
         column[2].set_xlabel(f"$x$ from ${pin_name(ENDS[bar][0]).strip('$')}$ ({unit})")
-        largest = write_quantity(abs(float(found.largest.moment[worst])), "N m", view.units)
-        at = write_quantity(float(found.largest.x[worst]), "m", view.units)
-        spread = "weight and inertia as a uniform bar's" if found.uniform else "weight and inertia at G"
-        note(view, f"Bar {bar}: largest |M| = {largest} at x = {at}, {spread}.")
+        largest = write_quantity(worst.peak.value, "N m", view.units)
+        foot = write_quantity(worst.x, "m", view.units)
+        spread = "weight and inertia as a uniform bar's" if forces.uniform else "weight and inertia at G"
+        note(view, f"Bar {bar}: largest |M| = {largest} at x = {foot}, {spread}.")
     note(view, "x runs along the line between the pins, y to its left; N > 0 is tension.")
 
 

@@ -14,7 +14,8 @@ from fourbar.effects import SpringEnd
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
 from fourbar.mjcf.assembly import write_sdf, write_usd
-from fourbar.show.duty import motor_duty, shaking_force, shaking_moment, write_motor
+from fourbar.show.duty import motor_duty, shaking_force, shaking_moment
+from fourbar.show.summary import write_motor
 from fourbar.solution import write_json
 from tests.support.scenes import crank_rocker
 
@@ -371,7 +372,7 @@ def test_the_frame_bears_what_changes_the_momentum_of_the_bars(one: int, other: 
     pins = np.abs(study.F12).max() + np.abs(study.F14).max()
     assert np.abs(shaking_force(study) - force).max() < ROUND_OFF * pins
     assert np.abs(shaking_moment(study) - moment).max() < ROUND_OFF * pins
-    duty, entry = motor_duty(s), write_motor(s, {}, s)
+    duty, entry = motor_duty(s), write_motor(scene, s, {})
     assert duty.peak_force == np.abs(s.drive_force).max() and duty.peak_torque is None
     assert duty.peak_speed == np.abs(s.stroke_speed).max() and entry["units"]["peak_speed"] == "m/s"
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.show.duty import bearing_load, motor_duty, shaking_force, shaking_moment, write_motor
+from fourbar.show.duty import bearing_load, motor_duty, shaking_force, shaking_moment
+from fourbar.show.summary import write_motor
 from fourbar.show.units import units
 from tests.support.scenes import crank_rocker
 
@@ -66,8 +67,9 @@ def test_the_duty_of_a_motor() -> None:
 
 
 def test_the_json_holds_the_duty() -> None:
-    s, imperial = fourbar.solve(crank_rocker()), units("imperial")
-    duty, entry = motor_duty(s), write_motor(s, imperial, s)
+    scene = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, math.tau, 61), 10.0))  # between which nothing stands
+    s = fourbar.solve(scene)
+    duty, entry = motor_duty(s), write_motor(scene, s, units("imperial"))
     assert duty is not None and entry is not None and duty.energy_out is not None
     inch_pound = 0.0254 * 0.45359237 * 9.80665
     assert entry["units"]["rms_power"] == "hp" and entry["units"]["energy_out"] == "lbf in"

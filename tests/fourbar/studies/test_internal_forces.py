@@ -125,3 +125,17 @@ def test_what_cannot_be_is_refused_and_what_has_no_forces_is_nan() -> None:
     found = fourbar.internal_forces(open_, fourbar.solve(open_), 3)
     assert np.isnan(found.M[0]).all() and np.isfinite(found.M[1]).all()
     assert np.isnan(found.largest.moment[0]) and np.isfinite(found.largest.moment[1])
+
+
+def test_feet_that_differ_by_rounding_are_one() -> None:
+    """A load and the inertia act at G, each by its own roundings: between them no part of both bends the bar."""
+    bar = fourbar.Bar(0.25, 0.7, 1e-4, (0.13, 0.3))
+    linkage = replace(crank_rocker().linkage, coupler=bar)
+    load = fourbar.Load(3, (3.0, 0.7), moment=20.0)
+    sweep = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 200), 10.0)
+    scene = replace(crank_rocker(motion=sweep, effects=()), linkage=linkage, loads=(load,))
+    s = fourbar.solve(scene)
+    largest = fourbar.internal_forces(scene, s, 3).largest
+    G, far = bar.to_centre.real, 1e-6 * bar.length
+    beside = np.abs(fourbar.internal_forces(scene, s, 3, np.array([0.0, G - far, G + far, bar.length])).M).max(axis=1)
+    assert np.abs(largest.moment) == pytest.approx(beside, rel=1e-4)
