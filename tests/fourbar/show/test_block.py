@@ -117,9 +117,8 @@ def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
 def test_the_largest_bending_moment_of_each_bar_is_located_between_the_positions() -> None:
     """A crank without mass carries the torque of its drive at O2 as the largest moment of all."""
     light = replace(TURN, linkage=replace(TURN.linkage, input=fourbar.Bar(A)), loads=())
-    coarse, fine = (
-        replace(light, motion=replace(light.motion, theta_2=fourbar.Sweep(0.0, math.tau, n))) for n in (24, 36000)
-    )
+    sweeps = (fourbar.Sweep(0.0, math.tau, steps) for steps in (24, 36000))
+    coarse, fine = (replace(light, motion=light.motion.replace(angle=sweep)) for sweep in sweeps)
     facts, s = summarize(coarse, fourbar.solve(coarse)), fourbar.solve(fine)
     for bar, bending in facts.bending.items():
         moment, x = fourbar.internal_forces(fine, s, bar, [0.0]).largest  # type: ignore[arg-type]
