@@ -292,8 +292,9 @@ class _Block:
     def _cells(self, values: list[float], unit: str) -> list[str]:
         """Write quantities of one kind with the prefix of the largest; each with its own if they lie far apart."""
         sizes = [abs(value) for value in values if value]
-        alike = bool(sizes) and min(sizes) > ALIKE * max(sizes)
-        return [self._value(value, unit, max(sizes) if alike or not value else None) for value in values]
+        largest = max(sizes, default=0.0)
+        alike = min(sizes, default=0.0) >= ALIKE * largest
+        return [self._value(value, unit, largest if alike or not value else None) for value in values]
 
     def _is_rough(self, name: str) -> bool:
         """Tell whether a peak is that of the positions alone: between them it grows, or nothing was looked for."""
