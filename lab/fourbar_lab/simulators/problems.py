@@ -117,10 +117,11 @@ def command(archive: Path | None) -> None:
 
 
 def write_archive(checkout: Path, archive: Path) -> None:
-    """Pack the problems with their page, schema, licence and citation, the same bytes each time."""
+    """Pack the problems with their page, figures, schema, licence and citation, the same bytes each time."""
     files = sorted(PROBLEMS.iterdir())
     files += [checkout / name for name in ("docs/benchmark.md", "docs/protocol.md", "docs/protocol.schema.json")]
     files += [checkout / name for name in ("LICENSE", "CITATION.cff")]
+    files += sorted((checkout / "docs" / "benchmark").glob("*.svg"))
     with ZipFile(archive, "w", ZIP_DEFLATED) as packed:
         for file in files:
             entry = ZipInfo(f"{ARCHIVE}/{file.relative_to(checkout)}", date_time=(1980, 1, 1, 0, 0, 0))

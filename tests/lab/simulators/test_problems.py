@@ -35,23 +35,23 @@ IN_MANY_DIGITS = [name for name in PRESCRIBED if name not in ("cylinder", "pin_f
 
 
 @cache
-def kept(name: str) -> Any:
-    """The JSON that is in the tree."""
+def read_stored(name: str) -> Any:
+    """Read a problem as it stands in the tree."""
     return read_problem(PROBLEMS / f"{name}.json")
 
 
-def off(one: Any, other: Any) -> Any:
-    """How far two answers are apart, position by position."""
-    return magnitude(np.atleast_1d(np.asarray(one, dtype=float) - np.asarray(other, dtype=float)))
+def find_distance(first: Any, second: Any) -> Any:
+    """Return the distance between two answers at each position."""
+    return magnitude(np.atleast_1d(np.asarray(first, dtype=float) - np.asarray(second, dtype=float)))
 
 
-def agree(name: str, answers: Any, share: float = 0.0) -> None:
-    """Every answer lies within the problem's error bars, and what the other derivation may add of the largest value."""
-    problem, compared = kept(name), 0
+def assert_agreement(name: str, answers: Any, share: float = 0.0) -> None:
+    """Assert that each answer lies within its error bar, widened by a share of the largest value for its derivation."""
+    problem, compared = read_stored(name), 0
     for quantity, values in problem["answers"].items():
         if quantity not in answers:
             continue
-        apart = off(values, answers[quantity])
+        apart = find_distance(values, answers[quantity])
         if quantity.startswith("theta"):
             apart = np.minimum(apart, np.abs(apart - 2.0 * np.pi))
         size = 1.0 if quantity.startswith("theta") else magnitude(np.atleast_1d(np.asarray(values))).max()
@@ -67,17 +67,18 @@ def test_there_are_fifteen_and_their_files_agree() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in LONG])
 def test_the_files_are_those_of_today(name: str) -> None:
-    old, new = kept(name), json.loads(json.dumps(collect_problem(name)))
+    old, new = read_stored(name), json.loads(json.dumps(collect_problem(name)))
     assert old["schema"] == SCHEMA and old["answers"].keys() == new["answers"].keys() == old["errors"].keys()
     for key in ("title", "source", "conventions", "mechanism", "ask", "units"):
         assert old[key] == new[key]
     numbers = [
-        re.findall(r"-?\d[\d.e+-]*", json.dumps([each[key] for key in ("scene", "command")])) for each in (old, new)
+        re.findall(r"-?\d[\d.e+-]*", json.dumps([problem[key] for key in ("scene", "command")]))
+        for problem in (old, new)
     ]
-    assert np.allclose(*(np.array(each, dtype=float) for each in numbers), rtol=K * EPS, atol=1e-9)
+    assert np.allclose(*(np.array(texts, dtype=float) for texts in numbers), rtol=K * EPS, atol=1e-9)
     for quantity, values in old["answers"].items():
         bar = np.asarray(old["errors"][quantity])
-        assert (bar > 0.0).all() and (off(values, new["answers"][quantity]) <= APART * bar).all(), quantity
+        assert (bar > 0.0).all() and (find_distance(values, new["answers"][quantity]) <= APART * bar).all(), quantity
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -90,24 +91,24 @@ def test_a_problem_is_what_the_schema_says(name: str) -> None:
     assert not check.is_valid({**problem, "given": {}}) and not check.is_valid({**problem, "scene": {}})
 
 
-def asked(name: str) -> Any:
-    """Scene and command as an engine reads them."""
-    problem = kept(name)
+def read_question(name: str) -> Any:
+    """Read scene and command as an engine does."""
+    problem = read_stored(name)
     return protocol.command_from_json(protocol.scene_from_json(problem["scene"]), problem["command"])
 
 
 @pytest.mark.parametrize("name", PRESCRIBED)
 def test_the_free_bodies_answer_the_same(name: str) -> None:
-    scene, at = asked(name)
-    other = FreeBody().answer(scene, at).quantities
-    agree(name, other, K * EPS / float(np.abs(other["sin_mu"]).min()) ** 2)
+    scene, at = read_question(name)
+    answers = FreeBody().answer(scene, at).quantities
+    assert_agreement(name, answers, K * EPS / float(np.abs(answers["sin_mu"]).min()) ** 2)
 
 
 @pytest.mark.parametrize("name", IN_MANY_DIGITS)
 def test_ninety_digits_answer_the_same(name: str) -> None:
     exact = pytest.importorskip("fourbar_validation.engines.exact")
     pytest.importorskip("flint")
-    agree(name, exact.BallArithmetic().answer(*asked(name)).quantities)
+    assert_agreement(name, exact.BallArithmetic().answer(*read_question(name)).quantities)
 
 
 def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, Any]:
@@ -168,17 +169,16 @@ def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, 
 @pytest.mark.parametrize("name", SLIDING)
 def test_virtual_work_answers_the_slider_cranks_the_same(name: str) -> None:
     mp = pytest.importorskip("mpmath").mp
-    command = kept(name)["command"]
+    command = read_stored(name)["command"]
     with mp.workdps(60):
         rates = mp.mpf(command["omega_2"]), mp.mpf(command["alpha_2"])
-        rows = [slide(mp, kept(name)["scene"], mp.mpf(place), *rates) for place in command["theta_2"]]
-    assert rows[0].keys() == kept(name)["answers"].keys()
-    agree(name, {quantity: [row[quantity] for row in rows] for quantity in rows[0]})
+        rows = [slide(mp, read_stored(name)["scene"], mp.mpf(place), *rates) for place in command["theta_2"]]
+    assert rows[0].keys() == read_stored(name)["answers"].keys()
+    assert_agreement(name, {quantity: [row[quantity] for row in rows] for quantity in rows[0]})
 
 
 def pendulum(problem: Any) -> tuple[float, float]:
-    """Of a parallelogram whose input swings about O2 and whose coupler does not turn: k in theta'' = -k cos theta, and
-    the energy theta'^2/2 + k sin theta."""
+    """Return k in theta'' = -k cos theta and the energy theta'^2/2 + k sin theta of a released parallelogram."""
     scene, start = problem["scene"], problem["command"]
     bars, length = scene["bars"], scene["lengths"]["input"]
     swinging, coupler = [bars["input"], bars["output"]], bars["coupler"]["mass"]
@@ -193,11 +193,8 @@ def pendulum(problem: Any) -> tuple[float, float]:
 
 def test_gazebos_four_bar_swings_as_a_pendulum() -> None:
     special = pytest.importorskip("scipy.special")
-    problem, answers, errors = (
-        kept("gz_physics_987"),
-        kept("gz_physics_987")["answers"],
-        kept("gz_physics_987")["errors"],
-    )
+    problem = read_stored("gz_physics_987")
+    answers, errors = problem["answers"], problem["errors"]
     k, modulus = pendulum(problem)[0], math.sin(0.5 * (problem["command"]["theta_2"] + 0.5 * math.pi))
     quarter = special.ellipk(modulus**2)
     assert abs(answers["frequency"] - math.sqrt(k) / (4.0 * quarter)) <= errors["frequency"] < 1e-9
@@ -205,16 +202,17 @@ def test_gazebos_four_bar_swings_as_a_pendulum() -> None:
     sn, cn, _, _ = special.ellipj(quarter - math.sqrt(k) * np.asarray(problem["times"]), modulus**2)
     theta = 2.0 * np.arcsin(modulus * sn) - 0.5 * math.pi
     omega = -2.0 * modulus * math.sqrt(k) * cn
-    agree("gz_physics_987", {"theta_2": theta, "omega_2": omega, **hang(problem, theta, omega)})
+    assert_agreement("gz_physics_987", {"theta_2": theta, "omega_2": omega, **solve_pin_forces(problem, theta, omega)})
 
 
 def test_a02_passes_every_angle_when_energy_says() -> None:
     integrate = pytest.importorskip("scipy.integrate")
-    problem, answers, errors = kept("iftomm_a02"), kept("iftomm_a02")["answers"], kept("iftomm_a02")["errors"]
+    problem = read_stored("iftomm_a02")
+    answers, errors = problem["answers"], problem["errors"]
     k, energy = pendulum(problem)
     theta, time = np.asarray(answers["theta_2"]), problem["times"]
     speed = -np.sqrt(2.0 * (energy - k * np.sin(theta)))
-    agree("iftomm_a02", {"omega_2": speed, **hang(problem, theta, speed)})
+    assert_agreement("iftomm_a02", {"omega_2": speed, **solve_pin_forces(problem, theta, speed)})
     reached, passed = 0.0, 0
     for i in range(20, len(time), 20):
         reached += integrate.quad(lambda x: -1.0 / math.sqrt(2.0 * (energy - k * math.sin(x))), *theta[[i - 20, i]],
@@ -224,7 +222,7 @@ def test_a02_passes_every_angle_when_energy_says() -> None:
     assert passed == 20 and time[-1] == 20.0
 
 
-def hang(problem: Any, theta: Any, omega: Any) -> dict[str, list[list[float]]]:
+def solve_pin_forces(problem: Any, theta: Any, omega: Any) -> dict[str, list[list[float]]]:
     """Return the pin forces of a released parallelogram from the balances of its coupler, which does not turn.
 
     Moments of the coupler about B give the part of F32 across it, moments of the input about O2 the part along it.
@@ -268,7 +266,7 @@ def test_the_page_s_example_reads_an_answer_without_this_project() -> None:
     names: dict[str, Any] = {}
     exec(code, names)
     assert "fourbar" not in code.replace("fourbar-problem/2", "")
-    file, right = PROBLEMS / "newton_128.json", kept("newton_128")["answers"]["F43"]
+    file, right = PROBLEMS / "newton_128.json", read_stored("newton_128")["answers"]["F43"]
     assert names["find_error"](file, "F43", right) <= 0.0
     wrong = [right[0], [1.01 * x for x in right[1]], *right[2:]]
     assert 1e-4 < names["find_error"](file, "F43", wrong) < 1e-2
@@ -303,37 +301,39 @@ def test_the_proposed_problem_rests_and_swings_as_its_page_says() -> None:
         assert text in page
 
 
-def result(name: str, **answers: Any) -> dict[str, Any]:
-    return {"schema": RESULT, "problem": name, "engine": "mine", "answers": {**kept(name)["answers"], **answers}}
+def make_result(name: str, **answers: Any) -> dict[str, Any]:
+    return {"schema": RESULT, "problem": name, "engine": "mine", "answers": {**read_stored(name)["answers"], **answers}}
 
 
 @pytest.mark.parametrize(("error", "level"), [(0.0, "A"), (5e-10, "A"), (5e-7, "B"), (5e-4, "C"), (5e-3, "D")])
 def test_a_level_is_that_of_the_worst_position(error: float, level: str) -> None:
-    torque = list(kept("newton_128")["answers"]["torque"])
+    torque = list(read_stored("newton_128")["answers"]["torque"])
     torque[7] += error * max(map(abs, torque))
-    levels = find_levels(judge(kept("newton_128"), result("newton_128", torque=torque)))
+    levels = find_levels(judge(read_stored("newton_128"), make_result("newton_128", torque=torque)))
     assert levels == {"motion": "A", "reactions": "A", "torque": level}
 
 
 @pytest.mark.parametrize("torque", [None, [], [1.0], "x", [[1.0, 2.0]] * 37, [math.nan] * 37])
 def test_an_answer_that_is_none_has_no_level(torque: Any) -> None:
-    assert find_levels(judge(kept("newton_128"), result("newton_128", torque=torque)))["torque"] == "-"
+    assert find_levels(judge(read_stored("newton_128"), make_result("newton_128", torque=torque)))["torque"] == "-"
 
 
 def test_error_bars_are_allowed_where_they_are_larger() -> None:
-    problem = kept("near_limit")
+    problem = read_stored("near_limit")
     torque, bars = np.array(problem["answers"]["torque"]), np.array(problem["errors"]["torque"])
     assert (bars > LEVELS["A"] * np.abs(torque).max()).any()
-    assert find_levels(judge(problem, result("near_limit", torque=(torque + 0.9 * bars).tolist())))["torque"] == "A"
+    assert (
+        find_levels(judge(problem, make_result("near_limit", torque=(torque + 0.9 * bars).tolist())))["torque"] == "A"
+    )
 
 
 def test_an_answer_at_its_own_motion_is_judged_there() -> None:
-    problem = kept("crank_rocker")
-    scene, at = asked("crank_rocker")
+    problem = read_stored("crank_rocker")
+    scene, at = read_question("crank_rocker")
     moved = at._replace(angle=at.angle + 1e-3, speed=np.full(len(at.angle), 10.01))
     theirs = fourbar.solve(scene, at=moved)
     answers = {name: getattr(theirs, name).tolist() for name in problem["answers"]}
-    own = {**result("crank_rocker", **answers), "at": protocol.command_to_json(scene, moved)}
+    own = {**make_result("crank_rocker", **answers), "at": protocol.command_to_json(scene, moved)}
     assert set(find_levels(judge(problem, own)).values()) == {"A"}
     del own["at"]
     assert set(find_levels(judge(problem, own)).values()) != {"A"}
@@ -341,10 +341,10 @@ def test_an_answer_at_its_own_motion_is_judged_there() -> None:
 
 def test_the_command_judges_a_result_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, problem = tmp_path / "mine.json", str(PROBLEMS / "newton_128.json")
-    file.write_text(json.dumps(result("newton_128")))
+    file.write_text(json.dumps(make_result("newton_128")))
     assert status(["check", problem, str(file)]) == 0
     assert "levels: motion A, torque A, reactions A" in capsys.readouterr().out
-    del (wrong := result("newton_128"))["answers"]["F43"]
+    del (wrong := make_result("newton_128"))["answers"]["F43"]
     file.write_text(json.dumps(wrong))
     assert status(["check", problem, str(file)]) == 1
     assert "no answer" in capsys.readouterr().out
@@ -359,4 +359,5 @@ def test_the_archive_holds_the_set_and_is_the_same_bytes_each_time(tmp_path: Pat
         assert lab_status(["problems", "--archive", str(tmp_path / name)]) == 0
     assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "two.zip").read_bytes()
     names = {Path(name).name for name in zipfile.ZipFile(tmp_path / "one.zip").namelist()}
-    assert {f"{name}.json" for name in NAMES} | {"LICENSE", "CITATION.cff", "benchmark.md"} <= names
+    assert {f"{name}.json" for name in NAMES} | {f"{name}.svg" for name in NAMES} <= names
+    assert {"LICENSE", "CITATION.cff", "benchmark.md"} <= names
