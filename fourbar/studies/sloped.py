@@ -153,7 +153,12 @@ class Sloped(NDArrayOperatorsMixin):
         if function in PIECEWISE:
             return found
         partial = RULES[function](found, *plain)
-        return Sloped(found, sum(by * x.slopes for by, x in zip(partial, given, strict=True) if isinstance(x, Sloped)))
+        slopes = None
+        for by, x in zip(partial, given, strict=True):
+            if isinstance(x, Sloped):
+                term = x.slopes if isinstance(by, float) and by == 1.0 else by * x.slopes
+                slopes = term if slopes is None else slopes + term
+        return Sloped(found, slopes)
 
     def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: Any) -> Any:
         return _find_by_name(function, args, options)

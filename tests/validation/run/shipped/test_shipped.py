@@ -17,7 +17,7 @@ from fourbar_validation.compare.rows import SHIPPED as SHIPPED_ROWS
 from fourbar_validation.run import judge
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped import files
-from fourbar_validation.run.shipped.variants import find_stated, move_numbers
+from fourbar_validation.run.shipped.variants import SceneFile
 from tests.support.scenes import crank_rocker
 
 SHIPPED = FAULT_SCENES["shipped"]
@@ -267,9 +267,9 @@ def test_what_a_file_cannot_hold_is_refused() -> None:
 def test_every_number_that_a_scene_states_is_found_in_its_file(name: str) -> None:
     scene = FAULT_SCENES[name]
     known = {key for key, entry in list_entries(scene).items() if not is_left_out(scene, entry)}
-    found = find_stated(scene, known)
+    found = SceneFile(scene).find_stated(known)
     assert found.keys() >= known - {key for key in known if ".centre." in key or ".inertia" in key}
-    changed = move_numbers(scene, {"lengths.coupler": 0.01})
+    changed = SceneFile(scene).move({"lengths.coupler": 0.01})
     assert changed.linkage.coupler.length == scene.linkage.coupler.length + 0.01
     assert np.array_equal(command(changed).theta_2, command(scene).theta_2)
 

@@ -17,6 +17,8 @@ O2, A, O4 = 0, 1, 2
 """Degrees of freedom, in the order of the bodies."""
 TURNED_BY = {2: [O2], 3: [O2, A], 4: [O4]}
 """Joints whose angles a bar's rotation is the sum of."""
+COLUMN_OF = {bar: np.isin((O2, A, O4), joints).astype(float) for bar, joints in TURNED_BY.items()}
+"""Derivative of each bar's rotation by the joint angles."""
 ENDS = (f"{CYLINDER}_start", f"{CYLINDER}_end")
 """Sites of the cylinder."""
 WARNINGS = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
@@ -134,7 +136,7 @@ class ClosedLoop(Assembled):
     def drive_column(self, drive_bar: int | None) -> Array:
         """Return the derivative of the driven bar's rotation by the joint angles, or of the cylinder's stroke, (3,)."""
         if drive_bar is not None:
-            return np.isin((O2, A, O4), TURNED_BY[drive_bar]).astype(float)
+            return COLUMN_OF[drive_bar]
         start, end = ENDS
         return np.asarray(self.line() / self.stroke() @ (self.jacobian_at(end) - self.jacobian_at(start)))
 

@@ -13,7 +13,7 @@ from fourbar_validation.compare.rows import REFUSES, Row
 from fourbar_validation.compare.tolerance import ErrorBound
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.run.question import NotAskedError, Question
-from fourbar_validation.run.shipped.variants import ask_free_bodies, make_row, move_numbers
+from fourbar_validation.run.shipped.variants import SceneFile, ask_free_bodies, make_row
 
 GIVEN = 1e-4
 """Tolerance that the run gives a length, in parts of it."""
@@ -56,14 +56,9 @@ def extremes(question: Question) -> list[Row]:
     reach = {each.key: each.reach for each in scene.tolerances[:MOST]}
     bare = replace(scene, tolerances=(), motion=scene.motion.replace(angle=theta_2, through="sign"))
     corners = [dict(zip(reach, signs, strict=True)) for signs in product((-INSIDE, INSIDE), repeat=len(reach))]
-    values = np.array(
-        [
-            ask_free_bodies(move_numbers(bare, {key: sign * reach[key] for key, sign in corner.items()})).quantities[
-                drive
-            ]
-            for corner in ({}, *corners)
-        ]
-    )
+    file = SceneFile(bare)
+    moved = [file.move({key: sign * reach[key] for key, sign in corner.items()}) for corner in ({}, *corners)]
+    values = np.array([ask_free_bodies(member).quantities[drive] for member in moved])
     size = max(abs(end) for each in ends for end in each[:2])
     error = np.zeros_like(theta_2)
     whole = len(reach) == len(scene.tolerances)

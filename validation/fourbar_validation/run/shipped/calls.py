@@ -15,12 +15,11 @@ from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import (
+    SceneFile,
     ask_free_bodies,
     at_places,
-    find_stated,
     hold_to,
     keep_worst,
-    move_numbers,
     take_few,
     take_member,
 )
@@ -53,15 +52,18 @@ def study(question: Question) -> list[Row]:
     """Judge a square study in which every number varies, member by member."""
     scene = furnish(take_few(question), question)
     places, key = np.asarray(scene.motion.angle), command_key(scene)
-    of = find_stated(scene, fourbar.sensitivity(scene).keys)
-    del of[key]
-    values = {key: np.array([x + number * APART * step for number in range(MEMBERS)]) for key, (x, step) in of.items()}
+    stated = SceneFile(scene).find_stated(fourbar.sensitivity(scene).keys)
+    del stated[key]
+    values = {
+        key: np.array([x + number * APART * step for number in range(MEMBERS)]) for key, (x, step) in stated.items()
+    }
     # the places of each member lie within those of the scene: nothing says that a table reaches further
     each = np.array([places + APART * number * (places.mean() - places) for number in range(MEMBERS)])
     members: dict[int, Scene] = {}
     for number, own in enumerate(each):
         with suppress(NotAskedError):  # the others are judged, beside one that never assembles
-            members[number] = move_numbers(at_places(scene, own), {k: number * APART * of[k].step for k in of})
+            changes = {name: number * APART * entry.step for name, entry in stated.items()}
+            members[number] = SceneFile(at_places(scene, own)).move(changes)
     rows = []
     with np.errstate(all="ignore"):
         result = fourbar.solve(fourbar.vary(scene, values | {key: each}))

@@ -17,10 +17,9 @@ from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import ErrorBound, divide, magnitude
 from fourbar_validation.run.question import Question
 from fourbar_validation.run.shipped.variants import (
+    SceneFile,
     ask_free_bodies,
-    find_stated,
     make_row,
-    move_numbers,
     split_parts,
     take_few,
 )
@@ -66,14 +65,13 @@ def sensitivity(question: Question) -> list[Row]:
     """Judge the derivatives of the unknowns and of the scene's points along one direction."""
     scene = take_few(question)
     result = fourbar.sensitivity(scene)
-    directions = {key: step for key, (_, step) in find_stated(scene, result.keys).items()}
+    file = SceneFile(scene)
+    directions = {key: step for key, (_, step) in file.find_stated(result.keys).items()}
     if scene.motion.stroke is None:
         directions[command_key(scene)] = 1.0
 
     def along(part: float) -> dict[str, Array]:
-        return ask_free_bodies(
-            move_numbers(scene, {key: part * STEP * step for key, step in directions.items()})
-        ).quantities
+        return ask_free_bodies(file.move({key: part * STEP * step for key, step in directions.items()})).quantities
 
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
     rows = []
@@ -129,10 +127,11 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
     """Compute what the free bodies of changed linkages answer, by the parts of the unknowns."""
     bare = replace(scene, tolerances=())
     nominal = split_parts(ask_free_bodies(bare))
-    numbers = find_stated(bare, [each.key for each in scene.tolerances])
+    file = SceneFile(bare)
+    numbers = file.find_stated(tolerance.key for tolerance in scene.tolerances)
 
     def changed(changes: dict[str, float]) -> dict[str, Array]:
-        result = split_parts(ask_free_bodies(move_numbers(bare, changes)))
+        result = split_parts(ask_free_bodies(file.move(changes)))
         return {part: _subtract(part, values, nominal[part]) for part, values in result.items()}
 
     weights, off = [], []

@@ -5,6 +5,7 @@ import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from copy import deepcopy
 from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
@@ -74,41 +75,45 @@ class FileNumber(NamedTuple):
     step: float
 
 
-def find_stated(scene: Scene, keys: Iterable[str]) -> dict[str, FileNumber]:
-    """Find those of the keys whose numbers the scene's file states; of motion.theta_2 the first.
+class SceneFile:
+    """The text of a scene's file, in which numbers are moved; what it leaves out follows the lengths."""
 
-    What it leaves out (the inertia of a uniform bar, its centre) follows the lengths.
-    """
-    document, result = tomllib.loads(dump(scene)), {}
-    for index, key in enumerate(keys):
-        with suppress(KeyError):
-            table, last = _place(document, key)
-            number, _, unit = str(table[last][0] if isinstance(table[last], list) else table[last]).partition(" ")
-            # no two alike, between 1/2 and 1
-            part = 0.5 + 0.5 * ((index + 1) * GOLDEN % 1.0)
-            result[key] = FileNumber(float(number), part * (1.0 if unit == "rad" else float(number)))
-    return result
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self._document = tomllib.loads(dump(scene))
+        self._lines = {key: _write_line(key, value) for key, value in self._document.items()}
 
+    def find_stated(self, keys: Iterable[str]) -> dict[str, FileNumber]:
+        """Find those of the keys whose numbers the file states; of motion.theta_2 the first."""
+        stated = {}
+        for index, key in enumerate(keys):
+            with suppress(KeyError):
+                table, last = _place(self._document, key)
+                number, _, unit = str(table[last][0] if isinstance(table[last], list) else table[last]).partition(" ")
+                # no two alike, between 1/2 and 1
+                part = 0.5 + 0.5 * ((index + 1) * GOLDEN % 1.0)
+                stated[key] = FileNumber(float(number), part * (1.0 if unit == "rad" else float(number)))
+        return stated
 
-def move_numbers(scene: Scene, changes: Mapping[str, float]) -> Scene:
-    """Change some numbers of a scene by so much, through the text of its file: keys as there.
+    def move(self, changes: Mapping[str, float]) -> Scene:
+        """Read the file after some of its numbers were changed by so much; motion.theta_2 moves every position.
 
-    motion.theta_2 moves every position. Raises NotAskedError where the changed linkage can never assemble.
-    """
-    lengths = [
-        length + changes.get(f"lengths.{bar}", 0.0)
-        for bar, length in zip(("ground", "input", "coupler", "output"), scene.linkage.lengths, strict=True)
-    ]
-    if max(lengths) >= 0.5 * math.fsum(lengths):
-        raise NotAskedError("a changed linkage can never assemble")
-    document = tomllib.loads(dump(scene))
-    for key, change in changes.items():
-        table, last = _place(document, key)
-        old = table[last]
-        table[last] = (
-            [_change_entry(each, change) for each in old] if isinstance(old, list) else _change_entry(old, change)
-        )
-    return loads("\n".join(f"{json.dumps(key)} = {_write_toml(value)}" for key, value in document.items()))
+        Raises NotAskedError where the changed linkage can never assemble.
+        """
+        lengths = [
+            length + changes.get(f"lengths.{bar}", 0.0)
+            for bar, length in zip(("ground", "input", "coupler", "output"), self.scene.linkage.lengths, strict=True)
+        ]
+        if max(lengths) >= 0.5 * math.fsum(lengths):
+            raise NotAskedError("a changed linkage can never assemble")
+        tables = {top: deepcopy(self._document[top]) for top in {key.partition(".")[0] for key in changes}}
+        for key, change in changes.items():
+            table, last = _place(tables, key)
+            old = table[last]
+            moved = [_change_entry(entry, change) for entry in old] if isinstance(old, list) else None
+            table[last] = _change_entry(old, change) if moved is None else moved
+        lines = self._lines | {key: _write_line(key, value) for key, value in tables.items()}
+        return loads("\n".join(lines.values()))
 
 
 def _place(document: Any, key: str) -> tuple[Any, Any]:
@@ -126,9 +131,13 @@ def _change_entry(quantity: str | float, change: float) -> str | float:
     return f"{float(number) + change!r} {unit}" if unit else float(number) + change
 
 
+def _write_line(key: str, value: Any) -> str:
+    return f"{json.dumps(key)} = {_write_toml(value)}"
+
+
 def _write_toml(value: Any) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(key)} = {_write_toml(each)}" for key, each in value.items()) + "}"
+        return "{" + ", ".join(_write_line(*entry) for entry in value.items()) + "}"
     return "[" + ",\n".join(map(_write_toml, value)) + "]" if isinstance(value, list) else json.dumps(value)
 
 
