@@ -98,7 +98,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        *(("README.md", 2), ("docs/commands.md", 7), ("docs/gallery.md", 8)),
+        *(("README.md", 2), ("docs/commands.md", 7), ("docs/gallery.md", 1)),
         *(("docs/guide-designer.md", 4), ("docs/guide-roboticist.md", 3)),
     ],
 )
@@ -245,8 +245,9 @@ def test_the_index_lists_every_page_for_readers_and_for_the_site() -> None:
 
 
 def test_pages_keep_to_their_length() -> None:
-    words = {page: len(page.read_text(encoding="utf-8").split()) for page in DOCS.rglob("*.md")}
-    assert len(words) <= 20 and sum(words.values()) <= 27_000 and max(words.values()) <= 3000, words
+    tokens = {page: page.read_text(encoding="utf-8").split() for page in DOCS.rglob("*.md")}
+    words = {page.name: sum(bool(re.search(r"[^|:-]", token)) for token in tokens[page]) for page in tokens}
+    assert len(words) <= 20 and sum(words.values()) <= 23_100 and max(words.values()) <= 3000, words
     assert len(read("README.md").splitlines()) <= 70
     assert len(read("CHANGELOG.md").splitlines()) <= 60
 
