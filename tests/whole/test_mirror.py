@@ -58,8 +58,8 @@ JUDGED_BY = {
     "validation/run/test_released.py": "validation/engines: pinocchio_forward; validation/engines/mujoco: released",
     "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
     "validation/run: printed",
-    "validation/check/test_mjcf.py": "validation/check: causes differences screen; "
-    "validation/engines/mujoco: attached corrections describe guess theirs topology",
+    "validation/check/test_mjcf.py": "validation/check: differences screen; "
+    "validation/engines/mujoco: describe theirs topology",
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "
     "ladder thesis_dynamics thesis_positions thirteen",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "

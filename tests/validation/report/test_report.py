@@ -192,7 +192,7 @@ def test_every_kind_of_scene_is_drawn(motion: fourbar.Motion, pictures: int, mon
 
 
 def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
-    absent = replace(ENGINES[0], engine=lambda: import_module("fourbar_validation.engines.absent").Absent())
+    absent = replace(ENGINES[0], start=lambda: import_module("fourbar_validation.engines.absent").Absent())
     summary, text = report([judge_for_report("demo", crank_rocker(), (absent,), draw=False)])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and "∞" in text

@@ -1,159 +1,133 @@
-"""List how a described MJCF differs from the one generated for the same scene, and what each difference does."""
+"""List how a described MJCF differs from the one generated for the same scene, and what each difference costs."""
 
 import math
-import re
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-Value = float | str | tuple[float, ...]
-Described = Mapping[str, Value]
+from fourbar.quantities import FORCES
+from fourbar_validation.compare.rows import Row
+from fourbar_validation.engines.description import ModelEntry, Value
 
 SAME = 1e-12
 """Relative; a number written with its digits in another order of operations."""
 TENFOLD = 1e-9
 """Relative distance from a power of ten at which a ratio is called one."""
-OF_THE_DRIVE = {"pins.O2.armature": "the generated file keeps its speed by a flywheel; another drive needs none"}
-"""Differences that are no fault: both files are driven alike here."""
-ATTACHED = re.compile(r"((?:actuators|tendons)\.\d+)(\..+)?")
-"""Keys of what a file may have any number of: numbered, so that their names can be anything."""
-NEEDS = {
-    r"(pins\.\w+)\.sol(?:ref|imp)friction": (r"\1.friction", 0.0),
-    r"(tendons\.\d+)\.sol(?:ref|imp)friction": (r"\1.frictionloss", 0.0),
-    r"(pins\.\w+|tendons\.\d+)\.(?:sol(?:ref|imp)limit|margin)": (r"\1.range", "free"),
-    r"(pins\.\w+|tendons\.\d+)\.(?:spring angle|springyield|springlength.*)": (r"\1.stiffness", 0.0),
-    r"(actuators\.\d+)\.dynprm": (r"\1.dyntype", 0.0),
-    r"option\.wind": ("option.density", 0.0),
-    r"option\.noslip_tolerance": ("option.noslip_iterations", 0.0),
-    r"option\.sleep_tolerance": ("option.switched on", "nothing that matters here"),
-    r"option\.meaninertia": ("option.tolerance", 0.0),
-}
-"""A key, and what its effect hangs on: where their file has that switched off, the key is left out."""
-NEUTRAL: dict[str, Value] = {"damping": 0.0, "friction": 0.0, "stiffness": 0.0, "armature": 0.0, "range": "free"}
-"""Properties of a pin without a hinge, where the other file is cut. Its other properties are not compared."""
-WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-"""Names in MJCF where they differ, and what a difference does; see there."""
+OF_THE_DRIVE = "pins.O2.armature"
+"""The generated file keeps its speed by a flywheel, and another drive needs none: both files are driven alike here."""
+ONE_SIDED = ("loads.", "tendons.", "actuators.")
+"""Entries that a file may lack: what is missing on one side is a difference."""
+NOTHING: dict[str, Value] = {".force": (0.0, 0.0), ".couple": 0.0}
+"""What a load exerts that is not there."""
+REMARKS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["remarks"]
+"""Part of a key, and what a difference there does; the first that fits."""
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One entry that is not the same in both files."""
+    """One entry that is not the same in both files, and its cost."""
 
     key: str
-    generated: Value
-    theirs: Value
+    generated: Value | None
+    theirs: Value | None
+    """None: it is not there."""
     remark: str
     written: str = ""
     """Element and attribute in their file, where there is one."""
+    cost: float | None = None
+    """What this entry alone, as in theirs, adds to the error of the generated file: of torque and pin forces that which
+    grows most. None if it was not measured, or cannot be set alone."""
+    quantity: str = ""
+    """Quantity that has this error."""
+
+    @property
+    def price(self) -> str:
+        """Write the cost with its quantity."""
+        return "-" if self.cost is None else f"{self.cost:.1e} {self.quantity}".strip()
+
+    def line(self) -> str:
+        """Write the entry with both values."""
+        return f"{self.key}: {write_value(self.theirs)}, generated {write_value(self.generated)}"
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the cells of a row of the page."""
+        key = f"{self.key} ({self.written})" if self.written else self.key
+        return self.price, key, write_value(self.generated), write_value(self.theirs), self.remark
 
 
-def find_differences(
-    generated: Described, theirs: Described, called: Mapping[str, str] | None = None
-) -> list[Difference]:
-    """Find what differs, in the order of the description; `called`: what their file calls a part of a key."""
-    scale = max(value for key, value in generated.items() if _is_length(key) and isinstance(value, float))
-    generated = _renumber_like(theirs, generated)
-    result = []
+def find_differences(generated: Mapping[str, ModelEntry], theirs: Mapping[str, ModelEntry]) -> list[Difference]:
+    """Find what differs, in the order of their description."""
+    length = max(float(entry.value) for key, entry in generated.items() if _is_length(key))  # type: ignore[arg-type]
+    differences = []
     for key in [*theirs, *(key for key in generated if key not in theirs)]:
-        ours, other = (file.get(key, _describe_missing(key)) for file in (generated, theirs))
-        if (
-            ours is not None
-            and other is not None
-            and not _is_same(key, ours, other, scale)
-            and _has_effect(key, theirs)
-        ):
-            name = _write_name(key, theirs if key in theirs else generated)
-            result.append(
-                Difference(name, ours, other, _remark(key, ours, other), _find_written(key, theirs, called or {}))
-            )
-    return result
+        ours, other = generated.get(key), theirs.get(key)
+        if (ours is None or other is None) and not (key.startswith(ONE_SIDED) or key.endswith(".motor")):
+            continue  # what one of the files has no use for, such as the solver parameters of no friction
+        nothing = next((value for end, value in NOTHING.items() if key.endswith(end)), None)
+        mine, yours = (nothing if entry is None else entry.value for entry in (ours, other))
+        if _is_same(key, mine, yours, length):
+            continue
+        written = f"{other.element} {other.attribute}".strip() if other is not None else ""
+        differences.append(Difference(key, mine, yours, _remark(key, mine, yours), written))
+    return differences
 
 
-def _renumber_like(theirs: Described, generated: Described) -> Described:
-    """Renumber the generated file's actuators and tendons as their counterparts: same role, if possible name.
+def price(difference: Difference, rows: Sequence[Row], unchanged: Sequence[Row]) -> Difference:
+    """Put the cost on a difference: what it adds to the worst error of a force.
 
-    One without a counterpart keeps a number that theirs does not have.
+    `rows`: of the generated file that has it, none where it cannot be set alone; `unchanged`: of the file without it.
     """
-    heads = {key: value for key, value in theirs.items() if (m := ATTACHED.fullmatch(key)) and not m[2]}
-    numbers: dict[str, str] = {}
-    mine = [key for key in generated if (m := ATTACHED.fullmatch(key)) and not m[2]]
-    for by_name in (True, False):
-        for key in mine:
-            for other, role in heads.items():
-                same = not by_name or generated[f"{key}.name"] == theirs[f"{other}.name"]
-                free = key not in numbers and other not in numbers.values()
-                if free and same and role == generated[key] and other.partition(".")[0] == key.partition(".")[0]:
-                    numbers[key] = other
-    for key in mine:
-        numbers.setdefault(key, f"{key}0{len(heads)}")
-    renumbered = {}
-    for key, value in generated.items():
-        attached = ATTACHED.fullmatch(key)
-        renumbered[numbers[attached[1]] + (attached[2] or "") if attached else key] = value
-    return renumbered
+    before = _collect_errors(unchanged)
+    gains = [(error - before.get(key, 0.0), key[1]) for key, error in _collect_errors(rows).items()]
+    if not gains:
+        return difference
+    cost, quantity = max(gains)
+    return replace(difference, cost=max(cost, 0.0), quantity=quantity)
 
 
-def _describe_missing(key: str) -> Value | None:
-    """Give what a file has that lacks the key; None: it is left out."""
-    if attached := ATTACHED.fullmatch(key):
-        return None if attached[2] else "none"
-    if key.startswith("pins."):
-        return NEUTRAL.get(key.split(".", 2)[2])
-    return "none"
+def _collect_errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
+    """Collect the error of the torque and of each pin force, by method."""
+    return {
+        (row.engine, row.quantity): row.error for row in rows if row.quantity in FORCES and math.isfinite(row.error)
+    }
 
 
-def _has_effect(key: str, theirs: Described) -> bool:
-    """Return whether the entry of this key has an effect in their file; a name has none."""
-    if ATTACHED.fullmatch(key) and key.endswith(".name"):
-        return False
-    for pattern, (switch, off) in NEEDS.items():
-        if result := re.fullmatch(pattern, key):
-            return theirs.get(result.expand(switch), off) != off
-    return True
-
-
-def _write_name(key: str, described: Described) -> str:
-    attached = ATTACHED.fullmatch(key)
-    if not attached or not (name := described[f"{attached[1]}.name"]):
-        return key
-    return f"{key.partition('.')[0]}.{name}{attached[2] or ''}"
-
-
-def _find_written(key: str, theirs: Described, called: Mapping[str, str]) -> str:
-    """Element and attribute as they stand in their MJCF, where the key does not say so itself."""
-    if key not in theirs:
-        return ""
-    part = next((known for known in called if key == known or key.startswith(known + ".")), "")
-    attribute = key[len(part) + 1 :]
-    return f"{called[part]} {WORDS['written'].get(attribute, attribute)}".strip() if part else ""
+def order(differences: Sequence[Difference]) -> list[Difference]:
+    """Order differences by their cost, the worst first; those without one keep their order."""
+    return sorted(differences, key=lambda one: (one.cost is None, -(one.cost or 0.0)))
 
 
 def _is_length(key: str) -> bool:
     return key.startswith("lengths.") and not key.endswith("angle")
 
 
-def _is_same(key: str, ours: Value, theirs: Value, length: float) -> bool:
-    if isinstance(ours, str) or isinstance(theirs, str) or ours == theirs:
+def _is_same(key: str, ours: Value | None, theirs: Value | None, length: float) -> bool:
+    if isinstance(ours, str) or isinstance(theirs, str) or ours is None or theirs is None or ours == theirs:
         return ours == theirs
-    one, other = np.atleast_1d(ours), np.atleast_1d(theirs)
-    if one.shape != other.shape:
+    first, second = np.atleast_1d(ours), np.atleast_1d(theirs)
+    if first.shape != second.shape:
         return False
     if key.endswith("angle"):
-        return bool(np.all(np.abs(np.remainder(one - other + np.pi, math.tau) - np.pi) <= SAME))
-    placed = any(part in key for part in ("centre", "plane", ".site", ".path"))
-    floor = length if placed else 1.0 if key.startswith("gravity") else 0.0
-    return bool(np.all(np.abs(one - other) <= SAME * max(np.abs(one).max(), np.abs(other).max(), floor)))
+        return bool(np.all(np.abs(np.remainder(first - second + np.pi, math.tau) - np.pi) <= SAME))
+    placed = any(part in key for part in ("centre", "plane", ".point", ".path"))
+    floor = length if placed else 1.0 if key.startswith(("gravity", "loads")) else 0.0
+    return bool(np.all(np.abs(first - second) <= SAME * max(np.abs(first).max(), np.abs(second).max(), floor)))
 
 
-def _remark(key: str, ours: Value, theirs: Value) -> str:
-    if key in OF_THE_DRIVE:
-        return OF_THE_DRIVE[key]
-    remark = next((text for part, text in WORDS["remarks"].items() if part in key), "")
-    if isinstance(ours, float) and isinstance(theirs, float) and ours * theirs > 0.0 and not key.startswith("option"):
+def _remark(key: str, ours: Value | None, theirs: Value | None) -> str:
+    remark = next((text for part, text in REMARKS.items() if part in key), "")
+    if key != OF_THE_DRIVE and isinstance(ours, float) and isinstance(theirs, float) and ours * theirs > 0.0:
         power = math.log10(abs(theirs)) - math.log10(abs(ours))
-        if round(power) and abs(power - round(power)) <= TENFOLD:
+        if not key.startswith("option") and round(power) and abs(power - round(power)) <= TENFOLD:
             return f"10^{round(power)} times: units? {remark}"
-    return remark
+    return str(remark)
+
+
+def write_value(value: Value | None) -> str:
+    """Write numbers with the digits that set them apart, or the word itself."""
+    if value is None or isinstance(value, str):
+        return value or "none"
+    return " ".join(f"{number:.12g}" for number in (value if isinstance(value, tuple) else (value,)))

@@ -21,9 +21,8 @@ from fourbar.scene import Scene
 from fourbar.show.tables import show_running
 from fourbar.solve import solve
 from fourbar.writing import write_text
-from fourbar_validation.check.causes import Cause, order_causes
-from fourbar_validation.check.differences import find_differences
-from fourbar_validation.check.screen import read_mjcf
+from fourbar_validation.check.differences import Difference, find_differences, order, price
+from fourbar_validation.check.screen import list_unread, read_mjcf
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.counts import Counts
@@ -36,13 +35,13 @@ from fourbar_validation.scenes.suites import read_scene_files
 
 SECONDS = 120.0
 """A four-bar takes less than one."""
-ABOUT_SHARES = (
-    "share: by how much the error of that quantity falls when this one entry is set as in the generated file and all "
-    "others stay; shares do not add up to 100 %. A dash: this entry cannot be changed by itself in the compiled file"
+ABOUT_COSTS = (
+    "cost: what this one entry, as in the file, adds to the error of the generated file; of torque and pin forces that "
+    "which grows most. A dash: this entry cannot be set by itself, or the file holds what it is held to"
 )
 HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 EXAMINE = "fourbar_validation.engines.mujoco.theirs:examine"
-CORRECTED = "fourbar_validation.engines.mujoco.theirs:examine_corrected"
+CHANGED = "fourbar_validation.engines.mujoco.theirs:examine_changed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +67,8 @@ class CostOfModel:
 class ModelReport:
     """Report on a user's file."""
 
-    causes: list[Cause]
-    """Differences, the worst first."""
+    differences: list[Difference]
+    """Differences, the dearest first."""
     costs: list[CostOfModel]
     notes: list[str]
 
@@ -105,20 +104,21 @@ def examine_model(
         ours = {(row.engine, row.quantity): row.error for row in _list_rows(name, scene, generated.answers, SIMULATED)}
         rows = _list_rows(name, scene, theirs.answers, tolerance)
         costs = [CostOfModel(row, ours.get((row.engine, row.quantity), math.nan)) for row in rows]
-        result = find_differences(generated.described, theirs.described, theirs.called)
-        entries = [(difference.key, difference.generated) for difference in result]
-        failed = any(row.failed for row in rows)
-        corrected = examined(CORRECTED, scene, text, dict(theirs.names), entries) if failed else []
-    after = [[] if answers is None else _list_rows(name, scene, answers, tolerance) for answers in corrected]
-    return ModelReport(order_causes(result, rows, after), costs, theirs.notes)
+        differences = find_differences(generated.described, theirs.described)
+        if any(row.failed for row in rows):
+            answered = examined(CHANGED, scene, [(difference.key, difference.theirs) for difference in differences])
+            unchanged, *changed = (_list_rows(name, scene, answers or [], tolerance) for answers in answered)
+            differences = [price(*pair, unchanged) for pair in zip(differences, changed, strict=True)]
+    unread = [f"not looked at: {', '.join(parts)}"] if (parts := list_unread(text)) else []
+    return ModelReport(order(differences), costs, [*theirs.notes, *unread])
 
 
 def _list_rows(name: str, scene: Scene, answers: list[Answer], tolerance: ErrorBound) -> list[Row]:
-    result = []
+    rows = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
-        result += Comparison(name, scene, answer, formulas, tolerance, UNKNOWNS).rows()
-    return result
+        rows += Comparison(name, scene, answer, formulas, tolerance, UNKNOWNS).rows()
+    return rows
 
 
 @contextmanager
@@ -169,16 +169,16 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
     from rich.padding import Padding
 
     console = Console()
-    if not report.causes:
+    if not report.differences:
         console.print("It differs in nothing from the generated MJCF.")
     else:
-        console.print(f"{escape(make_plain(mjcf.name))} against the generated MJCF, the worst cause first")
-        console.print(f"[dim]{ABOUT_SHARES}[/]\n")
-    for cause in report.causes:
-        style = "bold" if cause.share is not None and cause.share >= 0.5 else ""
-        console.print(f"{cause.percent():>12}  {escape(make_plain(cause.line()))}", style=style)
-        for text in cause.texts():
-            console.print(Padding(escape(make_plain(text)), (0, 0, 0, 14)))
+        console.print(f"{escape(make_plain(mjcf.name))} against the generated MJCF, the dearest difference first")
+        console.print(f"[dim]{ABOUT_COSTS}[/]\n")
+    for difference in report.differences:
+        console.print(f"{difference.price:>16}  {escape(make_plain(difference.line()))}")
+        for text in (f"in the file: {difference.written}" if difference.written else "", difference.remark):
+            if text:
+                console.print(Padding(escape(make_plain(text)), (0, 0, 0, 18)))
     for note in report.notes:
         console.print(f"note: {escape(make_plain(note))}")
     for method in report.methods():
@@ -190,14 +190,14 @@ def show(report: ModelReport, mjcf: Path, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "theirs.md", write_markdown(report, mjcf))
     write_results([cost.row for cost in report.costs], out / "results.csv")
-    sentence = f"{report.counts.sentence()}. It differs in {len(report.causes)} entries"
+    sentence = f"{report.counts.sentence()}. It differs in {len(report.differences)} entries"
     console.print(f"[bold]{sentence}[/]; written to {escape(make_plain(str(out)))}")
 
 
 def write_markdown(report: ModelReport, mjcf: Path) -> str:
     """Write the same as text for a page."""
-    what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_SHARES, "headings": ("method", *HEADINGS)}
-    what |= {"causes": [cause.cells() for cause in report.causes]}
+    what = {"report": report, "mjcf": mjcf.name, "about": ABOUT_COSTS, "headings": ("method", *HEADINGS)}
+    what |= {"differences": [difference.cells() for difference in report.differences]}
     what |= {"costs": [(cost.method, *cost.cells()) for cost in report.costs]}
     return render("fourbar_validation.check", "theirs.md.j2", **what)
 
@@ -218,7 +218,7 @@ def write_markdown(report: ModelReport, mjcf: Path) -> str:
     "-o", "--out", type=click.Path(path_type=Path, file_okay=False), default=Path("results"), show_default=True
 )
 def command(scene: Path, theirs: Path, names: tuple[str, ...], wanted: float | None, out: Path) -> int:
-    """Compare your own MJCF of SCENE with the generated one, field by field, and say what each difference costs."""
+    """Compare your own MJCF of SCENE with the generated one: how wrong it is, and what each difference costs."""
     suite = read_scene_files((scene,))
     tolerance = SIMULATED if wanted is None else hold_simulated(wanted, "what this file may be wrong by")
     report = examine_model(suite.name(0), suite.scene(0), theirs, read_names(names), tolerance)

@@ -35,6 +35,18 @@ TELLS = 2.0**-53
 SHARED = "the description, what is commanded and the branch"
 """Words of a report for what an exact engine takes from the formulas' side."""
 
+Value = float | str | tuple[float, ...]
+"""Value of an entry of a model file, in SI and rad."""
+
+
+class ModelEntry(NamedTuple):
+    """One entry of a model file: its value as compiled, and the element and attribute that state it."""
+
+    value: Value
+    element: str = ""
+    """Tag and name, for example `joint "A"`; empty where no single element states it."""
+    attribute: str = ""
+
 
 def find_inertia(bar: Bar) -> float:
     """Return the moment of inertia about G, kg m^2: as stated, or that of a uniform slender bar, m L^2/12."""

@@ -1,168 +1,370 @@
-"""Describe the four-bar of a compiled MJCF under names by which two models can be compared."""
+"""The entries of a four-bar's MJCF that decide its motion and forces: read from a compiled model, set in the generated.
+
+Each entry stands under a name by which two files can be compared, whatever the tree of their bodies, their axes and
+their names. What an entry costs is seen by setting it, alone, in the generated file.
+"""
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 
-from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
-from fourbar_validation.engines.mujoco.attached import (
-    Described,
-    describe_actuators,
-    describe_tendons,
-    read_range,
-    read_row,
-    sum_damping_of_drive,
-)
-from fourbar_validation.engines.mujoco.model_fields import COUNTED, FLAGS, PIN, list_members, list_of
-from fourbar_validation.engines.mujoco.topology import ENDS, Topology
+from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS
+from fourbar_validation.compare.answer import Array
+from fourbar_validation.engines.description import ModelEntry, Value
+from fourbar_validation.engines.mujoco.topology import Topology
 
-NOT_HERE = ("opt", "stat", "vis")
-ENUMERATIONS = {"integrator": ("mjtIntegrator", "mjINT_"), "solver": ("mjtSolver", "mjSOL_")}
+Described = dict[str, ModelEntry]
+NONE = "none"
+
+PIN = {
+    "damping": ("dof_damping", "damping", "damper"),
+    "friction": ("dof_frictionloss", "frictionloss", "frictionloss"),
+    "stiffness": ("jnt_stiffness", "stiffness", "spring"),
+    "armature": ("dof_armature", "armature", ""),
+}
+"""Property of a pin: field of MjModel, attribute of its joint, and the flag that switches it off."""
+FRICTION = {"dof_solref": "solreffriction", "dof_solimp": "solimpfriction"}
+"""How dry friction yields: field of MjModel and attribute; compared where there is any."""
+TENDON = {
+    "stiffness": "stiffness",
+    "damping": "damping",
+    "frictionloss": "frictionloss",
+    "solref_fri": "solreffriction",
+    "solimp_fri": "solimpfriction",
+}
 OPTIONS = (
-    *("timestep", "integrator", "solver", "tolerance", "iterations", "ls_tolerance", "ls_iterations"),
-    *("noslip_tolerance", "noslip_iterations", "density", "viscosity", "wind", "sleep_tolerance"),
+    *("timestep", "integrator", "solver", "tolerance", "iterations", "ls_iterations", "noslip_iterations"),
+    *("density", "viscosity", "wind"),
 )
+KINDS = {"integrator": mujoco.mjtIntegrator, "solver": mujoco.mjtSolver}
+WORDS = {"EULER": "Euler", "IMPLICIT": "implicit", "IMPLICITFAST": "implicitfast", "NEWTON": "Newton"}
+"""Integrators and solvers as MJCF spells them, where MuJoCo spells them otherwise."""
+SOFTEST, STIFFEST = 1e-4, 0.9999
+"""Impedances between which MuJoCo keeps that of a constraint."""
 
 
 def describe_model(topology: Topology) -> Described:
-    """Lengths, masses, pins, closure, drive and options as compiled; numbers in SI and rad."""
+    """Describe lengths, masses, pins, gravity, closure, loads, tendons and options, as compiled."""
     model = topology.model
-    result: Described = {"plane": topology.plane}
+    described = {"plane": ModelEntry(topology.plane)}
     for bar, name in BAR_NAMES.items():
-        result[f"lengths.{name}"] = topology.length(bar)
-    result["lengths.ground_angle"] = topology.ground_angle
+        described[f"lengths.{name}"] = ModelEntry(topology.length(bar))
+    described["lengths.ground_angle"] = ModelEntry(topology.ground_angle)
     for bar in MOVING_BARS:
-        result |= _describe_bar(topology, bar)
-    gravity = model.opt.gravity * _is_on(model, "GRAVITY")
-    result["gravity.x"], result["gravity.y"] = (float(g) for g in topology.in_plane(gravity))
-    result["gravity.across"] = float(gravity @ topology.normal)
-    for pin, joint in sorted(topology.hinge.items()):
-        result |= _pin(topology, pin, joint)
-    result |= _describe_closure(topology)
-    result |= _describe_options(model)
-    result |= describe_actuators(topology) | describe_tendons(topology)
-    others = [
-        model.equality(i).name or f"(unnamed {i})"
-        for i in range(model.neq)
-        if i != topology.closure and model.eq_active0[i]
-    ]
-    result["other equalities"] = ", ".join(others) or "none"
-    result |= {f"others.{name}": float(getattr(model, field, 0)) for field, name in COUNTED.items()}
-    for thing in (model, model.opt, model.stat):
-        for field in list_members(thing):
-            if field not in NOT_HERE and list_of(field) is None:
-                result[f"unknown.{field}"] = np.array2string(np.asarray(getattr(thing, field)), threshold=2**10)
-    return result
+        described |= _describe_bar(topology, bar)
+    gravity = model.opt.gravity * _is_on(model, "gravity")
+    for axis, size in zip("xy", topology.in_plane(gravity), strict=True):
+        described[f"gravity.{axis}"] = ModelEntry(float(size), "option", "gravity")
+    described["gravity.across"] = ModelEntry(float(gravity @ topology.normal), "option", "gravity")
+    for pin in PINS:
+        described |= _describe_pin(topology, pin)
+    described |= _describe_closure(topology) | _describe_loads(topology) | _describe_tendons(topology)
+    for name in OPTIONS:
+        setting = getattr(model.opt, name)
+        kind = KINDS[name](setting).name.partition("_")[2] if name in KINDS else ""
+        described[f"option.{name}"] = ModelEntry(WORDS.get(kind, kind) or _read_numbers(setting), "option", name)
+    touching = model.npair or (model.geom_contype.any() and model.geom_conaffinity.any())
+    described["contacts"] = ModelEntry("possible" if touching and _is_on(model, "contact") else "off")
+    return described
 
 
-def find_element(topology: Topology) -> dict[str, str]:
-    """Part of a key: the element of the user's file that it is of."""
-    model = topology.model
-
-    def element(word: str, name: str, number: int) -> str:
-        return f'{word} "{name}"' if name else f"{word} {number} (unnamed)"
-
-    result = {f"bars.{BAR_NAMES[bar]}": f'body "{model.body(topology.root[bar]).name}"' for bar in MOVING_BARS}
-    for pin, joint in topology.hinge.items():
-        result[f"pins.{pin}"] = element("joint", model.joint(joint).name, joint)
-    if topology.closure is not None:
-        number = topology.closure
-        result["closure"] = element(topology.closed_by.partition(" ")[0], model.equality(number).name, number)
-    for i in range(len(model.actuator_trntype)):
-        result[f"actuators.{i}"] = element("actuator", model.actuator(i).name, i)
-    return result | {f"tendons.{i}": element("tendon", model.tendon(i).name, i) for i in range(model.ntendon)}
+def _is_on(model: mujoco.MjModel, *flags: str) -> bool:
+    """Return whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
+    bits = (int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)) for flag in flags)
+    return not any(model.opt.disableflags & bit for bit in bits)
 
 
-def _is_on(model: mujoco.MjModel, *features: str) -> bool:
-    """Tell whether no flag switches a feature off; a flag that this MuJoCo does not have switches nothing."""
-    flags = mujoco.mjtDisableBit
-    return not any(model.opt.disableflags & getattr(flags, f"mjDSBL_{name}", 0) for name in features)
+def _read_numbers(entry: object) -> Value:
+    return float(entry) if np.ndim(entry) == 0 else tuple(np.asarray(entry, dtype=float).tolist())  # type: ignore[arg-type]
+
+
+def _name_element(tag: str, name: str, number: int) -> str:
+    return f'{tag} "{name}"' if name else f"{tag} {number} (unnamed)"
 
 
 def _describe_bar(topology: Topology, bar: int) -> Described:
-    """Mass, mass centre from the first pin, and inertia about it, of a body and all that is welded to it."""
+    """Describe mass, inertia about the mass centre, and its place from the first pin, with all that is welded to it."""
     model, data = topology.model, topology.data
     parts = np.flatnonzero(model.body_weldid == topology.root[bar])
     masses = model.body_mass[parts]
     mass = float(masses.sum())
-    at = np.array([topology.in_plane(data.xipos[part]) for part in parts])
-    centre = masses @ at / mass if mass else at[0]
+    places = np.array([topology.in_plane(data.xipos[part]) for part in parts])
+    centre = masses @ places / mass if mass else places[0]
     inertia = 0.0
-    for part, m, x in zip(parts, masses, at, strict=True):
+    for part, part_mass, place in zip(parts, masses, places, strict=True):
         across = data.ximat[part].reshape(3, 3).T @ topology.normal
-        inertia += float(across**2 @ model.body_inertia[part] + m * (x - centre) @ (x - centre))
+        inertia += float(across**2 @ model.body_inertia[part] + part_mass * (place - centre) @ (place - centre))
     arm = centre - topology.in_plane(topology.world(data, bar, FIRST_PIN[bar]))
     x, y = topology.line(data, bar)
-    key = f"bars.{BAR_NAMES[bar]}"
     angle = math.remainder(math.atan2(arm[1], arm[0]) - math.atan2(y, x), math.tau) if arm.any() else 0.0
-    where = {f"{key}.centre.distance": math.hypot(*arm), f"{key}.centre.angle": angle}
-    held = float(masses @ model.body_gravcomp[parts]) / mass if mass else 0.0
-    return {f"{key}.mass": mass, f"{key}.inertia": inertia, **where, f"{key}.gravcomp": held}
+    key, element = f"bars.{BAR_NAMES[bar]}", f'body "{model.body(topology.root[bar]).name}"'
+    values = {"mass": mass, "inertia": inertia, "centre.distance": math.hypot(*arm), "centre.angle": angle}
+    return {f"{key}.{name}": ModelEntry(value, element, "inertial") for name, value in values.items()}
 
 
-def _pin(topology: Topology, pin: str, joint: int) -> Described:
-    model = topology.model
-    dof = model.jnt_dofadr[joint]
-    spring, damper = (float(_is_on(model, name, "PASSIVE")) for name in ("SPRING", "DAMPER"))
-    key = f"pins.{pin}"
-    result: Described = {
-        f"{key}.damping": damper * float(model.dof_damping[dof]),
-        f"{key}.friction": float(model.dof_frictionloss[dof]) * _is_on(model, "FRICTIONLOSS"),
-        f"{key}.stiffness": spring * float(model.jnt_stiffness[joint]),
-        f"{key}.armature": float(model.dof_armature[dof]),
-        f"{key}.positive": "counter-clockwise" if topology.sense[pin] > 0 else "clockwise",
-    }
-    address = model.jnt_qposadr[joint]
-    turned = topology.sense[pin] * float(model.qpos_spring[address] - model.qpos0[address])
-    result[f"{key}.spring angle"] = topology.rest_angle(pin) + turned
-    for field, name in PIN.items():
-        result |= read_row(model, field, dof if field.startswith("dof") else joint, f"{key}.{name}")
-    for field in ("jnt_range", "jnt_actfrcrange"):
-        result |= read_range(model, field, joint, key, switched_on=field != "jnt_range" or _is_on(model, "LIMIT"))
-    return result | sum_damping_of_drive(topology, pin)
+def _describe_pin(topology: Topology, pin: str) -> Described:
+    """Describe what acts at a pin; nothing acts where the loop is cut."""
+    model, key = topology.model, f"pins.{pin}"
+    joint = topology.hinge.get(pin)
+    if joint is None:
+        return {f"{key}.{name}": ModelEntry(0.0) for name in PIN} | {f"{key}.range": ModelEntry("free")}
+    dof, element = int(model.jnt_dofadr[joint]), _name_element("joint", model.joint(joint).name, joint)
+    described = {}
+    for name, (field, attribute, flag) in PIN.items():
+        size = float(getattr(model, field)[joint if field.startswith("jnt") else dof])
+        acts = not flag or _is_on(model, flag, *(("passive",) if flag in ("spring", "damper") else ()))
+        described[f"{key}.{name}"] = ModelEntry(size * acts, element, attribute)
+    if described[f"{key}.friction"].value:
+        for field, attribute in FRICTION.items():
+            described[f"{key}.{attribute}"] = ModelEntry(_read_numbers(getattr(model, field)[dof]), element, attribute)
+    if described[f"{key}.stiffness"].value:
+        address = model.jnt_qposadr[joint]
+        turned = topology.sense[pin] * float(model.qpos_spring[address] - model.qpos0[address])
+        described[f"{key}.spring angle"] = ModelEntry(topology.rest_angle(pin) + turned, element, "springref")
+    limited = model.jnt_limited[joint] and _is_on(model, "limit")
+    described[f"{key}.range"] = ModelEntry(
+        _read_numbers(model.jnt_range[joint]) if limited else "free", element, "range"
+    )
+    sense = "counter-clockwise" if topology.sense[pin] > 0 else "clockwise"
+    return described | {f"{key}.positive": ModelEntry(sense, element, "axis")}
 
 
 def _describe_closure(topology: Topology) -> Described:
     model, number = topology.model, topology.closure
-    result: Described = {"closure.pin": topology.cut, "closure.by": topology.closed_by}
-    first, second = (bar for bar, ends in ENDS.items() if topology.cut in ends)
-    gap = topology.world(topology.data, first, topology.cut) - topology.world(topology.data, second, topology.cut)
-    result["closure.out of plane"] = abs(float(gap @ topology.normal))
+    described = {"closure.pin": ModelEntry(topology.cut), "closure.by": ModelEntry(topology.closed_by)}
+    ends = [topology.world(topology.data, bar, topology.cut) for bar in PINS[topology.cut]]
+    described["closure.out of plane"] = ModelEntry(abs(float((ends[0] - ends[1]) @ topology.normal)))
+    others = [i for i in range(model.neq) if i != number and model.eq_active0[i]]
+    names = [model.equality(i).name or f"(unnamed {i})" for i in others]
+    described["other equalities"] = ModelEntry(", ".join(names) or NONE)
     if number is None:
-        return result
-    bodies = (model.eq_obj1id[number], model.eq_obj2id[number])
+        return described
+    element = _name_element(topology.closed_by.partition(" ")[0], model.equality(number).name, number)
+    impedance = float(np.clip(model.eq_solimp[number, 0], SOFTEST, STIFFEST))
+    softness = (1.0 - impedance) / impedance * _sum_inverse_weights(topology, number)
+    described["closure.solref"] = ModelEntry(_read_numbers(model.eq_solref[number]), element, "solref")
+    described["closure.solimp"] = ModelEntry(_read_numbers(model.eq_solimp[number]), element, "solimp")
+    return described | {"closure.softness": ModelEntry(softness, element, "solimp")}
+
+
+def _sum_inverse_weights(topology: Topology, number: int) -> float:
+    """Sum MuJoCo's inverse weights of the two bodies that an equality joins, 1/kg."""
+    model = topology.model
+    bodies = [int(model.eq_obj1id[number]), int(model.eq_obj2id[number])]
     if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
-        bodies = tuple(model.site_bodyid[list(bodies)])
-    first_d, last_d, *opening = (float(x) for x in model.eq_solimp[number])
-    impedance = float(np.clip(first_d, 1e-4, 0.9999))
-    softness = (1.0 - impedance) / impedance * float(model.body_invweight0[list(bodies), 0].sum())
-    names = ("time constant", "damping ratio")
-    result |= {f"closure.{name}": float(x) for name, x in zip(names, model.eq_solref[number], strict=True)}
-    result["closure.impedance"], result["closure.softness"] = impedance, softness
-    result["closure.impedance when open"] = "the same" if first_d == last_d else (last_d, *opening)
-    return result
+        bodies = [int(model.site_bodyid[site]) for site in bodies]
+    return float(model.body_invweight0[bodies, 0].sum())
 
 
-def _describe_options(model: mujoco.MjModel) -> Described:
-    option = model.opt
-    result: Described = {}
-    for name in OPTIONS:
-        kept: Any = getattr(option, name, None)
-        if name in ENUMERATIONS:
-            kind, prefix = ENUMERATIONS[name]
-            result[f"option.{name}"] = getattr(mujoco, kind)(kept).name.removeprefix(prefix)
-        elif kept is not None:
-            result[f"option.{name}"] = float(kept) if np.ndim(kept) == 0 else tuple(map(float, kept))
-    result["option.meaninertia"] = float(model.stat.meaninertia)
-    for state, flags, prefix in (("off", mujoco.mjtDisableBit, "mjDSBL_"), ("on", mujoco.mjtEnableBit, "mjENBL_")):
-        bits = getattr(option, "disableflags" if state == "off" else "enableflags")
-        names = [name for name in flags.__members__ if name.startswith(prefix)]
-        named = [name.removeprefix(prefix) for name in names if bits & int(flags.__members__[name])]
-        names = [name.lower() for name in named if name not in FLAGS]
-        result[f"option.switched {state}"] = ", ".join(names) or "nothing that matters here"
-    groups = [str(group) for group in range(31) if option.disableactuator >> group & 1]
-    result["option.actuatorgroupdisable"] = " ".join(groups) or "none"
-    possible = _is_on(model, "CONTACT") and (model.npair or (model.geom_contype.any() and model.geom_conaffinity.any()))
-    return result | {"contacts": "possible" if possible else "off"}
+def _describe_loads(topology: Topology) -> Described:
+    """Describe what actuators exert with a control of 0: at sites the sum on each bar, at hinges the couple.
+
+    Forces that keep their axes add up to one force, one couple, and the first moments r x F and r . F about the bar's
+    first pin, which tell where the force acts. The drive is taken off, and is no load.
+    """
+    model, data = topology.model, topology.data
+    sums: dict[str, Array] = {}
+    described: Described = {}
+    for i in sorted({*range(model.nu)} - {*topology.drives()} - {*topology.cylinders()}):
+        number, frame = (int(index) for index in model.actuator_trnid[i])
+        gear, bias, kind = model.actuator_gear[i], model.actuator_biasprm[i, :3], model.actuator_trntype[i]
+        element = _name_element("actuator", model.actuator(i).name, i)
+        if kind == mujoco.mjtTrn.mjTRN_JOINT:
+            pin = next(pin for pin, joint in topology.hinge.items() if joint == number)
+            described[f"pins.{pin}.motor"] = ModelEntry(_read_numbers(topology.sense[pin] * gear[0] * bias), element)
+        elif kind == mujoco.mjtTrn.mjTRN_TENDON:
+            described[f"{_name_tendon(topology, number)}.tension"] = ModelEntry(_read_numbers(gear[0] * bias), element)
+        elif kind == mujoco.mjtTrn.mjTRN_SITE and (bar := topology.bar(model.site_bodyid[number])) in MOVING_BARS:
+            bearer = topology.bar(model.site_bodyid[frame if frame >= 0 else number]) or 1
+            axes = data.site_xmat[frame if frame >= 0 else number].reshape(3, 3)
+            force, couple = (axes @ part * bias[0] for part in (gear[:3], gear[3:]))
+            turns = bearer in MOVING_BARS
+            fx, fy = topology.turned_back(bearer, force) if turns else topology.in_plane(force)
+            x, y = topology.along_bar(bar, data.site_xpos[number])
+            key = f"loads.{BAR_NAMES[bar]}, {f'axes of the {BAR_NAMES[bearer]}' if turns else 'world axes'}"
+            load = (fx, fy, float(couple @ topology.normal), x * fy - y * fx, x * fx + y * fy)
+            sums[key] = sums.get(key, np.zeros(5)) + load
+        else:
+            described[f"actuators.{model.actuator(i).name or i}"] = ModelEntry("acts on no pin, bar or tendon", element)
+    for key, (fx, fy, couple, turning, along) in sums.items():
+        squared = fx * fx + fy * fy
+        at = ((fx * along + fy * turning) / squared, (fy * along - fx * turning) / squared) if squared else (0.0, 0.0)
+        described[f"{key}.force"] = ModelEntry((float(fx), float(fy)))
+        described[f"{key}.point"] = ModelEntry((float(at[0]), float(at[1])))
+        described[f"{key}.couple"] = ModelEntry(float(couple) if squared else float(couple + turning))
+    return described
+
+
+def _name_tendon(topology: Topology, number: int) -> str:
+    """Name a tendon by the pins that it runs over, or by the bars that it runs between."""
+    model, joints = topology.model, {joint: pin for pin, joint in topology.hinge.items()}
+    parts = []
+    for wrap in range(model.tendon_adr[number], model.tendon_adr[number] + model.tendon_num[number]):
+        kind, index = mujoco.mjtWrap(model.wrap_type[wrap]), int(model.wrap_objid[wrap])
+        if kind == mujoco.mjtWrap.mjWRAP_JOINT:
+            parts.append(joints[index])
+        elif kind == mujoco.mjtWrap.mjWRAP_SITE:
+            bar = topology.bar(model.site_bodyid[index])
+            parts.append("no bar" if bar is None else BAR_NAMES[bar])
+        else:
+            parts.append(kind.name.removeprefix("mjWRAP_").lower())
+    return f"tendons.{' '.join(sorted(parts))}"
+
+
+def _describe_tendons(topology: Topology) -> Described:
+    """Describe every tendon: its path, and what it does. Their paths tell several between the same bars apart."""
+    model, data, tendons = topology.model, topology.data, list[tuple[str, tuple[float, ...], int]]()
+    rest: dict[int, float] = {}
+    for i in range(model.ntendon):
+        path = []
+        for wrap in range(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i]):
+            index = int(model.wrap_objid[wrap])
+            if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT:
+                pin = next(pin for pin, joint in topology.hinge.items() if joint == index)
+                coefficient = topology.sense[pin] * float(model.wrap_prm[wrap])
+                path.append((pin, coefficient))
+                rest[i] = rest.get(i, -float(model.tendon_length0[i])) + coefficient * topology.rest_angle(pin)
+            elif model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_SITE:
+                bar = topology.bar(model.site_bodyid[index])
+                path.append((str(bar), *(() if bar is None else topology.along_bar(bar, data.site_xpos[index]))))
+        numbers = tuple(number for _, *place in sorted(path) for number in place)
+        tendons.append((_name_tendon(topology, i), numbers, i))
+    described: Described = {}
+    for name, numbers, i in sorted(tendons):
+        key = next(key for key in (name, *(f"{name} ({n})" for n in range(2, 99))) if key not in described)
+        element = _name_element("tendon", model.tendon(i).name, i)
+        described[key] = ModelEntry("present", element)
+        described[f"{key}.path"] = ModelEntry(numbers, element)
+        for attribute, written in TENDON.items():
+            described[f"{key}.{written}"] = ModelEntry(
+                _read_numbers(getattr(model, f"tendon_{attribute}")[i]), element, written
+            )
+        if model.tendon_stiffness[i]:
+            end = ".springlength angle" if i in rest else ".springlength"
+            lengths = tuple(float(length) + rest.get(i, 0.0) for length in model.tendon_lengthspring[i])
+            described[key + end] = ModelEntry(lengths, element, "springlength")
+        if not model.tendon_frictionloss[i]:
+            del described[f"{key}.solreffriction"], described[f"{key}.solimpfriction"]
+    return described
+
+
+def set_entry(text: str, generated: Mapping[str, ModelEntry], key: str, value: Value | None) -> str | None:
+    """Set one entry of the generated file, all others as they are; None where it cannot be set alone.
+
+    `generated`: its description. `value`: None for what is not there.
+    """
+    root = ET.fromstring(text)
+    subject, _, rest = key.partition(".")
+    try:
+        if subject == "lengths":
+            _set_length(root, generated, rest, float(value))  # type: ignore[arg-type]
+        elif subject == "bars":
+            bar, _, name = rest.partition(".")
+            _set_inertial(root, generated, bar, name, float(value))  # type: ignore[arg-type]
+        elif subject == "loads":
+            load, _, name = rest.rpartition(".")
+            _set_load(root, generated, load, name, value)
+        elif key == "closure.softness":
+            _set_softness(root, generated[key], float(value))  # type: ignore[arg-type]
+        elif value is None:
+            _find(root, generated[key].element).clear()
+        else:
+            _set_attribute(root, generated[key], key, value)
+    except (KeyError, TypeError, ValueError):  # an entry of another kind, or of an element that is not there
+        return None
+    return ET.tostring(root, encoding="unicode")
+
+
+def _find(root: ET.Element, element: str) -> ET.Element:
+    """Find an element of the generated file by tag and name; KeyError where there is none."""
+    tag, _, name = element.partition(" ")
+    tags = {"tendon": ("fixed", "spatial"), "actuator": ("general",)}.get(tag, (tag,))
+    for each_tag in tags:
+        for candidate in root.iter(each_tag):
+            if not name or candidate.get("name") == name.strip('"'):
+                return candidate
+    raise KeyError(element)
+
+
+def _set_attribute(root: ET.Element, entry: ModelEntry, key: str, value: Value) -> None:
+    """Set the attribute that states an entry; a pin's flag is taken off, so that the entry acts."""
+    element = _find(root, entry.element)
+    if not entry.attribute or entry.attribute == "axis":
+        raise KeyError(key)
+    if entry.attribute == "gravity":
+        field = [float(number) for number in element.attrib["gravity"].split()]
+        field["xy".find(key[-1]) if key[-1] in "xy" else 2] = float(value)  # type: ignore[arg-type]
+        value = tuple(field)
+    elif entry.attribute in ("springref", "springlength"):  # described from the bars' lines
+        stated, described = float(element.attrib[entry.attribute]), np.atleast_1d(entry.value)[0]
+        value = stated + float(np.atleast_1d(value)[0]) - float(described)
+    element.set(entry.attribute, _write_value(value))
+    flags = {"range": "limit"} | {attribute: flag for _, attribute, flag in PIN.values()}
+    if (flag := flags.get(entry.attribute)) and (switches := root.find("option/flag")) is not None:
+        switches.attrib.pop(flag, None)
+
+
+def _write_value(value: Value) -> str:
+    if isinstance(value, str):
+        return value
+    numbers = value if isinstance(value, tuple) else (value,)
+    return " ".join(repr(int(number)) if number == int(number) else repr(number) for number in numbers)
+
+
+def _set_length(root: ET.Element, generated: Mapping[str, ModelEntry], bar: str, value: float) -> None:
+    """Move the pin at the end of a bar along its line; the ground's is that of the output."""
+    if bar in ("ground", "ground_angle"):
+        length, angle = (float(generated[f"lengths.{name}"].value) for name in ("ground", "ground_angle"))  # type: ignore[arg-type]
+        length, angle = (value, angle) if bar == "ground" else (length, value)
+        place = (length * math.cos(angle), length * math.sin(angle), 0.0)
+        _find(root, 'body "output"').set("pos", _write_value(place))
+    else:
+        element = {"input": 'body "coupler"', "coupler": 'site "B3"', "output": 'site "B4"'}[bar]
+        _find(root, element).set("pos", _write_value((value, 0.0, 0.0)))
+
+
+def _set_inertial(root: ET.Element, generated: Mapping[str, ModelEntry], bar: str, name: str, value: float) -> None:
+    """Set mass, inertia or mass centre of a bar, the others kept."""
+    inertial = _find(root, f'body "{bar}"').find("inertial")
+    if inertial is None:
+        raise KeyError(bar)
+    if name == "mass":
+        inertial.set("mass", repr(value))
+    elif name == "inertia":
+        inertial.set("diaginertia", _write_value((value, value, value)))
+    else:
+        polar = {part: float(generated[f"bars.{bar}.{part}"].value) for part in ("centre.distance", "centre.angle")}  # type: ignore[arg-type]
+        distance, angle = (polar | {name: value}).values()
+        inertial.set("pos", _write_value((distance * math.cos(angle), distance * math.sin(angle), 0.0)))
+
+
+def _set_softness(root: ET.Element, entry: ModelEntry, value: float) -> None:
+    """Set the impedance at which the closure yields so much."""
+    closure = _find(root, entry.element)
+    first, *opening = closure.attrib["solimp"].split()
+    weights = float(entry.value) * float(first) / (1.0 - float(first))  # type: ignore[arg-type]
+    impedance = repr(1.0 / (1.0 + value / weights))
+    closure.set("solimp", " ".join((impedance, impedance, *opening[1:])))
+
+
+def _set_load(root: ET.Element, generated: Mapping[str, ModelEntry], key: str, name: str, value: Value | None) -> None:
+    """Add what a load lacks of another: the sum of the two is the load with this one entry, the others kept."""
+    bar, axes = key.split(", ")
+    if axes not in ("world axes", f"axes of the {bar}"):
+        raise KeyError(axes)
+    load = {part: generated.get(f"loads.{key}.{part}") for part in ("force", "point", "couple")}
+    was = {part: np.atleast_1d((0.0, 0.0, 0.0) if entry is None else entry.value) for part, entry in load.items()}
+    wanted = was | {name: np.atleast_1d(0.0 if value is None else value)}
+    body, actuators = _find(root, f'body "{bar}"'), ET.SubElement(root, "actuator")
+    for number, (parts, sign) in enumerate(((was, -1.0), (wanted, 1.0))):
+        (fx, fy), (x, y) = (np.resize(parts[part], 2) * 1.0 for part in ("force", "point"))
+        ET.SubElement(body, "site", name=f"changed_{number}", pos=_write_value((float(x), float(y), 0.0)))
+        gear = sign * np.array((fx, fy, 0.0, 0.0, 0.0, parts["couple"][0]))
+        frame = {"refsite": "O2"} if axes == "world axes" else {}
+        ET.SubElement(
+            actuators, "general", frame, site=f"changed_{number}", name=f"changed_{number}", gaintype="fixed",
+            gainprm="0", biastype="affine", biasprm="1 0 0", gear=_write_value(tuple(gear.tolist())),
+        )  # fmt: skip

@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import mujoco
 import numpy as np
@@ -19,17 +20,14 @@ from fourbar.linkage import PINS
 from fourbar.mjcf import choose_run, size_flywheel, write_mjcf
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.engines.description import list_unknowns, name_driving
+from fourbar_validation.engines.description import Value, list_unknowns, name_driving
 from fourbar_validation.engines.loaded import Assembled, Values
 from fourbar_validation.engines.loop import MADE, Angles, Assembler, make_blank, read_each, split_answer
-from fourbar_validation.engines.mujoco.attached import Described, Value
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, load_force, solve_couple
-from fourbar_validation.engines.mujoco.corrections import correct
-from fourbar_validation.engines.mujoco.describe import describe_model, find_element
-from fourbar_validation.engines.mujoco.guess import find_topology
+from fourbar_validation.engines.mujoco.describe import Described, describe_model, set_entry
 from fourbar_validation.engines.mujoco.motions import order_in_time
 from fourbar_validation.engines.mujoco.runner import Stepper, find_assembled, split_segments
-from fourbar_validation.engines.mujoco.topology import Topology
+from fourbar_validation.engines.mujoco.topology import Topology, find_topology
 from fourbar_validation.engines.tree import solve_closed
 
 ONE_STATE, THROUGH_TIME = "mjcf-one-state", "mjcf-simulated"
@@ -37,8 +35,8 @@ POSITIONS = 37
 """Positions taken of a sweep: a file is judged as a whole, not position by position."""
 MOST_STEPS = 400_000
 """A revolution at 628 steps per turn is a thousandth of this; more would be minutes."""
-CORRECTING = 60.0
-"""Seconds in which entries are corrected one by one; each takes two evaluations."""
+PRICING = 60.0
+"""Seconds in which differences are tried one by one; each takes two evaluations."""
 REFINEMENTS = 3
 """Secant steps after the first: each gains the digits that the one before has."""
 NO_BIAS = mujoco.mjtBias.mjBIAS_NONE
@@ -53,8 +51,6 @@ class Examined:
     """Results of examining one file."""
 
     described: Described
-    called: dict[str, str]
-    """Part of a key of the description: the element of the file that it is of."""
     answers: list[Answer]
     notes: list[str]
     names: dict[str, str]
@@ -82,32 +78,31 @@ def examine(scene: Scene, text: str | None, names: Mapping[str, str]) -> Examine
     model = compile_text(write_mjcf(scene) if text is None else text)
     topology, guessed = find_topology(model, names, scene.linkage.lengths)
     loop = UserLoop(topology, scene)
-    result = describe_model(topology)
-    for key, value in result.items():
+    described = describe_model(topology)
+    for key, (value, *_) in described.items():
         if key.startswith(("bars.", "lengths.")) and not math.isfinite(value):  # type: ignore[arg-type]
             raise InputError("MJCF", None, f"{key} is beyond the range of doubles: {value}")
     answers = _list_answers(loop, scene)
-    return Examined(result, find_element(topology), answers, [*guessed, *loop.notes], topology.names)
+    return Examined(described, answers, [*guessed, *loop.notes], topology.names)
 
 
-def examine_corrected(
-    scene: Scene, text: str, names: Mapping[str, str], entries: Sequence[tuple[str, Value]]
-) -> list[list[Answer] | None]:
-    """Answer with one entry of a file's description as specified, for each; None where it cannot be set alone.
+def examine_changed(scene: Scene, changes: Sequence[tuple[str, Value | None]]) -> list[list[Answer] | None]:
+    """Answer with the generated file, without a drive, as it is; then with each entry alone changed in it.
 
-    After CORRECTING seconds the rest are not evaluated either.
+    None stands for an entry that cannot be set alone. After PRICING seconds the rest are not evaluated either.
     """
-    topology = Topology(compile_text(text), names)
-    start, result = time.perf_counter(), list[list[Answer] | None]()
-    for key, value in entries:
+    text, start, answered = write_mjcf(scene, drive="none"), time.perf_counter(), list[list[Answer] | None]()
+    generated = describe_model(Topology(compile_text(text), {}))
+    texts = (set_entry(text, generated, key, value) for key, value in changes)
+    for changed in chain([text], texts):
         answers = None
-        if time.perf_counter() - start < CORRECTING and (model := correct(topology, key, value)) is not None:
+        if time.perf_counter() - start < PRICING and changed is not None:
             try:
-                answers = _list_answers(UserLoop(Topology(model, names), scene), scene)
-            except FourBarError:  # the other differences leave no four-bar
+                answers = _list_answers(UserLoop(Topology(compile_text(changed), {}), scene), scene)
+            except FourBarError:  # with this entry it is no four-bar, or does not compile
                 answers = None
-        result.append(answers)
-    return result
+        answered.append(answers)
+    return answered
 
 
 def _list_answers(loop: "UserLoop", scene: Scene) -> list[Answer]:
