@@ -17,12 +17,16 @@ from fourbar.show.animate import collect_live_data
 from fourbar.show.block import write_block
 from fourbar.show.studies import write_type
 from fourbar.show.units import COMMON
-from fourbar.solution import Conversion, Solution
+from fourbar.solution import Conversion
 from fourbar.solve import find_last_stage, solve
 
 
-def evaluate_scene(scene: Scene, plain: dict[str, Any], units: Conversion, *, settled: bool = False) -> dict[str, Any]:
+def evaluate_scene(
+    scene: Scene, plain: dict[str, Any], units: Conversion, *, settled: bool = False, pressure: float | None = None
+) -> dict[str, Any]:
     """Evaluate a scene for the page; `settled`: with error bars and summary, which cost more than the rest.
+
+    `pressure`: of a cylinder, Pa; the summary then has the bore that it needs.
 
     Raises NotAssembledError where no position assembles, InputError as `solve` does.
     """
@@ -36,14 +40,10 @@ def evaluate_scene(scene: Scene, plain: dict[str, Any], units: Conversion, *, se
         "toml": None,
     }
     data["handles"] = [handle.drawn() for handle in list_handles(scene, plain)]
-    if settled:
-        data["summary"] = write_summary(scene, own, units)
+    if settled:  # what `analyze` and `classify` print
+        block = write_block(scene, own, {**COMMON, **units}, pressure=pressure)
+        data["summary"] = [*block, "", *write_type(scene.linkage, everything=True)]
     return data
-
-
-def write_summary(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
-    """Write what `analyze` and `classify` print."""
-    return [*write_block(scene, solution, {**COMMON, **units}), "", *write_type(scene.linkage, everything=True)]
 
 
 def pack_frame(about: dict[str, Any]) -> bytes:

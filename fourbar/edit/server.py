@@ -140,16 +140,20 @@ class Workbench:
 
     async def _settle(self) -> None:
         """Send error bars and summary, unless something has changed again; changes are answered meanwhile."""
-        state, units, names = self.session.now, self.session.units, self.session.unit_names
+        session = self.session
+        state, units, pressure = session.now, session.units, session.pressure
+        chosen = (session.unit_names, session.pressure_text)
 
         def is_present() -> bool:
-            return state is self.session.now and names == self.session.unit_names
+            return state is session.now and chosen == (session.unit_names, session.pressure_text)
 
         def evaluate() -> dict[str, Any] | None:
-            return evaluate_scene(state.scene, state.plain, units, settled=True) if is_present() else None
+            if not is_present():
+                return None
+            return evaluate_scene(state.scene, state.plain, units, settled=True, pressure=pressure)
 
         def describe(data: dict[str, Any]) -> dict[str, Any] | None:
-            return self.session.describe(data, settled=True) if is_present() else None
+            return session.describe(data, settled=True) if is_present() else None
 
         try:
             data = await self.loop.run_in_executor(self.aside, evaluate)

@@ -21,10 +21,11 @@ from fourbar.edit.exports import Exports
 from fourbar.edit.reply import evaluate_scene
 from fourbar.errors import FourBarError, InputError
 from fourbar.files import loads, read_text
+from fourbar.files.fields import Reader
 from fourbar.files.reading import read_bytes
 from fourbar.files.scene_file import LARGEST_FILE
 from fourbar.files.scene_text import BRANCHES, write_new_scene
-from fourbar.linkage import BAR_NAMES
+from fourbar.linkage import BAR_NAMES, POSITIVE
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, require_steps
@@ -78,7 +79,7 @@ class Session:
         self.path, self.exports = Path(os.path.realpath(path)), Exports(exports, path.stem)
         self.state_file = self.path.with_name(self.path.name + ENDING)
         self.token = secrets.token_urlsafe(32)  # of this process alone
-        self.unit_names = AS_THE_FILE
+        self.unit_names, self.pressure_text = AS_THE_FILE, ""
         text = read_text(self.path) if self.path.exists() else write_new_scene(NEW)
         self.disk = self._read_disk()
         self.texts, self.place, self.kept = [text], 0, {"start": text}
@@ -102,6 +103,7 @@ class Session:
             self.reference, self.unit_names, self.disk = str(state["reference"]), str(state["units"]), state["disk"]
             if self.unit_names != AS_THE_FILE:
                 _read_units(self.unit_names)
+            self.pressure_text = _read_pressure(state.get("pressure", ""))
             if self.place < 0 or self.reference not in self.kept:
                 raise ValueError("it names a state that it does not hold")
             self.now = self.read(self.texts[self.place])
@@ -121,7 +123,12 @@ class Session:
         """Write the state file, readable by its owner alone as the scene may be."""
         state = {
             **{"schema": SCHEMA, "disk": self.disk, "texts": self.texts, "place": self.place},
-            **{"kept": self.kept, "reference": self.reference, "units": self.unit_names},
+            **{
+                "kept": self.kept,
+                "reference": self.reference,
+                "units": self.unit_names,
+                "pressure": self.pressure_text,
+            },
         }
         write_bytes(self.state_file, json.dumps(state, ensure_ascii=False).encode(), private=True)
 
@@ -138,6 +145,11 @@ class Session:
         if self.unit_names != AS_THE_FILE:
             return _read_units(self.unit_names)
         return _suit_units(self.now.plain["lengths"]["ground"])
+
+    @property
+    def pressure(self) -> float | None:
+        """Pressure of the cylinder, Pa; None where none is stated."""
+        return to_si(self.pressure_text, "Pa") if self.pressure_text else None
 
     @property
     def fresh(self) -> bool:
@@ -174,6 +186,7 @@ class Session:
             "plain": self.now.plain,
             "text": self.now.text,
             "units": self.unit_names,
+            "pressure": self.pressure_text,
             "undo": self.place > 0,
             "redo": self.place + 1 < len(self.texts),
             "reference": self.reference,
@@ -295,6 +308,17 @@ def _choose_units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
     return {"refer": True}
 
 
+def _read_pressure(text: str) -> str:
+    """Return a pressure as it was typed; InputError where it is none."""
+    if text.strip():
+        Reader("workbench").quantity("pressure", text, "Pa", POSITIVE)
+    return text.strip()
+
+
+def _state_pressure(session: Session, asked: dict[str, Any]) -> None:
+    session.pressure_text = _read_pressure(str(asked["pressure"]))
+
+
 def _command(session: Session, asked: dict[str, Any]) -> None:
     """Command another bar, or the cylinder, over what the present motion covers of it without turning back."""
     place = str(asked["command"])
@@ -407,6 +431,7 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
     "keep": _keep,
     "refer": _refer,
     "units": _choose_units,
+    "pressure": _state_pressure,
     "command": _command,
     "restate": _restate,
     "draw": _draw,

@@ -107,6 +107,8 @@ function show(about, own) {
   if ([fileText, about.text].includes(byId("file-text").value) || own?.request.do === "text") byId("file-text").value = about.text;   // a draft stays
   fileText = about.text;
   showUnits(about.units);
+  byId("pressure").parentElement.hidden = !about.plain.drive?.from;
+  if (document.activeElement !== byId("pressure")) byId("pressure").value = about.pressure;
   byId("undo").disabled = !about.undo; byId("redo").disabled = !about.redo;
   byId("reference").replaceChildren(...about.kept.map(name => new Option(name, name, false, name === about.reference)));
   document.querySelector("h1").textContent = document.title = about.plain.title || "Four-bar linkage";
@@ -186,6 +188,7 @@ byId("units").addEventListener("change", event => {
   byId("unit-list").focus();
 });
 byId("unit-list").addEventListener("change", event => ask({ do: "units", units: event.target.value }));
+byId("pressure").addEventListener("change", event => ask({ do: "pressure", pressure: event.target.value }));
 byId("sketch").addEventListener("click", beginSketch);
 byId("every").addEventListener("change", showPositions);
 byId("table-of").addEventListener("toggle", showPositions);

@@ -397,6 +397,9 @@ def test_a_session_goes_on_where_it_stopped(session: Session) -> None:
     session.do({"do": "set", "path": ["lengths", "input"], "value": "105 mm"})
     session.do({"do": "keep"})
     session.do({"do": "set", "path": ["lengths", "input"], "value": "110 mm"})
+    for wrong in ("210", "-1 bar", "3 mm"):
+        assert "pressure" in session.do({"do": "pressure", "pressure": wrong})["refused"] and session.pressure is None
+    session.do({"do": "pressure", "pressure": " 210 bar "})
     session.end(gone=True)
     if os.name == "posix":
         assert session.state_file.stat().st_mode & 0o077 == 0  # the scene may be its owner's alone
@@ -404,6 +407,7 @@ def test_a_session_goes_on_where_it_stopped(session: Session) -> None:
     assert (again.now.text, again.kept) == (session.now.text, session.kept)
     assert again.token != session.token and session.token not in session.state_file.read_text()
     assert again.compared()["compared"] == "state 1"
+    assert again.pressure == pytest.approx(210e5) and again.answer()["pressure"] == "210 bar"
     assert '"105 mm"' in again.do({"do": "undo"})["text"]
     again.do({"do": "save"})
     again.end(gone=True)
@@ -420,6 +424,7 @@ DAMAGES = {
     "a place before": lambda state: state.replace('"place": 1', '"place": -1'),
     "no texts": lambda state: state.replace('"texts": [', '"texts": 3, "others": ['),
     "no scene": lambda state: state.replace("[lengths]", "[length]"),
+    "a pressure of nothing": lambda state: state.replace('"pressure": ""', '"pressure": "3 mm"'),
     "units of nothing": lambda state: state.replace('"units": "as the file"', '"units": "parsec"'),
     "a reference to nothing": lambda state: state.replace('"reference": "start"', '"reference": "state 7"'),
     "kept is a list": lambda state: state.replace('"kept": {', '"kept": [], "others": {'),

@@ -105,6 +105,9 @@ UNITS: dict[str, tuple[str, Fraction | int]] = {
     **dict.fromkeys(("watt", "W"), ("kg m^2/s^3", 1)),
     **dict.fromkeys(("horsepower", "hp"), ("W", 550 * FOOT * POUND * GRAVITY)),
     **dict.fromkeys(("metric_horsepower", "PS"), ("W", 75 * GRAVITY)),
+    **dict.fromkeys(("pascal", "Pa"), ("N/m^2", 1)),
+    "bar": ("N/m^2", 100_000),
+    "psi": ("N/m^2", POUND * GRAVITY * 144 / FOOT**2),
 }
 """Each unit in SI units: A. Thompson, B. N. Taylor, Guide for the Use of the SI, NIST SP 811 (2008), tables 1 to 8 and
 appendix B.8; slug, hp and PS by their definitions there."""

@@ -22,6 +22,7 @@ LOCATED = 1e-6
 """rad or relative: the top of a parabola through neighbours 0.05 degrees apart leaves the fourth power of that."""
 BENDING = 1e-6
 """Relative, of a largest moment against that of steps of 0.01 degrees: (0.01 deg)^2 times its curvature."""
+PSI = 0.45359237 * 9.80665 / 0.0254**2
 CYLINDER = fourbar.LinearDrive(SpringEnd(1, 0.25, math.radians(-160.0)), SpringEnd(2, 0.09, 0.17))
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 TURN = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, math.tau, 360), 10.0))
@@ -169,6 +170,15 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
     assert "cylinder from bar 1 (ground) to bar 2 (input), 0.2 m/s" in text and "motor" not in text
     right = replace(scene, motion=motion.replace(side="right"))
     assert summarize(right, fourbar.solve(right)).strokes == pytest.approx((0.16, 0.34), abs=1e-6)
+
+
+@pytest.mark.parametrize(("pressure", "pascal"), [("210 bar", 210e5), ("2.5 MPa", 2.5e6), ("3000 psi", 3000.0 * PSI)])
+def test_the_command_line_states_the_bore(pressure: str, pascal: float, capsys: pytest.CaptureFixture[str]) -> None:
+    path = Path(__file__).parents[3] / "models" / "gallery" / "excavator_bucket.toml"
+    assert status(["analyze", str(path), "--pressure", pressure]) == 0
+    force = np.nanmax(fourbar.solve(fourbar.load(path)).drive_force)
+    bore = 1e3 * math.sqrt(4.0 * force / (math.pi * pascal))
+    assert f"  bore     at least {bore:.4g} mm to push" in capsys.readouterr().out
 
 
 def test_units_follow_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
