@@ -86,7 +86,9 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
     stated = {row.quantity for row in check_statements("", scene, engine, engine.answer(scene, command(scene)))}
     of_positions = {q.name for q in QUANTITIES}
     assert set(described) == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE}) - of_positions
-    seen = {row.quantity for file in (results / "results", SHIPPED_RUN) for row in read_columns(file / "results.csv")}
+    shipped = {check.rows.__name__ for check in CHECKS if check.shipped}  # each judges quantities of its own
+    rows = (row for file in (results / "results", SHIPPED_RUN) for row in read_columns(file / "results.csv"))
+    seen = {row.quantity for row in rows if row.engine not in shipped}
     assert stated - {"through"} <= seen <= {*described, *of_positions}
 
 
