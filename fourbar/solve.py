@@ -116,6 +116,9 @@ def solve(
                 found = evaluate(case, block, wanted, names)
                 _store_block(case, found, result, code, part)
     unwrap_angles(result, where.bar)
+    for name, stated in (("stroke", where.stroke), ("stroke_speed", where.stroke_speed)):
+        if stated is not None and name in result:  # as commanded, wherever it has a value
+            result[name][...] = stated + 0.0 * result[name]
     if study is not None:
         study.refuse(result, code)
     solution = make_solution(scene if study is None else study.members(None, 1), where, code, result)
@@ -210,7 +213,7 @@ def _refuse(at: Command) -> None:
     expect("at", at, Command)
     require_bar("at.bar", at.bar)
     named = dict(zip(("angle", "speed", "acceleration", "branch"), (*COMMANDS[at.bar], "branch"), strict=True))
-    named |= {name: name for name in ("stroke", "lever", "stroke_speed") if getattr(at, name) is not None}
+    named |= {name: name for name in ("condition", "stroke", "stroke_speed") if getattr(at, name) is not None}
     for name in (name for name in named if name not in RATES):
         value = getattr(at, name)
         expect(f"at.{named[name]}", value, np.ndarray)

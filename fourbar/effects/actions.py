@@ -41,6 +41,8 @@ class Actions:
         """Resultants of the bars on which any acts, complex, N."""
         self.moments: dict[int, Any] = {}
         """Moments about the first pins O2, A, O4, N m, without the couples between two bars."""
+        self.on_coupler: list[tuple[Any, Any, Any, Any]] = []
+        """Forces on the coupler, where they act from pin B (in the bar's frame, and beyond, world axes); moments."""
         self.couples: dict[str, Any] = {}
         """Couples between the two bars that meet at a pin, on the second of them, N m."""
         self.through: dict[str, Any] = {}
@@ -52,19 +54,30 @@ class Actions:
             term.act(self, self.state)
         return self
 
-    def force(self, bar: int, force: Number, arm: Number = 0.0j) -> None:
+    def force(self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = 0.0j) -> None:
         """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.
 
-        `arm`: from the bar's first pin to where it acts, complex, m, world axes.
+        Parameters
+        ----------
+        point : of the bar's frame at its first pin, complex, m.
+        beyond : vector from there to where the force acts, complex, m, world axes.
         """
         if bar != 1:
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
-            self.moment(bar, cross(-force, arm))
+            self.twist(bar, cross(-force, point * self.state.direction(bar) + beyond))
+            if bar == 3:
+                self.on_coupler.append((force, point - self.state.lengths.b, beyond, 0.0))
 
     def moment(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar, N m; on the ground it does nothing."""
         if bar != 1:
-            self.moments[bar] = self.moments[bar] + moment if bar in self.moments else moment
+            self.twist(bar, moment)
+            if bar == 3:
+                self.on_coupler.append((0.0j, 0.0j, 0.0j, moment))
+
+    def twist(self, bar: int, moment: Number) -> None:
+        """Add a moment about a bar's first pin."""
+        self.moments[bar] = self.moments[bar] + moment if bar in self.moments else moment
 
     def couple(self, pin: str, couple: Number) -> None:
         """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
@@ -93,7 +106,7 @@ class Actions:
     def pull_ends(self, start: Any, end: Any, force: Number) -> None:
         """Add the two forces where they act."""
         for point, sense in ((start, 1.0), (end, -1.0)):
-            self.force(point.bar, sense * force, point.arm(self.state))
+            self.force(point.bar, sense * force, point.of(self.state))
 
     def plus(self, unit: "Actions", size: Number) -> "Actions":
         """Make the sum of these and of what a drive of a size does that does `unit` per newton."""
@@ -103,6 +116,8 @@ class Actions:
             for key, of_one in getattr(unit, name).items():
                 sums[key] = sums.get(key, 0.0) + size * of_one
             setattr(whole, name, sums)
+        scaled = [(size * force, point, beyond, size * moment) for force, point, beyond, moment in unit.on_coupler]
+        whole.on_coupler = self.on_coupler + scaled
         return whole
 
     def work(self) -> tuple[Number, Number]:
@@ -123,11 +138,11 @@ class Actions:
         return total, others
 
     def about_B(self) -> Number:
-        """Moment on the coupler about pin B, N m."""
-        lengths, moment = self.state.lengths, self.moments.get(3, 0.0)
-        if 3 in self.forces:
-            moment = moment - lengths.b * cross(self.state.at.u3, self.forces[3])
-        return moment + self.couples.get("A", 0.0) - self.couples.get("B", 0.0)
+        """Compute the moment on the coupler about pin B, N m, which is small where forces act near B."""
+        total = self.couples.get("A", 0.0) - self.couples.get("B", 0.0)
+        for force, point, beyond, moment in self.on_coupler:
+            total = total + moment + cross(-force, point * self.state.at.u3 + beyond)
+        return total
 
     def sense(self, pin: str) -> Number:
         """Sign of omega_j - omega_i at a pin; at rest the one that a motion beginning to `side` would have.

@@ -49,4 +49,4 @@ class Gravity(Effect):
         field = self.field
         for number, body in zip(MOVING_BARS, actions.bodies, strict=True):
             if is_any(body.m != 0.0):
-                actions.force(number, body.m * field, body.z * state.direction(number))
+                actions.force(number, body.m * field, body.z)

@@ -133,12 +133,10 @@ class Load(Effect):
         if self.table is not None:
             factor = self.table.at(state.theta_2)
         if self.force is not None:
-            force, arm = polar(*self.force), polar(*self.at)
-            u = state.direction(self.bar)
-            to_G = actions.bodies[self.bar - 2].z * u
+            force, arm, G = polar(*self.force), polar(*self.at), actions.bodies[self.bar - 2].z
             if self.frame == "bar":
-                force, arm = force * u, arm * u
-            actions.force(self.bar, factor * force, to_G + arm)
+                force, G, arm = force * state.direction(self.bar), G + arm, 0.0j
+            actions.force(self.bar, factor * force, G, arm)
         if is_any(self.moment != 0.0):
             actions.moment(self.bar, factor * self.moment)
 

@@ -70,13 +70,9 @@ class SpringEnd(NamedTuple):
         arm = vector((self.distance - state.lengths[self.bar - 1]) - 2.0 * self.distance * half * half, arm.imag)
         return arm, dot(arm, arm)
 
-    def arm(self, state: State) -> Any:
-        """Return the vector from the bar's first pin, complex, m, world axes."""
-        return self.of(state) * state.direction(self.bar)
-
     def place(self, state: State) -> Any:
         """Return the position of the end, complex, m."""
-        return state.foot(self.bar) + self.arm(state)
+        return state.foot(self.bar) + self.of(state) * state.direction(self.bar)
 
 
 def require_ends(key: str, start: object, end: object) -> tuple[SpringEnd, SpringEnd]:

@@ -127,20 +127,25 @@ class Case(NamedTuple):
 
         `at`: in the order in which the path reads the loop.
         """
-        k, path = NO_MOTION, self.path
+        k, path, sine = NO_MOTION, self.path, at.sin_mu
         if moving:
             at, k = path.motion(at, branch)
         else:
             at, speed, acceleration = path.in_order(at), 0.0, 0.0
         state = State(self.lengths, self.linkage.ground_angle, q, at, k, speed, rates(k, speed, acceleration))
-        return state if path.bar == 2 else state._replace(theta_2=angle(at.u2), bar=path.bar, q=q)
+        return state if path.bar == 2 else state._replace(theta_2=angle(at.u2), bar=path.bar, q=q, sine=sine)
+
+    def assemble(
+        self, q: Any, half: HalfAngle, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
+    ) -> State:
+        """Close the loop at a half angle and compute its motion: the one way from an angle to what forces act on."""
+        return self.state(q, self.path.position(q, half, branch), branch, speed, acceleration, moving=moving)
 
     def at(self, where: Command) -> State:
         """Compute the positions of a command, and their motion."""
         half, _ = self.half_angle(where.angle, where.remainder)
-        found = self.path.position(where.angle, half, where.branch)
         speed = 0.0 if where.speed is None else where.speed
-        return self.state(where.angle, found, where.branch, speed, where.acceleration)
+        return self.assemble(where.angle, half, where.branch, speed, where.acceleration)
 
     def freed(self, bar: int, side: Any) -> "Case":
         """Return the case of a linkage that is released, read in the angle of bar 2 or 4, which no couple drives."""

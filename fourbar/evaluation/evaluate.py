@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.evaluation.case import NOWHERE, Case, Dynamics, Evaluated
-from fourbar.formulas.arithmetic import angle, is_any, select
+from fourbar.formulas.arithmetic import is_any, select
 from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
-from fourbar.formulas.position import HalfAngle, Position
+from fourbar.formulas.position import HalfAngle
 from fourbar.quantities import (
     ANGLES,
     JAMMED,
@@ -69,10 +69,9 @@ def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) ->
     state = case.state(q, at, branch, speed, acceleration, moving=wanted > 0)
     if free is not None:
         state = state._replace(theta_2=command.angle)
-    values = list_kinematics(case, state, names)
-    if command.bar != 2 or command.lever is not None:
-        commanded = name_of_command(case, at, state, q) | _list_commanded(command, values, abs(at.sin_mu))
-        values |= {name: value for name, value in commanded.items() if name in names}
+    values = list_kinematics(case, state if free is None else state._replace(bar=2), names)
+    if command.condition is not None and "condition" in names:
+        values["condition"] = values["condition"] * command.condition
     if wanted >= FORCE:
         acting = case if free is None else case._replace(drive=None)
         dynamics = acting.dynamics(state, acceleration, case.side)
@@ -87,30 +86,13 @@ def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) ->
     return codes, values, state.at
 
 
-def name_of_command(case: Case, at: Position, state: State, q: Any) -> dict[str, Any]:
-    """Quantities that a command of bar 3 or 4 has in the place of others: its angle as commanded, theta_2, its sine.
-
-    `at`: in the order in which the path reads the loop.
-    """
-    if case.path.bar == 2:
-        return {}
-    return {f"theta_{case.path.bar}": q, "theta_2": state.theta_2, "condition": abs(at.sin_mu)}
-
-
-def _list_commanded(command: Command, values: dict[str, Any], sine: Any) -> dict[str, Any]:
-    """List the stroke and its speed as commanded, wherever they have a value, and the condition of their command."""
-    given = {"stroke": command.stroke, "stroke_speed": command.stroke_speed}
-    stated = {name: own + 0.0 * values[name] for name, own in given.items() if own is not None and name in values}
-    return stated if command.lever is None else {**stated, "condition": sine * command.lever}
-
-
 def _compute_codes(sine: Any, half: HalfAngle, command: Command | None, unit: float = 1.0) -> Any:
     """Compute statuses of positions from the sine of the transmission angle, or a multiple of it by `unit`."""
     size, margin = abs(sine), NO_DIGIT_LEFT * unit
     if command is not None and command.remainder is not None:
         margin = 0.0  # known in many digits
-    elif command is not None and command.lever is not None:
-        size = np.where(np.isnan(size), size, np.minimum(size, command.lever))
+    elif command is not None and command.condition is not None:
+        size = np.where(np.isnan(size), size, np.minimum(size, command.condition))
     if type(size) is float and size > margin:
         return OK
     codes = np.zeros(np.shape(sine), dtype=np.uint8)
@@ -209,8 +191,7 @@ def compute_error_bars(
 
         left_out = 0.0 if remainder is not None else lost[..., 0]
         half = decide_half_angles(case.linkage, case.path.unit, half, exact, angle, remainder, case.path.bar, left_out)
-    position = longer.path.position(q, half, sign)
-    near = longer.state(q, position, sign, speed, growth)
+    near = longer.assemble(q, half, sign, speed, growth)
     other = longer.dynamics(near, growth, case.side)
     pairs = zip((*found.pins, found.drive), (*other.pins, other.drive), strict=True)
     *gaps, drive_gap = (np.abs(shorten(after - before)) for before, after in pairs)
@@ -280,10 +261,11 @@ def make_no_value(quantity: Any) -> complex:
 
 
 OF_BARS: dict[str, Callable[[State], Any]] = {
-    "theta_3": lambda state: angle(state.at.u3),
-    "theta_4": lambda state: angle(state.at.u4),
+    "theta_2": lambda state: state.theta(2),
+    "theta_3": lambda state: state.theta(3),
+    "theta_4": lambda state: state.theta(4),
     "sin_mu": lambda state: state.at.sin_mu,
-    "condition": lambda state: abs(state.at.sin_mu),
+    "condition": lambda state: abs(state.at.sin_mu if state.bar == 2 else state.sine),
     "omega_2": lambda state: state.moving.omega_2,
     "omega_3": lambda state: state.moving.omega_3,
     "omega_4": lambda state: state.moving.omega_4,

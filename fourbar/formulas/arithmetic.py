@@ -62,9 +62,14 @@ def is_any(mask: Number) -> bool:
     return True  # arrays of another library may be traced
 
 
+def is_differentiated(x: Number) -> bool:
+    """Return True for numbers whose derivatives may be taken: arrays of other libraries, and those that carry them."""
+    return type(x) is not float and (namespace(x) is not np or hasattr(x, "slopes"))
+
+
 def is_zero(x: Number) -> Number:
-    """Mark zeros that are not differentiated; arrays of another library may be, so nothing is marked in them."""
-    return (type(x) is float or namespace(x) is np) and x == 0.0
+    """Mark zeros, none in numbers whose derivatives may be taken."""
+    return not is_differentiated(x) and x == 0.0
 
 
 def select(mask: Number, x: Number, y: Number) -> Number:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.formulas.arithmetic import make_like
-from fourbar.formulas.position import HalfAngle, reorder_lengths
+from fourbar.formulas.position import HalfAngle, Loop, compute_factors, reorder_lengths
 from fourbar.linkage import FourBar
 
 DIGITS = 120
@@ -49,12 +49,12 @@ def half_angle(
         if bar == 4:
             h -= mp.pi / 2
         s, k = mp.sin(h), mp.cos(h)
-        e2 = (d - a) ** 2 + 4 * a * d * s * s
-        whole = 2 * (a + b + c + d) * mp.sqrt(e2)
-        least, most = (-TOUCHING * whole, 0) if offset is None else (-RESIDUE * whole, RESIDUE * whole)
-        factors = ((b + c) ** 2 - e2, e2 - (b - c) ** 2)
-        outer, inner = (0 * factor if least <= factor <= most else factor for factor in factors)
-        return HalfAngle(s * s, k * k, s * k, outer, inner)
+        lengths = Loop(d, a, b, c, (b + c - a - d) * (a + b + c + d), (d - a - b + c) * (d - a + b - c))
+        half = compute_factors(lengths, s * s, k * k, s * k)
+        size = 2 * (a + b + c + d) * mp.sqrt(half.inner + (b - c) ** 2)
+        least, most = (-TOUCHING * size, 0) if offset is None else (-RESIDUE * size, RESIDUE * size)
+        outer, inner = (0 * factor if least <= factor <= most else factor for factor in (half.outer, half.inner))
+        return half._replace(outer=outer, inner=inner)
 
 
 def decide_half_angles(

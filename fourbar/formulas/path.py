@@ -74,11 +74,11 @@ class Path(NamedTuple):
 
         `branch`: sign of the root in that order, which is that of `drive_sine` for a drive on the bar itself.
         """
-        turned, along = self.theta_1 != 0.0, is_any(is_zero(self.theta_1))
+        along = is_any(is_zero(self.theta_1))
         u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
         if along and self.bar == 4:
             u2 = -u2
-        if along and is_any(turned):  # of linkages
+        if along and is_any(turned := self.theta_1 != 0.0):  # of linkages
             u2 = select(turned, direction(q), u2)
         at = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:

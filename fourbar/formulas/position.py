@@ -20,6 +20,7 @@ from fourbar.formulas.arithmetic import (
     Number,
     exact_difference,
     is_any,
+    is_differentiated,
     namespace,
     polar,
     select,
@@ -90,8 +91,8 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
 
 
 def direction(theta: Number) -> Number:
-    """e^{i theta} from one tangent; by cosine and sine where it may be differentiated, as for `half_angle`."""
-    return direction_of_tangent(tangent(0.5 * theta)) if namespace(theta) is np else polar(1.0, theta)
+    """Compute e^{i theta} from one tangent; by cosine and sine where it is differentiated, as `half_angle` does."""
+    return polar(1.0, theta) if is_differentiated(theta) else direction_of_tangent(tangent(0.5 * theta))
 
 
 def direction_of_tangent(t: Number) -> Number:
@@ -105,35 +106,21 @@ def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAng
 
     `opposite`: h of psi - pi, from the same tangent: there the ground is read from O4 to O2.
     """
-    if (
-        xp := namespace(psi)
-    ) is not np:  # near 180 deg the tangent is large, and the library's derivative is a difference
+    E = lengths.E1 if opposite else lengths.E2
+    if is_differentiated(psi):  # near 180 deg the tangent is large, and its derivative is a difference
+        xp = namespace(psi)
         s, k = xp.sin(0.5 * psi), xp.cos(0.5 * psi)
-        s = select((lengths.E1 if opposite else lengths.E2) == 0.0, s + hair(s), s)
-        return (
-            compute_factors(lengths, k * k, s * s, -s * k)
-            if opposite
-            else compute_factors(lengths, s * s, k * k, s * k)
-        )
-    if not opposite:
-        return half_angle_of_tangent(lengths, tangent(0.5 * psi))
-    t = tangent(0.5 * psi)
-    meets = lengths.E1 == 0.0
-    if is_any(meets):
-        t = select(meets, t + hair(t), t)
-    kk = 1.0 / (1.0 + t * t)
-    sk = t * kk
-    return compute_factors(lengths, kk, t * sk, -sk)
-
-
-def half_angle_of_tangent(lengths: Loop, t: Number) -> HalfAngle:
-    """Compute the same from t = tan h."""
-    meets = lengths.E2 == 0.0
-    if is_any(meets):
-        t = select(meets, t + hair(t), t)
-    kk = 1.0 / (1.0 + t * t)
-    sk = t * kk
-    return compute_factors(lengths, t * sk, kk, sk)
+        if xp is not np:
+            s = select(E == 0.0, s + hair(s), s)
+        ss, kk, sk = s * s, k * k, s * k
+    else:
+        t, meets = tangent(0.5 * psi), E == 0.0
+        if is_any(meets):
+            t = select(meets, t + hair(t), t)
+        kk = 1.0 / (1.0 + t * t)
+        sk = t * kk
+        ss = t * sk
+    return compute_factors(lengths, kk, ss, -sk) if opposite else compute_factors(lengths, ss, kk, sk)
 
 
 def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAngle:

@@ -170,10 +170,10 @@ class Command(NamedTuple):
     time: Array | None = None
     """(n,), s; where the motion is given over time."""
     bar: int = 2
+    condition: Array | None = None
+    """(n,), in [0, 1]: how well the command determines the angle; None: 1, it is the angle itself."""
     stroke: Array | None = None
     """(n,), m; where a stroke is commanded, from which the others follow."""
-    lever: Array | None = None
-    """(n,), of that cylinder, as a part of the longest that it could be."""
     stroke_speed: float | Array | None = None
     """m/s; None where no stroke is commanded, or positions only."""
     lost: Array | None = None
@@ -240,30 +240,52 @@ def default_places(scene: Scene, holding: float | None = None) -> Array:
     return np.linspace(first, last, DEFAULT_STEPS + 1)
 
 
+def turn_bar(scene: Scene, place: Any, speed: Any, acceleration: Any) -> tuple[Any, Any, Any, Any]:
+    """Compute angle, speed and acceleration of the commanded bar, and the condition of the command (None: 1).
+
+    A stroke and its rates become those of the bar here, angles stay. All may be arrays of any library, and numbers that
+    carry their derivatives.
+    """
+    if scene.motion.stroke is None:
+        return place, speed, acceleration, None
+    from fourbar.scene.stroke import find_triangle
+
+    return find_triangle(scene.linkage, scene.drive).turn_bar(place, speed, acceleration, scene.motion.side)
+
+
+def command_stroke(scene: Scene, stroke: Array, speed: Any, acceleration: Any) -> Command:
+    """Command the bar that a cylinder turns, from strokes and their rates; the branch is that of the motion."""
+    angle, omega, alpha, condition = turn_bar(scene, stroke, speed, acceleration)
+    lost = None
+    if speed is not None:
+        from fourbar.scene.stroke import find_round_off
+
+        command, turned = (stroke, speed, acceleration), (angle, omega, alpha)
+        lost = find_round_off(scene.linkage, scene.drive, scene.motion.side, command, turned)
+    branch = np.full(np.shape(angle), scene.motion.branch, dtype=np.int8)
+    return Command(angle, branch, omega, alpha, None, None, scene.motion.bar, condition, stroke, speed, lost)
+
+
 def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = None) -> Command:
     """Command what the scene's motion commands at other places: angles, strokes, or of a law times.
 
     `branch`: at each of them; left out: the scene's, which may follow its smooth path.
     """
-    motion, bar, time = scene.motion, scene.motion.bar, None
-    angle, stroke, lever, stroke_speed, lost = places, None, None, None, None
-    speed: float | Array | None = motion.speed
-    acceleration: float | Array = motion.acceleration
+    motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
-        from fourbar.scene.stroke import find_triangle, turn_bar
+        from fourbar.scene.stroke import find_triangle
 
         find_triangle(scene.linkage, scene.drive).require(places)
-        stroke, stroke_speed = places, speed
-        angle, speed, acceleration, lever, lost = turn_bar(
-            scene.linkage, scene.drive, scene.motion.side, places, speed, acceleration
-        )
-    elif motion.law is not None:
-        time, (angle, speed, acceleration) = places, motion.law.at(places)
-    if branch is None:
-        branch = np.full(angle.shape, motion.branch, dtype=np.int8)
-        if motion.through == "follow":
-            branch = follow_smooth_path(scene.linkage, angle, motion.branch, bar)
-    return Command(angle, branch, speed, acceleration, None, time, bar, stroke, lever, stroke_speed, lost)
+        at = command_stroke(scene, places, motion.speed, motion.acceleration)
+    else:
+        at = Command(places, np.full(places.shape, motion.branch, dtype=np.int8), motion.speed, motion.acceleration)
+        if motion.law is not None:
+            angle, speed, acceleration = motion.law.at(places)
+            at = at._replace(angle=angle, speed=speed, acceleration=acceleration, time=places)
+        at = at._replace(bar=bar)
+    if branch is None and motion.through == "follow":
+        branch = follow_smooth_path(scene.linkage, at.angle, motion.branch, bar)
+    return at if branch is None else at._replace(branch=branch)
 
 
 def command(scene: Scene) -> Command:

@@ -46,17 +46,11 @@ class Triangle(NamedTuple):
             bad = float(stroke[np.argmin(inside)])
             raise InputError("motion.stroke", bad, f"this cylinder can have {least:.6g} to {most:.6g} m")
 
-    def turned(
-        self,
-        stroke: Any,
-        speed: Any,
-        acceleration: Any,
-        side: str | None,
-    ) -> tuple[Any, Any, Any, Any]:
-        """Compute angle, speed and acceleration of the bar, and the lever as a part of the longer of l and r.
+    def turn_bar(self, stroke: Any, speed: Any, acceleration: Any, side: str | None) -> tuple[Any, Any, Any, Any]:
+        """Compute angle, speed and acceleration of the bar, and the condition: the lever over the longer of l and r.
 
-        NaN where the cylinder cannot have the stroke; in libraries other than NumPy the lever alone says so, by 0. All
-        may be arrays, and numbers that carry their derivatives.
+        NaN where the cylinder cannot have the stroke; in libraries other than NumPy the condition alone says so, by 0.
+        All may be arrays, and numbers that carry their derivatives.
         """
         assert side is not None
         length, reach, zero = self.length, self.reach, 0.0 * self.length
@@ -70,13 +64,13 @@ class Triangle(NamedTuple):
             beta = 2.0 * xp.atan2(near, far)
             lever = near * far / (2.0 * stroke)
             longer = 0.5 * (length + reach + abs(length - reach))
-            theta, share = self.angle + sign * beta, select(inside, lever / longer, 0.0)
+            theta, condition = self.angle + sign * beta, select(inside, lever / longer, 0.0)
             if speed is None:
-                return theta, None, np.zeros(np.shape(theta)), share
+                return theta, None, np.zeros(np.shape(theta)), condition
             rate = speed / lever
-            own, along = speed * speed + stroke * acceleration, length * reach * xp.cos(beta)
-            growth = (own - along * rate * rate) / (lever * stroke)
-        return theta, sign * rate, sign * growth, share
+            growth = speed * speed + stroke * acceleration - length * reach * xp.cos(beta) * rate * rate
+            growth = growth / (lever * stroke)
+        return theta, sign * rate, sign * growth, condition
 
 
 def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
@@ -94,18 +88,16 @@ def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
     return Triangle(own.bar, abs(own.distance), reach, towards - own.angle - _reverse(own))
 
 
-def turn_bar(
-    linkage: FourBar, drive: "LinearDrive | None", side: str | None, stroke: Array, speed: Any, acceleration: Any
-) -> tuple[Any, Any, Any, Any, Any]:
-    """Compute what `Triangle.turned` does, and what angle, speed and acceleration leave out as doubles, (..., 3)."""
-    found = find_triangle(linkage, drive).turned(stroke, speed, acceleration, side)
-    if speed is None:
-        return (*found, None)
+def find_round_off(
+    linkage: FourBar, drive: "LinearDrive | None", side: str | None, command: tuple[Any, ...], turned: tuple[Any, ...]
+) -> Any:
+    """Compute what angle, speed and acceleration leave out as doubles, (..., 3), where a stroke is commanded."""
     with np.errstate(all="ignore"):
-        longer = find_triangle(*change_numbers((linkage, drive), lengthen))
-        exact = longer.turned(lengthen(stroke), lengthen(speed), lengthen(acceleration), side)
-        lost = [shorten(after - before) for before, after in zip(found[:3], exact[:3], strict=True)]
-    return (*found, np.stack(np.broadcast_arrays(*lost), axis=-1))
+        triangle = find_triangle(*change_numbers((linkage, drive), lengthen))
+        stroke, speed, acceleration = (lengthen(number) for number in command)
+        longer = triangle.turn_bar(stroke, speed, acceleration, side)
+        gaps = [shorten(after - before) for before, after in zip(turned, longer[:3], strict=True)]
+    return np.stack(np.broadcast_arrays(*gaps), axis=-1)
 
 
 def _reverse(point: "SpringEnd") -> Any:

@@ -57,15 +57,14 @@ class _Sizes(Actions):
         self.size: Any = 0.0
         self.fastest = np.max(np.abs([state.k.h2, state.k.h3, state.k.h4]), axis=0)
 
-    def force(self, bar: int, force: Any, arm: Any = 0.0j) -> None:
-        super().force(bar, force, arm)
+    def force(self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = 0.0j) -> None:
+        super().force(bar, force, point, beyond)
         if bar == 3:
             self.size = self.size + np.abs(force) * self.state.lengths.a * self.fastest
 
-    def moment(self, bar: int, moment: Any) -> None:
-        super().moment(bar, moment)
-        if bar != 1:
-            self.size = self.size + np.abs(moment) * self.fastest
+    def twist(self, bar: int, moment: Any) -> None:
+        super().twist(bar, moment)
+        self.size = self.size + np.abs(moment) * self.fastest
 
     def couple(self, pin: str, couple: Any) -> None:
         super().couple(pin, couple)

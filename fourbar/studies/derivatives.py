@@ -12,15 +12,13 @@ from fourbar.effects import Gravity
 from fourbar.effects.actions import Actions
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
-from fourbar.evaluation.evaluate import list_kinematics, name_of_command
+from fourbar.evaluation.evaluate import list_kinematics
 from fourbar.formulas.arithmetic import polar
-from fourbar.formulas.path import Path
-from fourbar.formulas.position import HalfAngle, Position, compute_factors, find_parallel_pairs, put_parallel_pairs
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
-from fourbar.scene.stroke import find_triangle
+from fourbar.scene.scene import turn_bar
 from fourbar.solution import Array, Solution, find_values, split_parts
 from fourbar.solve import solve
 from fourbar.studies.keys import SceneNumber, command_key, list_entries, read_place, replace_place
@@ -258,22 +256,19 @@ def _compute_derivatives(
             return number + make_unit_slope(place[key], len(keys))
         return Sloped(number, np.zeros((len(keys), 1)))
 
-    numbers = (at.angle, at.speed, at.acceleration)
-    if at.stroke is not None:
-        numbers = (at.stroke, scene.motion.speed, scene.motion.acceleration)
-    q, speed, acceleration = (
-        seeded(f"motion.{name}", number) for name, number in zip(scene.motion.names, numbers, strict=True)
+    rates = (
+        (at.speed, at.acceleration) if scene.motion.law is not None else (scene.motion.speed, scene.motion.acceleration)
     )
-    if at.stroke is not None:
-        commanded = {"stroke": q, "stroke_speed": speed}
-        turned = find_triangle(scene.linkage, scene.drive).turned(q, speed, acceleration, scene.motion.side)
-        q, speed, acceleration, lever = turned
+    numbers = (at.angle if at.stroke is None else at.stroke, *rates)
+    commanded = {
+        name: seeded(f"motion.{name}", number) for name, number in zip(scene.motion.names, numbers, strict=True)
+    }
+    q, speed, acceleration, condition = turn_bar(scene, *commanded.values())
     case, branch = Case.of(scene, at.bar), at.branch[index].astype(float)
-    position = _compute_position(case.path, q, branch)
-    state = case.state(q, position, branch, speed, acceleration, moving=moving)
-    found = list_kinematics(case, state, names) | name_of_command(case, position, state, q)
-    if at.stroke is not None:
-        found |= {"theta_2": state.theta_2, "condition": found["condition"] * lever, **commanded}
+    state = case.assemble(q, case.path.half_angle(q), branch, speed, acceleration, moving=moving)
+    found = {**list_kinematics(case, state, names), **commanded}
+    if condition is not None:
+        found["condition"] = found["condition"] * condition
     held = np.zeros(len(index), dtype=bool)
     if moving:
         actions = Actions(state, case.bodies)
@@ -284,20 +279,3 @@ def _compute_derivatives(
         found["power"] = dynamics.work * speed
         found["drive_condition"] = case.drive_condition(state)
     return {name: found[name] for name in names}, held
-
-
-def _compute_position(path: Path, q: Any, branch: Array) -> Position:
-    """Compute the positions, whose directions have the slopes of sines and cosines.
-
-    Those of the tangent of a half angle, which has no bound, lose every digit half a turn from where it is zero.
-    """
-    h = 0.5 * (q - path.theta_1)
-    s, k = np.sin(h), np.cos(h)
-    if path.bar == 4:  # of half a turn less
-        s, k = -k, s
-    sloped = compute_factors(path.lengths, s * s, k * k, s * k)
-    plain = path.half_angle(q)
-    half = HalfAngle(*(Sloped(take_values(x), take_slopes(same)) for x, same in zip(plain, sloped, strict=True)))
-    at = path.position(q, half, branch)
-    at = at._replace(u2=Sloped(take_values(at.u2), take_slopes(polar(1.0, q))))
-    return put_parallel_pairs(at, *find_parallel_pairs(path.lengths, half, branch)) if path.may_stay_parallel else at

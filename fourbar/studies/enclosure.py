@@ -23,7 +23,7 @@ from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.mobility import TURN, change_points, find_intervals, limit_positions, turns_fully
 from fourbar.formulas.path import Path
-from fourbar.formulas.position import Loop, close_loop, compute_factors
+from fourbar.formulas.position import Loop, direction
 from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Scene, command, require_input
 from fourbar.solve import solve
@@ -189,20 +189,14 @@ class _Search:
         q, link = Sloped(theta_2, by_theta), scene.linkage
         d, a, b, c = link.lengths
         lengths = Loop(d, a, b, c, (b + c - a - d) * (a + b + c + d), (d - a - b + c) * (d - a + b - c))
-        angles: Any = (link.ground_angle, q)
-        theta_1 = angles[0]
-        h = 0.5 * (q - theta_1)
-        s, k = np.sin(h), np.cos(h)
-        half = compute_factors(lengths, s * s, k * k, s * k)
-        u1, u2 = (np.cos(angle) + 1j * np.sin(angle) for angle in angles)
-        at = close_loop(lengths, u1, u2, half, self.branch)
         terms = (*scene.loads, *scene.effects)
-        path = Path(2, lengths, theta_1, u1)
+        path = Path(2, lengths, link.ground_angle, direction(link.ground_angle))
         case = Case(link, lengths, list_bodies(link, terms), terms, scene.drive_bar, path, drive=scene.drive)
         acceleration = numbers["motion.alpha_2"]
-        state = case.state(q, at, self.branch, numbers["motion.omega_2"], acceleration)
+        state = case.assemble(q, path.half_angle(q), self.branch, numbers["motion.omega_2"], acceleration)
         found = case.dynamics(state, acceleration)
         forces = {f"|{name}|": dot(force, force) for name, force in found.pins._asdict().items()}
+        at = state.at
         cosine = dot(at.u3, at.u4)
         return {case.names.value: found.drive, **forces, "sine": at.sin_mu * at.sin_mu, "cosine": cosine * cosine}
 

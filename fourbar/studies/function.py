@@ -8,14 +8,14 @@ import numpy as np
 
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.evaluation.case import Case, find_undecided
-from fourbar.evaluation.evaluate import list_kinematics, name_of_command
+from fourbar.evaluation.evaluate import list_kinematics
 from fourbar.formulas.arithmetic import make_like, namespace
 from fourbar.formulas.mobility import change_points
 from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, SCALARS, STAGE_OF
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.point import OF_POINTS
-from fourbar.scene.stroke import find_triangle
+from fourbar.scene.scene import turn_bar
 from fourbar.studies.keys import SceneNumber, command_key, list_entries, read_place, refuse_key, replace_numbers
 
 NO_DIGIT_LEFT, UNDECIDED = 8.0, 16.0
@@ -103,33 +103,16 @@ def _replace_given(scene: Scene, known: Mapping[str, SceneNumber], given: Given)
     return replace_numbers(scene, numbers), q, holds
 
 
-class Moved(NamedTuple):
-    """Motion of the commanded bar."""
-
-    q: Any
-    speed: Any
-    acceleration: Any
-    lever: Any = None
-    """Lever of a commanded stroke, as a part of the longest that it could be."""
-    stated: dict[str, Any] = {}  # noqa: RUF012 - read alone
-    """The stroke and its speed, as commanded."""
-
-
-def _command_given(scene: Scene, q: Any, stated: Command | None, given: Given) -> Moved:
-    """Return the command of a scene whose numbers are replaced: q where it is given, else as the scene states it."""
+def _command_given(scene: Scene, q: Any, stated: Command | None, given: Given) -> tuple[Any, Any, Any]:
+    """Return the commanded place (q if it is given), speed and acceleration of a scene whose numbers are replaced."""
     motion, zero = scene.motion, given.zero
     speed, acceleration = motion.speed, motion.acceleration
     if stated is not None:
-        own = stated.angle if stated.stroke is None else stated.stroke
-        q = make_like(own if own.size > 1 else own.reshape(()), zero)
+        places = stated.angle if stated.stroke is None else stated.stroke
+        q = make_like(places if places.size > 1 else places.reshape(()), zero)
         if motion.law is not None:
             speed, acceleration = (make_like(x, zero) for x in (stated.speed, stated.acceleration))
-    q = q + zero
-    if motion.stroke is None:
-        return Moved(q, 0.0 if speed is None else speed, acceleration)
-    turned = find_triangle(scene.linkage, scene.drive).turned(q, speed, acceleration, motion.side)
-    commanded = {"stroke": q, "stroke_speed": speed}
-    return Moved(turned[0], 0.0 if turned[1] is None else turned[1], turned[2], turned[3], commanded)
+    return q + zero, speed, acceleration
 
 
 def _expect_names(**lists: Sequence[str]) -> None:
@@ -142,15 +125,19 @@ def _expect_names(**lists: Sequence[str]) -> None:
             raise InputError(name, names, "must be one or more, each once")
 
 
-def _evaluate(scene: Scene, moved: Moved, holds: Any, given: Given, wanted: dict[str, str]) -> dict[str, Any]:
+def _evaluate(
+    scene: Scene, commanded: tuple[Any, Any, Any], holds: Any, given: Given, wanted: dict[str, str]
+) -> dict[str, Any]:
     """Evaluate quantities, NaN where they have no value; what is put there meanwhile is finite, as its derivatives.
 
     A loop that does not close is evaluated with a right angle at B in its place, its sides those of the bars.
     """
-    case, q, branch = Case.of(scene, scene.motion.bar), moved.q, float(scene.motion.branch)
-    if moved.lever is not None:
-        holds = holds & (moved.lever > NO_DIGIT_LEFT * given.eps)
-    xp, path, speed, acceleration = given.xp, case.path, moved.speed, moved.acceleration
+    case, branch, xp = Case.of(scene, scene.motion.bar), float(scene.motion.branch), given.xp
+    q, speed, acceleration, condition = turn_bar(scene, *commanded)
+    speed = 0.0 if speed is None else speed
+    if condition is not None:
+        holds = holds & (condition > NO_DIGIT_LEFT * given.eps)
+    path = case.path
     lengths, half = path.lengths, path.half_angle(q)
     square = 2.0 * lengths.b * lengths.c
     size, turned, part = 4.0 * lengths.a * lengths.d, abs(half.sk * (q - path.theta_1)), UNDECIDED * given.eps
@@ -160,12 +147,10 @@ def _evaluate(scene: Scene, moved: Moved, holds: Any, given: Given, wanted: dict
         ok = ok & ~find_undecided(factor, constant, size * (trig + turned), part)
     half = half._replace(outer=xp.where(ok, half.outer, square), inner=xp.where(ok, half.inner, square))
     stages = set(wanted.values())
-    at = path.position(q, half, branch)
-    state = case.state(q, at, branch, speed, acceleration, moving=stages != {"position"})
-    found = {"theta_2": state.theta_2, **list_kinematics(case, state, wanted.keys())}
-    found |= name_of_command(case, at, state, q) | moved.stated
-    if moved.lever is not None and "condition" in wanted:
-        found["condition"] = found["condition"] * moved.lever
+    state = case.assemble(q, half, branch, speed, acceleration, moving=stages != {"position"})
+    found = list_kinematics(case, state, wanted.keys()) | dict(zip(scene.motion.names[:2], commanded[:2], strict=True))
+    if condition is not None and "condition" in wanted:
+        found["condition"] = found["condition"] * condition
     if "force" in stages:
         done = case.dynamics(state, acceleration)
         power = xp.where(xp.isfinite(done.drive), done.work * speed, xp.nan)

@@ -17,7 +17,7 @@ from fourbar.quantities import INVALID, NOT_ASSEMBLED
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import find_unit
-from fourbar.scene.stroke import turn_bar
+from fourbar.scene.scene import command_stroke
 from fourbar.solution import Array
 from fourbar.solve import take_members
 from fourbar.studies.keys import COMMAND_KEYS, command_key, list_entries, refuse_key, replace_numbers, replace_place
@@ -158,11 +158,8 @@ def _list_commands(scene: Scene, numbers: Mapping[str, Array], angles: Array, m:
         branch = _find_branches(scene, numbers, angles, m)
         return Command(angle, branch, speed, acceleration, bar=scene.motion.bar)
     varied = replace_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
-    theta, omega, alpha, lever, lost = turn_bar(
-        varied.linkage, varied.drive, scene.motion.side, angle, speed, acceleration
-    )
-    at = Command(theta, _find_branches(scene, numbers, theta, m), omega, alpha, bar=scene.motion.bar)
-    return at._replace(stroke=angle, lever=lever, stroke_speed=speed, lost=lost)
+    at = command_stroke(varied, angle, speed, acceleration)
+    return at._replace(branch=_find_branches(scene, numbers, at.angle, m))
 
 
 def _find_branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:

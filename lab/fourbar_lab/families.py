@@ -234,7 +234,7 @@ def near_pins(rng: np.random.Generator) -> Scene:
     if rng.random() < 0.5:
         start, end = end, start
     kind = rng.integers(0, 3)
-    if kind == 0 and pin in ("A", "O4"):
+    if kind == 0 and pin in ("A", "B", "O4"):
         bars = {bar: replace(scene.linkage.bar(bar), centre=(0.0, 0.0)) for bar in MOVING_BARS}
         force, frame = (1.0, float(rng.uniform(-3.0, 3.0))), str(rng.choice(["world", "bar"]))
         linkage = FourBar(scene.linkage.ground, bars[2], bars[3], bars[4], scene.linkage.ground_angle)

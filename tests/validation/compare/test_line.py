@@ -89,13 +89,13 @@ def _reversed(self: LinearDrive, actions: Any, force: Any, act: Any = LinearDriv
 
 def _of_one_end(self: LinearDrive, actions: Any, force: Any) -> None:
     push = force * self.line(actions.state)[1]
-    actions.force(self.end.bar, push, self.end.in_bar * actions.state.direction(self.end.bar))
+    actions.force(self.end.bar, push, self.end.in_bar)
 
 
 def _of_the_wrong_bar(self: LinearDrive, actions: Any, force: Any) -> None:
     push = force * self.line(actions.state)[1]
-    actions.force(2, -push, self.start.in_bar * actions.state.direction(2))
-    actions.force(3, push, self.end.in_bar * actions.state.direction(3))
+    actions.force(2, -push, self.start.in_bar)
+    actions.force(3, push, self.end.in_bar)
 
 
 FAULTS = {

@@ -309,5 +309,5 @@ def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch: 
     assert sum(row.engine == "free-body" and row.compared for row in rows) > 20
     assert given
     for at in given:
-        assert at.stroke is not None and np.isfinite(at.stroke).all() and at.lever is None
+        assert at.stroke is not None and np.isfinite(at.stroke).all() and at.condition is None
         assert all(np.isnan(values).all() for values in (at.angle, at.speed, at.acceleration))

@@ -193,7 +193,7 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     reference.condition = np.abs(np.sin(other - one))
     if answer.at.stroke is not None and scene.drive is not None:
         lever = place_line(scene.linkage, scene.drive, theta).lever
-        reference.at, reference.condition = answer.at._replace(lever=lever), reference.condition * lever
+        reference.at, reference.condition = answer.at._replace(condition=lever), reference.condition * lever
     if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
         one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits than its sine

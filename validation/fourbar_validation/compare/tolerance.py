@@ -123,7 +123,7 @@ def find_lever(linkage: FourBar, bar: int = 2) -> float:
 
 def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
     """Compute a quantity's condition at each position: s for positions, s^2 for what follows, times lever and drive."""
-    s, unit, bar, commanded = formulas.condition, UNITS[quantity], formulas.at.bar, formulas.at.lever
+    s, unit, bar, commanded = formulas.condition, UNITS[quantity], formulas.at.bar, formulas.at.condition
     if quantity in (OF_THE_INPUT if bar == 2 else (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")):
         # a stroke commands the bar as far as its cylinder has a lever
         return np.ones_like(s) if commanded is None else np.asarray(commanded ** POWER[unit], dtype=float)

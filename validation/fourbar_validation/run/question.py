@@ -177,7 +177,7 @@ def remove_angles(at: Command) -> Command:
         return at
     unknown = np.full_like(at.angle, np.nan)
     speed = None if at.speed is None else unknown
-    return at._replace(angle=unknown, speed=speed, acceleration=unknown, lever=None, lost=None)
+    return at._replace(angle=unknown, speed=speed, acceleration=unknown, condition=None, lost=None)
 
 
 def select_positions(at: Command, where: NDArray[np.intp]) -> Command:
