@@ -183,9 +183,10 @@ class Case(NamedTuple):
         half = decide_half_angles(self.linkage, self.path.unit, half, index, q, remainder, self.path.bar)
         return half, index
 
-    def _compute_inertial(self, state: State, acceleration: Any) -> tuple[Any, Any]:
-        """J q'' + J'/2 q'^2 of all bars, and of bars 3 and 4."""
+    def _compute_inertia(self, state: State, acceleration: Any) -> "_Inertia":
+        """Compute d'Alembert's forces and moments, and what they add to the generalized force."""
         a, at, k, square = self.lengths.a, state.at, state.k, state.speed * state.speed
+        wrenches, mass_at_A = inertia_wrenches(a, self.bodies, at, state.moving)
         inertial = others = half_slope(a, self.bodies, at, k) * square
         if is_any(acceleration != 0.0):
             of_input, of_others = inertia(a, self.bodies, at, k)
@@ -193,50 +194,26 @@ class Case(NamedTuple):
             inertial = others + of_input * acceleration
         if self.path.bar != 2:  # bar 2 has inertia of its own
             others = others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
-        return inertial, others
+        return _Inertia(inertial, others, wrenches, mass_at_A)
 
     def dynamics(self, state: State, acceleration: Any, side: Any = 0) -> Dynamics:
-        """Compute pin forces and the drive under everything that acts; for the parameters see `Actions`.
-
-        A couple on one bar leaves the moments of the other two alone, which give the force between them. A force along
-        a line is found first, by virtual work, and then is one more load; where it acts on two moving bars or on bar 3,
-        of the three pairs of bars that whose directions differ most has the digits.
-        """
-        a, at, k = self.lengths.a, state.at, state.k
+        """Compute pin forces and the drive under everything that acts; for the parameters see `Actions`."""
         actions = Actions(state, self.bodies, side).add(self.terms)
-        own, mass_at_A = inertia_wrenches(a, self.bodies, at, state.moving)
-        inertial, others = self._compute_inertial(state, acceleration)
+        inertia = self._compute_inertia(state, acceleration)
         driven = (self.drive_bar,) if self.drive is None else self.drive.apart
-        sines = {bar: self.path.drive_sine(at, bar) for bar in driven}
-        about_B, short = 0.0, is_any(self.lengths.d < self.lengths.a)
+        sines = {bar: self.path.drive_sine(state.at, bar) for bar in driven}
         if 4 in sines:
-            about_B = coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sines[4])
+            about_B = coupler_about_B(self.lengths, self.bodies[1], state.at, state.moving, sines[4])
+            inertia = inertia._replace(about_B=about_B)
         unit = None if self.drive is None else self.drive.per_newton(actions)
-        by = k[self.drive_bar - 2] if unit is None else unit.work()[0]
-
-        def apart(bar: int, acting: Actions, with_inertia: bool) -> PinForces:
-            """Solve from the moments of the two bars other than this."""
-            w, mass, rest = (own, mass_at_A, (others, about_B)) if with_inertia else (Wrenches(), 0.0j, (0.0, 0.0))
-            moment: Any = 0.0
-            if bar == 4:
-                moment = -(acting.about_B() + rest[1])
-            elif bar == 2 and short:
-                moment = (acting.work()[1] - rest[0]) / k.h2  # of bars 3 and 4 over the turn of bar 2
-            return acting.at_pins(pin_forces(self.lengths, at, bar, sines[bar], acting.wrenches(w), mass, moment))
-
-        def eliminate(acting: Actions, *, with_inertia: bool = True) -> PinForces:
-            if unit is None:
-                return apart(self.drive_bar, acting, with_inertia)
-            pushed = acting.plus(unit, driving_torque(by, inertial if with_inertia else 0.0, acting.work()[0]))
-            found = {bar: apart(bar, pushed, with_inertia) for bar in driven}
-            return found[driven[0]] if len(driven) == 1 else take_steadiest(sines, found)
-
-        solved = SolvedFriction(eliminate(actions))
+        gain = state.k[self.drive_bar - 2] if unit is None else unit.work()[0]
+        bodies = _FreeBodies(state, inertia, sines, unit, gain)
+        friction = SolvedFriction(bodies.solve_pin_forces(actions))
         for term in self.terms:  # a scene holds one effect of a kind, and one kind depends on the forces
             if term.loaded_pins:
-                solved = term.solve_friction(actions, solved.pins, eliminate)
+                friction = term.solve_friction(actions, friction.pins, bodies.solve_pin_forces)
         Q = actions.work()[0]
-        return Dynamics(*solved, driving_torque(by, inertial, Q), inertial - Q)
+        return Dynamics(*friction, driving_torque(gain, inertia.total, Q), inertia.total - Q)
 
     def drive_interval(self, state: State, acceleration: Any, drive: Any) -> tuple[Any, Any, Any]:
         """Least and greatest torque or force of the drive where dry friction holds a pin at rest, elsewhere it twice.
@@ -261,12 +238,60 @@ def _restore_unit(linkage: FourBar, path: Path) -> Loop:
     return Loop(*linkage.lengths, path.lengths.E1 * square, path.lengths.E2 * square)
 
 
-def take_steadiest(sines: dict[int, Any], of: dict[int, PinForces]) -> PinForces:
-    """Select, of the pin forces solved by the moments of two bars, those of the pair with the greatest sine."""
-    s2, s3, s4 = (abs(sines[bar]) for bar in MOVING_BARS)
-    first, second = (s2 >= s3) & (s2 >= s4), s3 >= s4
-    rows = zip(*(of[bar] for bar in MOVING_BARS), strict=True)
-    return PinForces(*(select(first, x, select(second, y, z)) for x, y, z in rows))
+class _Inertia(NamedTuple):
+    """Inertia of the bars in a motion; none by default."""
+
+    total: Any = 0.0
+    """J q'' + J'/2 q'^2 of all bars, N m."""
+    of_others: Any = 0.0
+    """The same of bars 3 and 4."""
+    wrenches: Wrenches = Wrenches()
+    mass_at_A: Any = 0.0j
+    """Force of the coupler's mass at pin A, as from `inertia_wrenches`."""
+    about_B: Any = 0.0
+    """Moment on the coupler about pin B, N m; of a drive for which bar 4 is left out."""
+
+
+class _FreeBodies(NamedTuple):
+    """The free bodies at some positions, and the drive that balances what acts on them."""
+
+    state: State
+    inertia: _Inertia
+    sines: dict[int, Any]
+    """Sines between the two other bars, by the bar whose moment is left out."""
+    drive: Actions | None
+    """Actions of a linear drive per newton; None: the drive is a couple on a bar."""
+    gain: Any
+    """h of the driven bar, or ds/dq of the linear drive, m."""
+
+    def solve_pin_forces(self, actions: Actions, *, with_inertia: bool = True) -> PinForces:
+        """Solve for the pin forces under some actions and the drive that balances them.
+
+        A couple on one bar leaves the moments of the other two alone, which give the force between them. A force along
+        a line is found first, by virtual work, and then is one more load; where it acts on two moving bars or on bar 3,
+        of the three pairs of bars that whose directions differ most has the digits.
+        """
+        inertia = self.inertia if with_inertia else _Inertia()
+        if self.drive is not None:
+            actions = actions.plus(self.drive, driving_torque(self.gain, inertia.total, actions.work()[0]))
+        pins = {bar: self._solve_from_two_moments(bar, actions, inertia) for bar in self.sines}
+        if len(pins) == 1:
+            return next(iter(pins.values()))
+        s2, s3, s4 = (abs(self.sines[bar]) for bar in MOVING_BARS)
+        first, second = (s2 >= s3) & (s2 >= s4), s3 >= s4
+        forces = zip(*(pins[bar] for bar in MOVING_BARS), strict=True)
+        return PinForces(*(select(first, x, select(second, y, z)) for x, y, z in forces))
+
+    def _solve_from_two_moments(self, left_out: int, actions: Actions, inertia: _Inertia) -> PinForces:
+        """Solve from the moments of the two bars other than the one left out."""
+        lengths, at, moment = self.state.lengths, self.state.at, 0.0
+        if left_out == 4:
+            moment = -(actions.about_B() + inertia.about_B)
+        elif left_out == 2 and is_any(lengths.d < lengths.a):
+            moment = (actions.work()[1] - inertia.of_others) / self.state.k.h2  # of bars 3 and 4 over the turn of bar 2
+        wrenches = actions.wrenches(inertia.wrenches)
+        pins = pin_forces(lengths, at, left_out, self.sines[left_out], wrenches, inertia.mass_at_A, moment)
+        return actions.at_pins(pins)
 
 
 def compute_state(scene: Scene, at: Command) -> State:
