@@ -25,7 +25,7 @@ from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS, say_error
 from fourbar_validation.compare.tolerance import TOUCHING_MARGIN, find_margin
 from fourbar_validation.engines import workers as processes
-from fourbar_validation.engines.registry import ENGINES, hold_fully, make_prediction
+from fourbar_validation.engines.registry import ENGINES, hold, hold_fully
 from fourbar_validation.places import CHECKOUT
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.answers import check_statements
@@ -236,10 +236,10 @@ def _check_engines(question: Question) -> list[str]:
     scene, at, solution, rows = question.scene, question.at, question.solution, list(check_identities(question))
     for engine in EXACT:
         answer = engine.start().answer(scene, at)
-        predicted = make_prediction(engine, scene, at, answer)
-        rows += Comparison("", scene, answer, solution, engine.tolerance, engine.expected, predicted).rows()
+        held = hold(engine, scene, at, answer)
+        rows += Comparison("", scene, answer, solution, held).rows()
         if engine.name == "pinocchio-inverse" and answer.refusal is None:  # the quicker of two exact engines
-            rows += check_statements("", scene, engine.start(), answer, predicted=predicted)
+            rows += check_statements("", scene, engine.start(), answer, predicted=held.predicted)
     # half of the scenes are drawn where doubles have few digits: that they are undecided is no fault
     failed = [row for row in rows if row.verdict == FAILS and row.quantity != "undecided"]
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in failed]

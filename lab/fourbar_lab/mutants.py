@@ -31,7 +31,7 @@ from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.engines.free_body import NAME as FREE_BODY
-from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
+from fourbar_validation.engines.registry import ENGINES, Engine, hold
 from fourbar_validation.run.answers import check_statements
 from fourbar_validation.run.identities import check_identities, compare_status
 from fourbar_validation.run.question import Question
@@ -197,8 +197,7 @@ def is_caught(scene: Scene, at: Command, answers: list[tuple[Engine, Answer]]) -
     question = Question("", scene, at)
     solution, rows = question.solution, list(check_identities(question))
     for engine, answer in answers:
-        predicted = make_prediction(engine, scene, at, answer)
-        rows += Comparison("", scene, answer, solution, engine.tolerance, engine.expected, predicted).rows()
+        rows += Comparison("", scene, answer, solution, hold(engine, scene, at, answer)).rows()
         if engine.name == FREE_BODY and (reference := make_reference(scene, answer)) is not None:
             rows.append(compare_status(question, reference))
     if not any(row.verdict == FAILS for row in rows):

@@ -18,6 +18,7 @@ from fourbar.studies.sloped import Sloped
 from fourbar_lab import fuzz as examine
 from fourbar_lab import outside
 from fourbar_lab.fuzz import KEPT, LAB, draw_fuzz_scene, keep, run, shrink_scene
+from fourbar_validation.compare.compare import Held
 from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.store import Store
 from tests.fourbar.studies.test_enclosure import meeting
@@ -99,9 +100,8 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(
     answer = engine.start().answer(scene, examine.command(scene))
     wrong = np.array([[times, 0.0]])
     answer.quantities["F12"] = wrong
-    rows = examine.Comparison(
-        "", scene, answer, solution, engine.tolerance, ("F12",), lambda quantity, where: np.ones(1)
-    ).rows()
+    held = Held(engine.tolerance, ("F12",), lambda quantity, where: np.ones(1))
+    rows = examine.Comparison("", scene, answer, solution, held).rows()
     assert [row.verdict == "fails" for row in rows if row.quantity == "F12"] == [found]
 
 

@@ -50,7 +50,7 @@ def open_engine(entry: str) -> tuple[Factory, dict[str, Any]]:
     adapter = engine.start()
     hello = {
         "engine": entry,
-        "answers": list(engine.expected),
+        "answers": list(engine.answers),
         "commands": list(getattr(adapter, "commands", ("theta_2",))),
         "effects": [*ALL_BUT_CYLINDER, "cylinder"],
     }

@@ -139,8 +139,8 @@ def test_exact_engines_stay_exact() -> None:
         new for old, new in zip(ENGINES, required_error.adjust_engines(ENGINES, 1e-3), strict=True) if new != old
     ]
     assert [engine.name for engine in changed] == ["mujoco-simulated"]
-    assert changed[0].tolerance.factor == 1e-3 and changed[0].expected == next(
-        w.expected for w in ENGINES if w.through_time
+    assert changed[0].tolerance.factor == 1e-3 and changed[0].answers == next(
+        w.answers for w in ENGINES if w.through_time
     )
 
 

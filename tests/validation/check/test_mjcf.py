@@ -28,7 +28,7 @@ from fourbar_validation.check.screen import DEEPEST, LARGEST_MJCF, list_unread, 
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.compare import Comparison
+from fourbar_validation.compare.compare import Comparison, Held
 from fourbar_validation.compare.rows import FAILS, Row
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.description import ModelEntry, Value
@@ -69,7 +69,7 @@ def rows_of(scene: Scene, answers: Sequence[Answer]) -> list[Row]:
     return [
         row
         for answer in answers
-        for row in Comparison("", scene, answer, solve(scene, at=answer.at), SIMULATED, UNKNOWNS).rows()
+        for row in Comparison("", scene, answer, solve(scene, at=answer.at), Held(SIMULATED, UNKNOWNS)).rows()
     ]
 
 

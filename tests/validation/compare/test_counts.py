@@ -17,7 +17,7 @@ from fourbar_validation.check.mjcf import ModelReport
 from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer, ReleasedAnswer
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.compare import Comparison
+from fourbar_validation.compare.compare import Comparison, Held
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, write_results
 from fourbar_validation.compare.tolerance import EQUIVALENCE
@@ -182,7 +182,9 @@ def test_formulas_without_an_answer_fail() -> None:
     answer = Echo().answer(scene, at)
     positions = fourbar.solve(scene, "position", at=at)
     (row,) = [
-        r for r in Comparison("", scene, answer, positions, EQUIVALENCE, ("torque",)).rows() if r.quantity == "torque"
+        r
+        for r in Comparison("", scene, answer, positions, Held(EQUIVALENCE, ("torque",))).rows()
+        if r.quantity == "torque"
     ]
     assert (row.verdict, row.reason) == (FAILS, "the formulas have no answer")
 

@@ -17,7 +17,7 @@ from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Motion
 from fourbar.solve import solve
-from fourbar_validation.compare.compare import COMPARED, Comparison
+from fourbar_validation.compare.compare import COMPARED, Comparison, Held
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE, K
 from fourbar_validation.engines import loop
@@ -102,7 +102,7 @@ def failures(name: str, case: Scene, every: int = 1) -> list[tuple[str, str]]:
     answer = answered(name, case, at)
     if answer.refusal is not None:
         return [("refusal", answer.refusal)]
-    comparison = Comparison("scene", case, answer, solve(case, "force", at=at), EQUIVALENCE, COMPARED)
+    comparison = Comparison("scene", case, answer, solve(case, "force", at=at), Held(EQUIVALENCE, COMPARED))
     rows = [*comparison.rows(), comparison.closure()]
     return [(row.quantity, row.reason) for row in rows if not row.passed]
 

@@ -24,7 +24,7 @@ from fourbar.writing import write_text
 from fourbar_validation.check.differences import Difference, find_differences, order, price
 from fourbar_validation.check.screen import list_unread, read_mjcf
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.compare import Comparison
+from fourbar_validation.compare.compare import Comparison, Held
 from fourbar_validation.compare.counts import Counts
 from fourbar_validation.compare.rows import Row, make_plain, write_results
 from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, hold_simulated
@@ -117,7 +117,7 @@ def _list_rows(name: str, scene: Scene, answers: list[Answer], tolerance: ErrorB
     rows = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
-        rows += Comparison(name, scene, answer, formulas, tolerance, UNKNOWNS).rows()
+        rows += Comparison(name, scene, answer, formulas, Held(tolerance, UNKNOWNS)).rows()
     return rows
 
 

@@ -1,8 +1,9 @@
 """An engine's answer against the formulas: one row per quantity, at the position where it is worst."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -71,33 +72,45 @@ NUMBERS = ("error", "allowed", "theta_2", "condition")
 """Names of the numbers of a row."""
 
 
-@dataclass(slots=True)
+class Held(NamedTuple):
+    """What an answer is held to."""
+
+    tolerance: ErrorBound
+    quantities: Sequence[str]
+    """Quantities that it must have."""
+    predicted: Predicted | None = None
+    """Errors predicted for it. With them an error beyond the tolerance must be within DEGRADED times its prediction."""
+    nearby: Nearby | None = None
+    """Evaluation near a position. With it an error beyond the tolerance is taken again within theta_2's rounding."""
+
+
+class _Judged(NamedTuple):
+    """Row of a quantity, with the number of positions that have it, and of those with a verdict."""
+
+    row: Row
+    numbers: int = 0
+    decided: int = 0
+
+
+@dataclass
 class Comparison:
-    """One answer held to the formulas; counts how many numbers there are and of how many a verdict is drawn."""
+    """One answer held to the formulas."""
 
     name: str
     scene: Scene
     answer: Answer
     formulas: Solution
     """Solution of the formulas at `answer.at`."""
-    tolerance: ErrorBound
-    expected: Iterable[str]
-    """Quantities that the engine must answer."""
-    predicted: Predicted | None = None
-    """Prediction of errors; with it an error beyond the tolerance must be within DEGRADED times the expected error."""
+    held: Held
     reference: Solution | None = None
     """Another derivation at the same positions: the stricter of its conditions and sizes and the formulas' own decides
     what they may be wrong by; left out: the answer itself."""
     scales: Scales = field(default_factory=dict)
     """Scales of `formulas` and `reference`, if an earlier answer was compared with them."""
-    nearby: Nearby | None = None
-    """Evaluation near a position; with it an error beyond the tolerance is taken again within theta_2's rounding."""
-    own: Solution | None = field(default=None, init=False)
-    """The answer as a solution."""
-    numbers: int = field(default=0, init=False)
-    decided: int = field(default=0, init=False)
-    again: dict[str, Array] | None = field(default=None, init=False)
-    """Answer of `nearby`, once it was needed."""
+
+    def __post_init__(self) -> None:
+        if self.reference is None:
+            self.scales = {}
 
     def rows(self) -> list[Row]:
         """Compare where the loop closes, each quantity, and what the engine says of itself."""
@@ -107,130 +120,133 @@ class Comparison:
         if answer.assembled is None or len(answer.assembled) != len(self.formulas):
             what = "the engine did not say where the loop closes"
             return [Row.unmeasured(self.name, answer.engine, answer.setting, "assembled", FAILS, what)]
-        held = tuple(self.expected)
+        names = set(self.held.quantities)
         if self.scene.drive is not None:
-            answered = answer.quantities
-            held = (*held, *(name for name, other in OF_THE_LINE.items() if other in held or name in answered))
-        self.own = make_reference(self.scene, answer)
-        if self.reference is None:
-            self.reference, self.scales = self.own, {}
-        rows = [self.assembled()]
-        rows += [row for quantity in STAGE_OF if quantity in held for row in self.compared(quantity)]
-        rows += [self.row("watch", FAILS, alarm) for alarm in answer.alarms]
-        return [*rows, *self.undecided()]
-
-    @property
-    def who(self) -> tuple[str, str, str]:
-        """Scene, engine and setting of its rows."""
-        return self.name, self.answer.engine, self.answer.setting or "-"
-
-    def row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
-        """Make a row of this answer."""
-        error, allowed, theta_2, condition = (float(numbers.get(key, math.nan)) for key in NUMBERS)
-        return Row(*self.who, quantity, error, allowed, verdict, make_plain(reason), theta_2, condition)
+            names |= {line for line, other in OF_THE_LINE.items() if other in names or line in answer.quantities}
+        judged = [one for name in STAGE_OF if name in names and (one := self._compare(name)) is not None]
+        alarms = [self._row("watch", FAILS, alarm) for alarm in answer.alarms]
+        numbers, decided = sum(one.numbers for one in judged), sum(one.decided for one in judged)
+        rows = [self._compare_assembled(), *(one.row for one in judged), *alarms]
+        if numbers:  # a scene of which most numbers are undecided does not hold
+            reason = f"{numbers - decided} of {numbers} numbers are undecided"
+            rows.append(Row.judged(self._who, "undecided", (numbers - decided) / numbers, MOST_UNDECIDED, reason))
+        return rows
 
     def closure(self) -> Row:
-        """Check that the own angles of an engine close the loop."""
+        """Check that the engine's angles close the loop."""
         answer, linkage = self.answer, self.scene.linkage
         assert answer.at is not None and answer.assembled is not None
         theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else answer.quantities["theta_2"]
         theta_3, theta_4 = answer.quantities["theta_3"], answer.quantities["theta_4"]
         condition = 1.0 / count_half_turns(linkage.ground_angle, theta_2)
-        allowed = (IDENTITY if answer.setting == "exact" else self.tolerance).factor / condition
+        allowed = (IDENTITY if answer.setting == "exact" else self.held.tolerance).factor / condition
         reason = f"identity: {CLOSURE}" if answer.assembled.any() else NOWHERE
         gap = find_gap(linkage, theta_2, theta_3, theta_4)
-        return Row.judged(self.who, "closure", gap, allowed, reason, theta_2, condition, answer.assembled)
+        return Row.judged(self._who, "closure", gap, allowed, reason, theta_2, condition, answer.assembled)
 
-    def assembled(self) -> Row:
+    @property
+    def _who(self) -> tuple[str, str, str]:
+        """Scene, engine and setting of its rows."""
+        return self.name, self.answer.engine, self.answer.setting or "-"
+
+    @cached_property
+    def _solution(self) -> Solution | None:
+        """Return the answer as a solution."""
+        return make_reference(self.scene, self.answer)
+
+    @cached_property
+    def _answered_nearby(self) -> dict[str, Array]:
+        """Ask again near each position, once an error calls for it."""
+        assert self.held.nearby is not None
+        return self.held.nearby(self.formulas.assembled)
+
+    def _row(self, quantity: str, verdict: str, reason: str, **numbers: float) -> Row:
+        error, allowed, theta_2, condition = (float(numbers.get(key, math.nan)) for key in NUMBERS)
+        return Row(*self._who, quantity, error, allowed, verdict, make_plain(reason), theta_2, condition)
+
+    def _compare_assembled(self) -> Row:
         """Compare where both close the loop."""
         theirs, ours, at = self.answer.assembled, self.formulas, self.answer.at
         assert theirs is not None and at is not None
         differ = (theirs != ours.assembled) & ~mark_touching(self.scene.linkage, at.angle, at.bar)
         count = np.count_nonzero(differ)
         reason = f"{count} of {len(differ)} positions differ" if count else "the same positions"
-        return Row.judged(self.who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2)
+        return Row.judged(self._who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2)
 
-    def compared(self, quantity: str) -> Iterator[Row]:
-        """Compare a quantity, if either side has it."""
-        formulas, scene, tolerance = self.formulas, self.scene, self.tolerance
+    def _compare(self, quantity: str) -> _Judged | None:
+        """Compare a quantity where both close the loop and the formulas state a value; None if neither side has it."""
+        formulas, scene, tolerance = self.formulas, self.scene, self.held.tolerance
         ours, theirs = getattr(formulas, quantity, None), self.answer.quantities.get(quantity)
-        if theirs is None and self.own is not None:
+        if theirs is None and self._solution is not None:
             if quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects):
-                return  # an engine that passes over loads and friction does not know how near they are to jamming
-            theirs = getattr(self.own, quantity)
+                return None  # an engine that passes over loads and friction does not know how near they are to jamming
+            theirs = getattr(self._solution, quantity)
+        if ours is None and theirs is None:  # the scene states positions only
+            return None
         if ours is None or theirs is None:
-            if ours is not theirs:  # both are missing where the scene states positions only
-                yield self.row(quantity, FAILS, "no answer" if theirs is None else "the formulas have no answer")
-            return
+            missing = "no answer" if theirs is None else "the formulas have no answer"
+            return _Judged(self._row(quantity, FAILS, missing))
         assert self.answer.assembled is not None
         both = formulas.assembled & self.answer.assembled
-        judged = both & _mark_stated(quantity, formulas, ours)
-        self.numbers += int(np.count_nonzero(both))
-        withheld = _count(formulas.status_code[both & ~judged])
-        if withheld and not judged.any():
-            yield self.row(quantity, REFUSES, f"the formulas state no value: {withheld}")
-            return
-        where = judged & _mark_answerable(quantity, scene, formulas, tolerance)
-        jumping = where & _mark_jumping(quantity, scene, formulas, tolerance)
-        where &= ~jumping
+        stated = both & _mark_stated(quantity, formulas, ours)
+        numbers, withheld = int(np.count_nonzero(both)), _count(formulas.status_code[both & ~stated])
+        if withheld and not stated.any():
+            return _Judged(self._row(quantity, REFUSES, f"the formulas state no value: {withheld}"), numbers)
+        answerable = stated & _mark_answerable(quantity, scene, formulas, tolerance)
+        jumping = answerable & _mark_jumping(quantity, scene, formulas, tolerance)
+        jumps = int(np.count_nonzero(jumping))  # the forces of either side of a reversal are right
         note = f"; not judged: {withheld}" if withheld else ""
-        if jumping.any():
-            count = int(np.count_nonzero(jumping))  # the forces of either side of a reversal are right
-            self.decided += count
-            note += f"; {count} positions at which dry friction reverses not judged"
+        note += f"; {jumps} positions at which dry friction reverses not judged" if jumps else ""
+        where = answerable & ~jumping
         if not where.any():
-            yield self.row(quantity, UNDECIDED, "no position at which both may be held to it" + note)
-            return
-        result, error, condition = self._measure(quantity, ours, theirs, where)
-        self.decided += result.decided
-        at = {"theta_2": formulas.theta_2[result.worst], "condition": condition[result.worst]}
-        yield self.row(
-            quantity, result.verdict, result.reason + note, error=error[result.worst], allowed=result.allowed, **at
-        )
+            nowhere = "no position at which both may be held to it" + note
+            return _Judged(self._row(quantity, UNDECIDED, nowhere), numbers, jumps)
+        row, decided = self._judge(quantity, ours, theirs, where, note)
+        return _Judged(row, numbers, jumps + decided)
 
-    def _measure(self, quantity: str, ours: Array, theirs: Array, where: Mask) -> "tuple[_Finding, Array, Array]":
-        """Compare at the positions `where`: the result, the errors and the conditions, (n,)."""
-        if quantity not in self.scales:
-            self.scales[quantity] = (
-                take_smallest_scale(quantity, self.scene, self.formulas, self.reference),
-                take_strictest_condition(quantity, self.scene.linkage, self.formulas, self.reference),
-            )
-        size, condition = self.scales[quantity]
-        full, predicted, expected = self.tolerance.allowed(condition), self.predicted, None
-        if predicted is not None:
-            full, size = np.where(size == 0.0, 0.0, full), replace_zero_size(size)
+    def _judge(self, quantity: str, ours: Array, theirs: Array, where: Mask, note: str) -> tuple[Row, int]:
+        """Judge the errors at the positions `where`; return the row, and the number of positions with a verdict."""
+        size, condition = self._scale(quantity)
+        allowed = self.held.tolerance.allowed(condition)
+        if self.held.predicted is not None:
+            allowed, size = np.where(size == 0.0, 0.0, allowed), replace_zero_size(size)
         error = find_error(quantity, ours, theirs, size)
-        beyond, again, note = where & (error > full), np.full_like(error, np.nan), ""
-        if self.nearby is not None and beyond.any():
-            if self.again is None:
-                self.again = self.nearby(self.formulas.assembled)
-            again = find_error(quantity, ours, self.again[quantity], size)
-            error = np.where(beyond, np.fmin(error, again), error)
-            mended = np.count_nonzero(beyond & (again <= full))
-            note = f"; {mended} positions within the rounding of theta_2" if mended else ""
-        if predicted is not None:
+        beyond, mended = where & (error > allowed), np.zeros_like(where)
+        retried = np.full_like(error, np.nan)
+        if self.held.nearby is not None and beyond.any():
+            retried = find_error(quantity, ours, self._answered_nearby[quantity], size)
+            error = np.where(beyond, np.fmin(error, retried), error)
+            mended = beyond & (retried <= allowed)
+        predict: Callable[[Mask], Array] | None = None
+        if (predicted := self.held.predicted) is not None:
 
-            def expected(where: Mask) -> Array:
-                of_data = divide(predicted(quantity, where), size)
-                return np.where(np.isfinite(again), np.fmin(of_data, full), of_data)
+            def predict(positions: Mask) -> Array:
+                share = divide(predicted(quantity, positions), size)
+                return np.where(np.isfinite(retried), np.fmin(share, allowed), share)
 
-        result = _judge_errors(error, condition, where, full, self.tolerance, expected)
-        return result._replace(reason=result.reason + note), error, condition
+        worst = _judge_errors(error, condition, where, allowed, self.held.tolerance, predict)
+        reason, i = worst.reason, worst.position
+        if mended.any():
+            reason += f"; {np.count_nonzero(mended)} positions within the rounding of theta_2"
+        numbers = (error[i], worst.allowed, self.formulas.theta_2[i], condition[i])
+        row = self._row(quantity, worst.verdict, reason + note, **dict(zip(NUMBERS, numbers, strict=True)))
+        return row, worst.decided
 
-    def undecided(self) -> Iterator[Row]:
-        """Fail a scene of which most numbers are undecided."""
-        if not self.numbers:
-            return
-        missing = self.numbers - self.decided
-        share = missing / self.numbers
-        reason = f"{missing} of {self.numbers} numbers are undecided"
-        yield Row.judged(self.who, "undecided", share, MOST_UNDECIDED, reason)
+    def _scale(self, quantity: str) -> tuple[Array, Array]:
+        """Return size and condition of a quantity at each position, each the stricter of formulas and reference."""
+        if quantity not in self.scales:
+            reference = self._solution if self.reference is None else self.reference
+            self.scales[quantity] = (
+                take_smallest_scale(quantity, self.scene, self.formulas, reference),
+                take_strictest_condition(quantity, self.scene.linkage, self.formulas, reference),
+            )
+        return self.scales[quantity]
 
 
-class _Finding(NamedTuple):
-    """Worst error of one quantity and the position where it occurs."""
+class _Worst(NamedTuple):
+    """Verdict on a quantity, and the position where its error is worst."""
 
-    worst: int
+    position: int
     verdict: str
     reason: str
     allowed: float
@@ -242,44 +258,44 @@ def _judge_errors(
     error: Array,
     condition: Array,
     where: Mask,
-    full: Array,
+    allowed: Array,
     tolerance: ErrorBound,
-    predicted: Callable[[Mask], Array] | None,
-) -> _Finding:
-    """Compare errors at the positions `where` with the tolerance, `full`, and beyond it with what was predicted there.
+    predict: Callable[[Mask], Array] | None,
+) -> _Worst:
+    """Judge errors at the positions `where` by what is allowed, and beyond it by what was predicted there.
 
-    NaN at any of them fails. `full` is 0 where the quantity vanishes; the error is in its own unit there.
+    NaN at any of them fails. `allowed` is 0 where the quantity vanishes; the error is in its own unit there.
     """
     decidable = where & (condition * NOTHING_TO_TELL > EPS) if tolerance.conditioned else where
     undecided = int(np.count_nonzero(where & ~decidable))
     note = f"; {undecided} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if undecided else ""
-    beyond = (decidable & ~(error <= full)) | (where & ~np.isfinite(error))
+    beyond = (decidable & ~(error <= allowed)) | (where & ~np.isfinite(error))
     if not (decidable | beyond).any():
         index = int(np.flatnonzero(where)[0])
-        return _Finding(index, UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}", full[index], 0)
+        return _Worst(index, UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}", allowed[index], 0)
     if not beyond.any():
-        index = int(np.argmax(np.where(decidable, find_used(error, full), -1.0)))
-        return _Finding(index, AGREES, tolerance.name + note, full[index], int(np.count_nonzero(decidable)))
-    expected = np.zeros_like(error)
-    if predicted is not None:
-        expected = np.nan_to_num(predicted(beyond), nan=0.0, posinf=np.inf)
-    allowed = np.maximum(full, TIMES_PREDICTED * expected)
-    ratio = find_used(error, allowed)
+        index = int(np.argmax(np.where(decidable, find_used(error, allowed), -1.0)))
+        return _Worst(index, AGREES, tolerance.name + note, allowed[index], int(np.count_nonzero(decidable)))
+    predicted = np.zeros_like(error)
+    if predict is not None:
+        predicted = np.nan_to_num(predict(beyond), nan=0.0, posinf=np.inf)
+    bound = np.maximum(allowed, TIMES_PREDICTED * predicted)
+    ratio = find_used(error, bound)
     # first order says that no digit is left, no more
-    lost = beyond & np.isfinite(error) & np.where(full > 0.0, expected >= 1.0, expected == np.inf)
+    lost = beyond & np.isfinite(error) & np.where(allowed > 0.0, predicted >= 1.0, predicted == np.inf)
     ratio[lost] = np.minimum(ratio[lost], 1.0)
     index = int(np.argmax(np.where(beyond, ratio, -1.0)))
     if math.isnan(error[index]):
         verdict, reason = FAILS, "NaN"
     elif lost[index]:
-        verdict, reason = UNDECIDED, f"an error of {expected[index]:.1e} of the value is predicted"
-    elif predicted is None:
+        verdict, reason = UNDECIDED, f"an error of {predicted[index]:.1e} of the value is predicted"
+    elif predict is None:
         verdict, reason = FAILS, tolerance.name
     elif ratio[index] <= 1.0:
-        verdict, reason = DEGRADED, f"{error[index]:.1e} of {expected[index]:.1e} predicted for this position"
+        verdict, reason = DEGRADED, f"{error[index]:.1e} of {predicted[index]:.1e} predicted for this position"
     else:
-        verdict, reason = FAILS, f"{error[index]:.1e} where {expected[index]:.1e} was predicted"
-    return _Finding(index, verdict, reason + note, allowed[index], int(np.count_nonzero(decidable & ~lost)))
+        verdict, reason = FAILS, f"{error[index]:.1e} where {predicted[index]:.1e} was predicted"
+    return _Worst(index, verdict, reason + note, bound[index], int(np.count_nonzero(decidable & ~lost)))
 
 
 def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:

@@ -26,7 +26,7 @@ FILE = "engines.toml"
 LARGEST_FILE = 10**6
 """Bytes."""
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-engines"
-HELD = ("tolerance", "expected", "positions", "through_time", "predictor", "residuals", "nearby", "stated")
+HELD = ("tolerance", "answers", "positions", "through_time", "predictor", "residuals", "nearby", "stated")
 """Fields of an engine that an adapter of ours keeps in every environment."""
 DONE = "installed"
 """File in the folder of an environment that is complete."""

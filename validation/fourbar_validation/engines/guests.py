@@ -156,7 +156,7 @@ def _make_guest(name: str, program: Program, hello: Hello, trouble: str, number:
         name,
         partial(Asked, name, program, hello, trouble),
         hello.tolerance,
-        expected=hello.answers,
+        answers=hello.answers,
         positions=tuple(name for name in hello.answers if name in ANGLES),
         stated=False,
         code=_hash_files(program.command),

@@ -16,7 +16,7 @@ from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Adapter, Answer
-from fourbar_validation.compare.compare import COMPARED, Nearby, Predicted
+from fourbar_validation.compare.compare import COMPARED, Held, Nearby, Predicted
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY, SIMULATED, Array, ErrorBound, Mask
 from fourbar_validation.engines.description import list_speeds
@@ -40,7 +40,8 @@ class Engine:
     start: Callable[[], Adapter]
     """Starts it; importable by name, and imports the library itself: a missing one costs only its own rows."""
     tolerance: ErrorBound
-    expected: tuple[str, ...] = COMPARED
+    answers: tuple[str, ...] = COMPARED
+    """Quantities that it must answer."""
     order: Order | None = None
     """Function that measures its observed order, which is shown."""
     positions: tuple[str, ...] = ()
@@ -202,6 +203,15 @@ def load_further() -> tuple[Engine, ...]:
 FOLDERS = tuple(Path(folder) for spec in [find_spec(LAB.replace("-", "_"))] if spec is not None
                 for folder in spec.submodule_search_locations or ())  # fmt: skip
 """Folder of the lab, whose engines.toml a run reads too; none if the lab is not installed."""
+
+
+def hold(engine: Engine, scene: Scene, at: Command, answer: Answer, formulas: Solution | None = None) -> Held:
+    """Hold an answer to the engine's tolerance and quantities, with the errors predicted for it at a command.
+
+    `formulas`: their solution at the command, with which an engine that can answers again within theta_2's rounding.
+    """
+    nearby = None if formulas is None else make_nearby(engine, scene, at, formulas)
+    return Held(engine.tolerance, engine.answers, make_prediction(engine, scene, at, answer), nearby)
 
 
 def make_prediction(engine: Engine, scene: Scene, at: Command, answer: Answer) -> Predicted | None:

@@ -17,7 +17,7 @@ from fourbar_validation.compare.scales import has_angles
 from fourbar_validation.compare.statements import limit_positions, transmission
 from fourbar_validation.compare.statements.finding import look, make_worst_row
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.registry import Engine, make_nearby, make_prediction
+from fourbar_validation.engines.registry import Engine, hold, make_prediction
 from fourbar_validation.run.question import Question, remove_angles
 
 
@@ -41,10 +41,8 @@ def compare_answer(question: Question, engine: Engine, answer: Answer) -> list[R
     if answer.at is not None and answer.at is not question.at:
         question = Question(question.name, question.scene, answer.at)
     name, scene, formulas = question.name, question.scene, question.solution
-    predicted = make_prediction(engine, scene, question.at, answer)
-    nearby = make_nearby(engine, scene, question.at, formulas)
-    of_engine, of_scene = (engine.tolerance, engine.expected, predicted), (question.reference, question.scales)
-    comparison = Comparison(name, scene, answer, formulas, *of_engine, *of_scene, nearby)
+    held = hold(engine, scene, question.at, answer, formulas)
+    comparison = Comparison(name, scene, answer, formulas, held, question.reference, question.scales)
     rows = comparison.rows()
     if (ratio := answer.evidence.get("mass_ratio", 1.0)) > LIGHT:
         why = f"; of coupler and output one is {ratio:.1e} times lighter"
@@ -59,7 +57,7 @@ def _observe_order(question: Question, engine: Engine) -> dict[str, float]:
     """Measure the worst error of the torque and the pin forces at 4h and 2h, and the order in h that they show."""
 
     def error(answer: Answer) -> float:
-        rows = compare_answer(question, replace(engine, expected=FORCES), answer)
+        rows = compare_answer(question, replace(engine, answers=FORCES), answer)
         return max((row.error for row in rows if row.quantity in FORCES), default=math.nan)  # a refusal has none
 
     assert engine.order is not None
@@ -81,7 +79,7 @@ def compare_statements(question: Question) -> Iterator[Row]:
 
     for engine in question.engines:
         answer, _ = question.answered.get(engine.name, (None, 0.0))
-        exact = engine.stated and engine.tolerance.conditioned and "theta_3" in engine.expected
+        exact = engine.stated and engine.tolerance.conditioned and "theta_3" in engine.answers
         if exact and answer is not None and answer.refusal is None:
             yield from question.attempt(partial(rows, engine, answer), engine.name, part)
 
@@ -128,7 +126,7 @@ def compare_inertia(question: Question) -> Iterator[Row]:
         if f"{name_driving(scene)}_inertia" in answer.quantities:
             bare.answered[name] = _take_inertia(answer, name_driving(scene)), seconds
     for engine in question.engines:
-        if COUPLE.value in engine.expected and engine.name in question.answered:  # one that broke down has its row
+        if COUPLE.value in engine.answers and engine.name in question.answered:  # one that broke down has its row
             yield from question.attempt(partial(_check_inertia, question, bare, engine), engine.name, "inertia alone")
 
 
@@ -137,7 +135,7 @@ def _check_inertia(question: Question, bare: Question, engine: Engine) -> Iterat
     if answer.refusal is not None and loaded is not None and loaded.refusal is not None:
         return  # the refusal has its row
     drive = name_driving(question.scene)
-    rows = compare_answer(bare, replace(engine, expected=(drive,)), answer)
+    rows = compare_answer(bare, replace(engine, answers=(drive,)), answer)
     rows = [row for row in rows if row.quantity == drive or row.verdict in (REFUSES, FAILS)]
     rows = [row for row in rows if row.quantity != "undecided"]
     if rows:  # a failure besides the torque, or in place of it, is not left out

@@ -141,6 +141,6 @@ def _choose_called_for(engines: Iterable[Engine], at: Command, left_out: list[st
         elif engine.through_time and len(at.angle) == 1:
             reason = "one position is no motion through time"
         if reason is None:
-            yield engine if at.speed is not None else replace(engine, expected=engine.positions)
+            yield engine if at.speed is not None else replace(engine, answers=engine.positions)
         else:
             left_out.append(f"{engine.name}: {reason}")

@@ -27,7 +27,7 @@ from fourbar_validation.compare.tolerance import DEGRADED as TIMES_PREDICTED
 from fourbar_validation.compare.tolerance import EQUIVALENCE, divide, find_worst, replace_zero_size
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import Guest
-from fourbar_validation.engines.registry import Engine, find_missing, make_prediction
+from fourbar_validation.engines.registry import Engine, find_missing, hold
 from fourbar_validation.report.record import Timing
 from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.shipped.variants import keep_worst, take_member
@@ -163,7 +163,7 @@ def _compare_forces(question: Question) -> Iterator[Row]:
         for own, where in _prescribe(held, at)
     ]
     for engine in question.engines:
-        if engine.tolerance == EQUIVALENCE and "theta_3" in engine.expected and not engine.missing():
+        if engine.tolerance == EQUIVALENCE and "theta_3" in engine.answers and not engine.missing():
             rows = partial(_keep_worst_forces, engine, driven_ones)
             yield from question.attempt(rows, engine.name, "forces")
 
@@ -183,10 +183,10 @@ def _compare_forces_by(engine: Engine, driven: Question, solution: Solution) -> 
     # the formulas are conditioned by the angle that is independent there, an engine by theta_2
     conditioned = replace(solution, condition=reference.condition, drive_condition=reference.drive_condition)
     conditioned.drive_bar, conditioned.at = 2, driven.at
-    names = [q for q in UNKNOWNS if q in engine.expected]
+    names = tuple(name for name in UNKNOWNS if name in engine.answers)
     # nor are theta_2, omega_2 and alpha_2 more than that angle's, rounded: what that costs there is computed
-    predicted = make_prediction(engine, scene, driven.at, answer)
-    rows = Comparison(driven.name, scene, answer, conditioned, engine.tolerance, names, predicted, reference).rows()
+    held = hold(replace(engine, answers=names), scene, driven.at, answer)
+    rows = Comparison(driven.name, scene, answer, conditioned, held, reference).rows()
     return [row for row in rows if row.quantity != "undecided"]
 
 

@@ -17,7 +17,7 @@ from fourbar.quantities import LINE, OK, SCALARS, UNKNOWNS
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
-from fourbar_validation.compare.compare import COMPARED, Comparison
+from fourbar_validation.compare.compare import COMPARED, Comparison, Held
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.compare.rows import VERDICTS, Row
 from fourbar_validation.compare.scales import make_reference
@@ -153,7 +153,7 @@ def hold_to(question: Question, engine: str, scene: Scene, solution: Solution, a
     assert answer.at is not None
     predicted = make_prediction(FREE_BODY, scene, answer.at, answer)
     reference = make_reference(scene, answer)
-    rows = Comparison(question.name, scene, answer, solution, EQUIVALENCE, COMPARED, predicted, reference).rows()
+    rows = Comparison(question.name, scene, answer, solution, Held(EQUIVALENCE, COMPARED, predicted), reference).rows()
     if scene.points and reference is not None:
         rows.append(replace(compare_points(question, scene, solution, reference, WELL_CONDITIONED), engine=engine))
     return rows
