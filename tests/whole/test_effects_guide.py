@@ -77,7 +77,7 @@ def guide_scene() -> Scene:
 
 
 def refusals(scene: Scene, engines: list[Any]) -> dict[str, str]:
-    """By engine, why it refuses."""
+    """Return the reason of each engine that refuses."""
     return {r.engine: r.reason for r in judge("scene", scene, engines).rows if r.verdict == "refuses"}
 
 
@@ -102,15 +102,15 @@ def test_engines_without_its_row_refuse_the_example(
 ) -> None:
     monkeypatch.delitem(table, "latch")
     assert failing(guide_scene(), EXACT) == []
-    found = refusals(guide_scene(), EXACT)
-    assert found.keys() == engines
-    assert all("'latch'" in reason for reason in found.values())
+    reasons = refusals(guide_scene(), EXACT)
+    assert reasons.keys() == engines
+    assert all("'latch'" in reason for reason in reasons.values())
 
 
 def test_mjcf_has_no_row_of_the_example_and_refuses_it(latch: Any) -> None:
     assert failing(guide_scene(), SIMULATED) == []
-    found = refusals(guide_scene(), SIMULATED)
-    assert found.keys() == {"mujoco-simulated"} and "'latch'" in found["mujoco-simulated"]
+    reasons = refusals(guide_scene(), SIMULATED)
+    assert reasons.keys() == {"mujoco-simulated"} and "'latch'" in reasons["mujoco-simulated"]
     with pytest.raises(LimitError, match="'latch'"):
         write_mjcf(guide_scene())
 
@@ -138,12 +138,12 @@ def test_the_drive_makes_up_for_what_the_example_takes(latch: Any) -> None:
     scene = guide_scene()
     with_it, without = solve(scene).torque, solve(replace(scene, effects=())).torque
     assert with_it is not None and without is not None
-    found = FreeBody().answer(scene, command(scene)).quantities
-    x = (np.degrees(found["theta_4"]) - 115.0) / 5.0
+    motion = FreeBody().answer(scene, command(scene)).quantities
+    x = (np.degrees(motion["theta_4"]) - 115.0) / 5.0
     couple = np.where(np.abs(x) < 1.0, -0.8 * x * (1.0 - np.abs(x)), 0.0)
     assert 2 <= np.count_nonzero(couple) < 20 and couple.min() < 0.0 < couple.max()
-    given = -couple * found["omega_4"]
-    assert (with_it - without) * 10.0 == pytest.approx(given, abs=1e-12 * np.abs(with_it).max(), rel=0)
+    power = -couple * motion["omega_4"]
+    assert (with_it - without) * 10.0 == pytest.approx(power, abs=1e-12 * np.abs(with_it).max(), rel=0)
 
 
 def test_studies_and_sensitivities_know_the_numbers_of_the_example(latch: Any) -> None:
@@ -174,7 +174,7 @@ def test_a_fault_in_the_example_is_caught(latch: Any, place: str, monkeypatch: p
 def test_the_example_of_each_effect_is_read_and_written_back(key: str) -> None:
     example = effects.list_kinds()[key].example
     scene = loads(f"{SCENE}[effects]\n{example}")
-    assert [each.key for each in scene.effects] == [key]
+    assert [effect.key for effect in scene.effects] == [key]
     assert loads(dump(scene)).effects == scene.effects
     assert example.split("=")[0] in REFERENCE
 
@@ -205,13 +205,13 @@ NEED_NO_LINE = {
 def test_the_guide_names_every_file_that_names_every_effect() -> None:
     root = Path(__file__).parents[2]
     kinds = {getattr(effects, name).key: name for name in effects.FILE_OF}
-    found = []
+    files = []
     for path in (path for top in ("fourbar", "validation", "lab", "docs") for path in (root / top).rglob("*.*")):
         if path.suffix in (".py", ".md", ".js"):
             text, name = path.read_text(encoding="utf-8"), path.relative_to(root).as_posix()
-            found += [name] if all(re.search(rf"\b({key}|{kind})\b", text) for key, kind in kinds.items()) else []
-    assert len(found) > 8
-    assert not [name for name in found if name not in NEED_NO_LINE and name.removeprefix("validation/") not in PAGE]
+            files += [name] if all(re.search(rf"\b({key}|{kind})\b", text) for key, kind in kinds.items()) else []
+    assert len(files) > 8
+    assert not [name for name in files if name not in NEED_NO_LINE and name.removeprefix("validation/") not in PAGE]
 
 
 def test_the_places_that_the_guide_to_a_quantity_names_are_there() -> None:
