@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,6 +20,7 @@ from fourbar.scene.motion import Law
 from fourbar.solve import solve
 from fourbar_validation.check.judge import Allowance
 from fourbar_validation.check.judgement import Judgement, judge_table
+from fourbar_validation.check.mistakes import list_hypotheses
 from fourbar_validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
 from fourbar_validation.cli import status
 from fourbar_validation.compare.scales import TERMS, scale_of
@@ -29,6 +31,9 @@ SCENES = {
     "thesis": fourbar.load(MODELS / "thesis.toml"),
     "crank_rocker": fourbar.load(MODELS / "crank_rocker.toml"),
 }
+SCENES["accelerating"] = replace(
+    SCENES["crank_rocker"], motion=fourbar.Motion(SCENES["crank_rocker"].motion.angle, 10.0, 30.0)
+)
 FORCES = ("torque", "F12", "F32", "F43", "F14")
 ALL = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", *FORCES)
 EVERY = 31
@@ -245,7 +250,38 @@ MISTAKES: list[tuple[str, str, tuple[str, ...], Callable[[Scene], Numbers], str]
      solved(lambda s: replace(s, effects=(fourbar.Gravity(1.0),))), "gravity 0.101937 times ours"),
     ("a tenth of a load", "thesis", FORCES,
      solved(lambda s: replace(s, loads=(tenth(s.loads[0]), *s.loads[1:]))), "load 1 (bar 2) 0.1 times ours"),
+    ("I alpha's sign", "thesis", FORCES, lambda s: inertial_times(s, 1.0, -1.0), "I alpha with the wrong sign"),
+    ("both in mm", "thesis", FORCES, lambda s: inertial_times(s, 1e3, 1e3), "m a and I alpha in kg mm/s^2"),
+    ("loads reversed", "thesis", FORCES,
+     solved(lambda s: replace(s, loads=tuple(map(reversed_load, s.loads)))), "the loads are reversed"),
+    *((f"load {k} reversed", "thesis", FORCES, solved(lambda s, k=k: replace(s, loads=tuple(
+        reversed_load(load) if i == k else load for i, load in enumerate(s.loads, 1)))),
+       f"load {k} (bar {SCENES['thesis'].loads[k - 1].bar}) is reversed") for k in (2, 3, 4)),
+    *((f"load {k} missing", "thesis", FORCES, solved(lambda s, k=k: replace(s, loads=tuple(
+        load for i, load in enumerate(s.loads, 1) if i != k))),
+       f"load {k} (bar {SCENES['thesis'].loads[k - 1].bar}) is missing") for k in (1, 2, 4)),
+    ("alpha_2 left out", "accelerating", FORCES, solved(same, alpha_2=0.0), "alpha_2 is left out"),
+    ("theta_4 from bar 2", "crank_rocker", ALL,
+     lambda s: right(s) | {"theta_4": right(s)["theta_4"] - right(s)["theta_2"]}, "relative to bar 2"),
+    ("mirrored", "crank_rocker", FORCES, solved(lambda s: bars(s, coupler=replace(
+        s.linkage.coupler, centre=(s.linkage.coupler.mass_centre[0], -s.linkage.coupler.mass_centre[1])))),
+     "coupler: mass centre on the other side of the bar's line"),
+    ("drive on bar 3", "thesis", FORCES, solved(lambda s: replace(s, drive_bar=3)), "on bar 3 instead of bar 4"),
 ]  # fmt: skip
+
+
+def test_every_hypothesis_has_a_case_and_no_two_have_one_text() -> None:
+    """Whatever is swapped, left out or of another unit has a message that a case above demands."""
+
+    def kind(text: str) -> str:
+        return re.sub(r"input|coupler|output|load \d|bar \d", "ONE", text)
+
+    texts = {kind(mistake.text) for scene in SCENES.values() for mistake in list_hypotheses(scene, command(scene))}
+    unnamed = {text for text in texts if not any(kind(words) in text for *_, words in MISTAKES)}
+    assert unnamed == set()
+    for scene in SCENES.values():
+        listed = [mistake.text for mistake in list_hypotheses(scene, command(scene))]
+        assert len(set(listed)) == len(listed)
 
 
 @pytest.mark.parametrize("digits", [4, 5])

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -19,6 +20,8 @@ from fourbar_validation.check.judge import Judge, Mistake
 from fourbar_validation.check.theirs import Array
 from fourbar_validation.scenes.hard_families import list_moving, replace_bars
 
+RPM = np.pi / 30.0
+"""rad/s of one rev/min."""
 SHOWN = 5
 """Explanations that are printed."""
 NEARER = 10.0
@@ -27,27 +30,36 @@ NEARER = 10.0
 
 def list_hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
     """List every mistake that can be made on this scene, the simplest first."""
-    for text, change, of in COLUMN_MISTAKES:
-        yield Mistake(
-            text,
-            lambda quantity, right, change=change, of=of: (
-                _choose_where(quantity, right, change) if of(quantity) else None
-            ),  # type: ignore[misc]
-            whole=False,
-        )
+    for text, change, applies in COLUMN_MISTAKES:
+        yield Mistake(text, partial(_change_column, change, applies), whole=False)
     for bar in (2, 3):
-        yield Mistake(
-            f"relative to bar {bar} instead of the ground",
-            lambda quantity, right, bar=bar: _take_relative(quantity, right, bar),  # type: ignore[misc]
-            whole=False,
-        )
+        yield Mistake(f"relative to bar {bar} instead of the ground", partial(_subtract_angle_of, bar), whole=False)
     yield from _scale_inertial(scene, at)
-    for text, changed, where in _list_other_problems(scene, at):
+    for text, changed, command in _list_other_problems(scene, at):
         try:
-            wrong = solve(changed, "position" if where.omega_2 is None else "force", at=where)
+            wrong = solve(changed, "position" if command.omega_2 is None else "force", at=command)
         except FourBarError:  # the mistake leaves no valid scene
             continue
-        yield Mistake(text, lambda quantity, right, wrong=wrong: getattr(wrong, quantity, None))  # type: ignore[misc]
+        yield Mistake(text, partial(_take_from, wrong))
+
+
+def _change_column(
+    change: Callable[[Array], Array], applies: Callable[[str], bool], quantity: str, right: Solution
+) -> Array | None:
+    values = getattr(right, quantity, None)
+    return change(values) if applies(quantity) and values is not None else None
+
+
+def _subtract_angle_of(bar: int, quantity: str, right: Solution) -> Array | None:
+    """Take an angle, or its rate, from the line of another bar."""
+    if not _is_angular(quantity) or quantity.endswith(str(bar)):
+        return None
+    values, base = (getattr(right, name, None) for name in (quantity, f"{quantity[:-1]}{bar}"))
+    return None if values is None or base is None else np.asarray(values - base)
+
+
+def _take_from(wrong: Solution, quantity: str, right: Solution) -> Array | None:
+    return getattr(wrong, quantity, None)
 
 
 def _scale_inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
@@ -80,55 +92,65 @@ def _scale_inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
 
 
 def _list_other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Command]]:
-    """Evaluate the same formulas on the scene that the mistake amounts to."""
-    yield "the other branch", scene, at._replace(branch=-at.branch)
-    yield "theta_2 read as degrees", scene, at._replace(angle=np.radians(at.theta_2))
+    """List scenes and commands that mistakes amount to: the same formulas answer them."""
+    for text, command in _list_other_commands(at):
+        yield text, scene, command
+    for text, changed in chain(_change_gravity(scene), _change_loads(scene), _change_bars(scene)):
+        yield text, changed, at
+    for drive in {2, 3, 4} - {scene.drive_bar} if scene.drive is None else ():
+        yield f"the torque acts on bar {drive} instead of bar {scene.drive_bar}", replace(scene, drive_bar=drive), at
+
+
+def _list_other_commands(at: Command) -> Iterator[tuple[str, Command]]:
+    yield "the other branch", at._replace(branch=-at.branch)
+    yield "theta_2 read as degrees", at._replace(angle=np.radians(at.theta_2))
     in_degrees = np.degrees(np.fmod(at.theta_2, TURN))  # a whole turn is 6.28 of these degrees
-    yield "theta_2 in radians where degrees were announced", scene, at._replace(angle=in_degrees)
-    gravity = [effect for effect in scene.effects if isinstance(effect, Gravity)]
-    if gravity:
-        others = tuple(effect for effect in scene.effects if not isinstance(effect, Gravity))
-        yield "gravity is missing", replace(scene, effects=others), at
-        flipped = tuple(replace(g, magnitude=-g.magnitude) for g in gravity)
-        yield "gravity is reversed", replace(scene, effects=(*others, *flipped)), at
-    else:
-        added = replace(scene, effects=(*scene.effects, Gravity()))
-        yield "gravity along -y is included though the scene has none", added, at
-    if scene.loads:
-        yield "the loads are missing", replace(scene, loads=()), at
-        for number, load in enumerate(scene.loads, 1):
-            kept = tuple(other for other in scene.loads if other is not load)
-            yield f"load {number} (bar {load.bar}) is missing", replace(scene, loads=kept), at
-        if len(scene.loads) > 1:
-            yield "the loads are reversed", replace(scene, loads=tuple(map(_reverse, scene.loads))), at
-        for number, load in enumerate(scene.loads, 1):
-            turned = tuple(_reverse(other) if other is load else other for other in scene.loads)
-            yield f"load {number} (bar {load.bar}) is reversed", replace(scene, loads=turned), at
+    yield "theta_2 in radians where degrees were announced", at._replace(angle=in_degrees)
     if at.omega_2 is not None:
-        yield "no inertial forces (statics)", scene, at._replace(speed=0.0, acceleration=0.0)
+        yield "no inertial forces (statics)", at._replace(speed=0.0, acceleration=0.0)
         if np.any(at.alpha_2):
-            yield "alpha_2 is left out", scene, at._replace(acceleration=0.0)
-        rpm = np.pi / 30.0
-        yield "omega_2 in rev/min taken for rad/s", scene, at._replace(speed=at.omega_2 / rpm)
-        yield "omega_2 in rad/s taken for rev/min", scene, at._replace(speed=at.omega_2 * rpm)
+            yield "alpha_2 is left out", at._replace(acceleration=0.0)
+        yield "omega_2 in rev/min taken for rad/s", at._replace(speed=at.omega_2 / RPM)
+        yield "omega_2 in rad/s taken for rev/min", at._replace(speed=at.omega_2 * RPM)
+
+
+def _change_gravity(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    gravity = [effect for effect in scene.effects if isinstance(effect, Gravity)]
+    others = tuple(effect for effect in scene.effects if not isinstance(effect, Gravity))
+    if not gravity:
+        yield "gravity along -y is included though the scene has none", replace(scene, effects=(*others, Gravity()))
+        return
+    yield "gravity is missing", replace(scene, effects=others)
+    flipped = (replace(effect, magnitude=-effect.magnitude) for effect in gravity)
+    yield "gravity is reversed", replace(scene, effects=(*others, *flipped))
+
+
+def _change_loads(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    def without(i: int) -> Scene:
+        return replace(scene, loads=scene.loads[:i] + scene.loads[i + 1 :])
+
+    def reversing(i: int) -> Scene:
+        return replace(scene, loads=(*scene.loads[:i], _reverse(scene.loads[i]), *scene.loads[i + 1 :]))
+
+    names = [f"load {number} (bar {load.bar})" for number, load in enumerate(scene.loads, 1)]
+    if names:
+        yield "the loads are missing", replace(scene, loads=())
+        yield from ((f"{name} is missing", without(i)) for i, name in enumerate(names))
+    if len(names) > 1:
+        yield "the loads are reversed", replace(scene, loads=tuple(map(_reverse, scene.loads)))
+    yield from ((f"{name} is reversed", reversing(i)) for i, name in enumerate(names))
+
+
+def _change_bars(scene: Scene) -> Iterator[tuple[str, Scene]]:
     for name, bar in list_moving(scene):
         for text, change in BAR_MISTAKES:
             if (changed := change(bar)) is not None:
-                yield f"{name}: {text}", replace_bars(scene, **{name: changed}), at
-    for drive in {2, 3, 4} - {scene.drive_bar} if scene.drive is None else ():
-        yield f"the torque acts on bar {drive} instead of bar {scene.drive_bar}", replace(scene, drive_bar=drive), at
+                yield f"{name}: {text}", replace_bars(scene, **{name: changed})
 
 
 def _reverse(load: Load) -> Load:
     force = None if load.force is None else (-load.force[0], load.force[1])
     return replace(load, force=force, moment=-load.moment)
-
-
-def _take_relative(quantity: str, right: Solution, bar: int) -> Array | None:
-    if not _is_angular(quantity) or quantity.endswith(str(bar)):
-        return None
-    base = getattr(right, f"{quantity[:-1]}{bar}", None)
-    return None if base is None else _choose_where(quantity, right, lambda values: values - base)
 
 
 def _measure_from_other_pin(bar: Bar) -> Bar | None:
@@ -164,11 +186,6 @@ BAR_MISTAKES: tuple[tuple[str, Callable[[Bar], Bar | None]], ...] = (
 
 def _is_angular(quantity: str) -> bool:
     return quantity.startswith(("theta", "omega", "alpha"))
-
-
-def _choose_where(quantity: str, right: Solution, change: Callable[[Array], Array]) -> Array | None:
-    values = getattr(right, quantity, None)
-    return None if values is None else change(values)
 
 
 COLUMN_MISTAKES: tuple[tuple[str, Callable[[Array], Array], Callable[[str], bool]], ...] = (
