@@ -125,95 +125,160 @@ def solve_linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
     return [solution[k, 0] for k in range(len(right))]
 
 
-def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:  # noqa: PLR0915 - one system
+def compute_outputs(scene: Scene, branch: int, inputs: Values) -> Values | None:
     """Compute every output at one position as balls; vectors as name_x, name_y; None where the loop does not close."""
     x = turn_by_stroke(scene, inputs) if "stroke" in inputs else inputs
-    closed = None if x is None else closure(x, branch)
-    if x is None or closed is None:
+    directions = None if x is None else closure(x, branch)
+    if x is None or directions is None:
         return None
-    w = dict(zip(MOVING_BARS, closed, strict=True))
-    a, b, c, bar = x["a"], x["b"], x["c"], find_commanded(x)
-    y: Values = {f"theta_{k}": w[k].arg() for k in MOVING_BARS if f"theta_{k}" not in inputs}
+    w = dict(zip(MOVING_BARS, directions, strict=True))
+    commanded = find_commanded(x)
     sines = {2: wedge(w[3], w[4]), 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
-    y |= {"sin_mu": sines[2], "condition": abs(sines[bar]) * x.get("lever", 1)}
+    y: Values = {f"theta_{bar}": w[bar].arg() for bar in MOVING_BARS if f"theta_{bar}" not in inputs}
+    y |= {"sin_mu": sines[2], "condition": abs(sines[commanded]) * x.get("lever", 1)}
     if not y["condition"] > 0:  # singular; NaN where A lies on O4, about which bars 3 and 4 then turn freely
         return y
-    zero = acb(0)
-    side = {2: a * w[2], 3: b * w[3], 4: -c * w[4]}  # sides of the loop
+    bars = _move(x, w, commanded)
+    y |= {f"omega_{bar}": bars.omega[bar] for bar in MOVING_BARS}
+    y |= {f"alpha_{bar}": bars.alpha[bar] for bar in MOVING_BARS}
+    _put(y, bars.points())
+    line = find_line(scene.drive, x, bars.directions(x), bars.first_pin) if scene.drive else None
+    if line is None:
+        drive, y["drive_condition"], speed = "torque", abs(sines[scene.drive_bar]), bars.omega[scene.drive_bar]
+    else:
+        drive, y["drive_condition"] = "drive_force", compute_condition(line, x, bars.tip[2], sines)
+        speed = line.speed({1: acb(0), **bars.v_pin}, {1: arb(0), **bars.omega})
+        y |= {"stroke": line.stroke, "stroke_speed": speed}
+        _put(y, {"drive_line": line.line})
+    drives = {bar: (arb(0), arb(0), arb(bar == scene.drive_bar)) for bar in MOVING_BARS}
+    if line is not None:
+        drives = {bar: line.push(bar, bars.centre[bar]) for bar in MOVING_BARS}
+    try:
+        forces, driving = _solve_thirteen(x, bars, *_sum_acting(scene, x, bars), drives)
+    except ZeroDivisionError:
+        return y
+    _put(y, forces)
+    y[drive], y["power"] = driving, driving * speed
+    return y
 
-    def rates(stated: Ball, known: Complex) -> dict[int, Ball]:
-        """Solve for the rates of the other bars, where the sum of i side rate is given."""
-        one, other = (k for k in MOVING_BARS if k != bar)
-        u, v, known = acb(0, 1) * side[one], acb(0, 1) * side[other], known - acb(0, stated) * side[bar]
-        found = solve_linear([[u.real, v.real], [u.imag, v.imag]], [known.real, known.imag])
-        return {bar: stated, **dict(zip((one, other), found, strict=True))}
+
+class BallBars(NamedTuple):
+    """Bars 2, 3 and 4 in motion at one position: directions, rates, and vectors of the plane."""
+
+    w: dict[int, Complex]
+    """Unit vectors along the bars."""
+    omega: dict[int, Ball]
+    alpha: dict[int, Ball]
+    tip: dict[int, Complex]
+    """From the first pin to the second."""
+    first_pin: dict[int, Complex]
+    """Places of the first pins, the ground's too."""
+    centre: dict[int, Complex]
+    """From the first pin to the mass centre."""
+    v_pin: dict[int, Complex]
+    a_pin: dict[int, Complex]
+    """Velocities and accelerations of the first pins."""
+
+    def turn(self, bar: int, arm: Complex) -> Complex:
+        """Return the velocity of a point of a bar against its first pin."""
+        return acb(0, self.omega[bar]) * arm
+
+    def swing(self, bar: int, arm: Complex) -> Complex:
+        """Return the acceleration of a point of a bar against its first pin."""
+        return acb(-self.omega[bar] * self.omega[bar], self.alpha[bar]) * arm
+
+    def acceleration(self, bar: int) -> Complex:
+        """Return the acceleration of a mass centre."""
+        return self.a_pin[bar] + self.swing(bar, self.centre[bar])
+
+    def directions(self, x: Values) -> dict[int, Complex]:
+        """Return the unit vectors along all bars, the ground's too."""
+        return {1: polar(arb(1), x["theta_1"]), **self.w}
+
+    def points(self) -> dict[str, Complex]:
+        """Return places, velocities and accelerations of the points that are answered, by name."""
+        points = {"A": self.tip[2], "B": self.first_pin[4] + self.tip[4]}
+        points |= {"v_A": self.v_pin[3], "v_B": self.turn(4, self.tip[4])}
+        points |= {"a_A": self.a_pin[3], "a_B": self.swing(4, self.tip[4])}
+        for bar in MOVING_BARS:
+            points[f"G{bar}"] = self.first_pin[bar] + self.centre[bar]
+            points[f"v_G{bar}"] = self.v_pin[bar] + self.turn(bar, self.centre[bar])
+            points[f"a_G{bar}"] = self.acceleration(bar)
+        return points
+
+
+def _move(x: Values, w: dict[int, Complex], commanded: int) -> BallBars:
+    """Move the bars: two linear systems of the differentiated loop."""
+    a, b, c, zero = x["a"], x["b"], x["c"], acb(0)
+    side = {2: a * w[2], 3: b * w[3], 4: -c * w[4]}  # sides of the loop
+    first, second = (bar for bar in MOVING_BARS if bar != commanded)
+
+    def rates(stated: Ball, total: Complex) -> dict[int, Ball]:
+        """Solve for the rates of the other bars, where the sum of i side rate is `total`."""
+        u, v, rest = acb(0, 1) * side[first], acb(0, 1) * side[second], total - acb(0, stated) * side[commanded]
+        solved = solve_linear([[u.real, v.real], [u.imag, v.imag]], [rest.real, rest.imag])
+        return {commanded: stated, **dict(zip((first, second), solved, strict=True))}
 
     # a probe opens the loop by slip, m/s, and jerk, m/s^2
-    omega = rates(x[f"omega_{bar}"], x.get("slip", zero))
-    centripetal = sum((side[k] * omega[k] ** 2 for k in MOVING_BARS), zero)
-    alpha = rates(x[f"alpha_{bar}"], x.get("jerk", zero) + centripetal)
-    for k in MOVING_BARS:
-        y[f"omega_{k}"], y[f"alpha_{k}"] = omega[k], alpha[k]
+    omega = rates(x[f"omega_{commanded}"], x.get("slip", zero))
+    centripetal = sum((side[bar] * omega[bar] ** 2 for bar in MOVING_BARS), zero)
+    alpha = rates(x[f"alpha_{commanded}"], x.get("jerk", zero) + centripetal)
+    tip = {2: a * w[2], 3: b * w[3], 4: c * w[4]}
+    first_pin = {1: zero, 2: zero, 3: tip[2], 4: polar(x["d"], x["theta_1"])}
+    centre = {bar: w[bar] * polar(x[f"r{bar}"], x[f"phi{bar}"]) for bar in MOVING_BARS}
+    v_A, a_A = acb(0, omega[2]) * tip[2], acb(-omega[2] * omega[2], alpha[2]) * tip[2]
+    at_rest = {2: zero, 4: zero}
+    return BallBars(w, omega, alpha, tip, first_pin, centre, at_rest | {3: v_A}, at_rest | {3: a_A})
 
-    O4, tip = polar(x["d"], x["theta_1"]), {2: a * w[2], 3: b * w[3], 4: c * w[4]}
-    spin = {k: acb(0, omega[k]) for k in MOVING_BARS}
-    swing = {k: acb(-omega[k] * omega[k], alpha[k]) for k in MOVING_BARS}
-    first_pin = {1: zero, 2: zero, 3: tip[2], 4: O4}
-    v_foot, a_foot = ({2: zero, 3: turn[2] * tip[2], 4: zero} for turn in (spin, swing))
-    centre = {k: w[k] * polar(x[f"r{k}"], x[f"phi{k}"]) for k in MOVING_BARS}
-    acceleration = {k: a_foot[k] + swing[k] * centre[k] for k in MOVING_BARS}
-    points = {"A": tip[2], "B": O4 + tip[4], "a_A": a_foot[3], "a_B": swing[4] * tip[4]}
-    points |= {"v_A": v_foot[3], "v_B": spin[4] * tip[4]}
-    for k in MOVING_BARS:
-        points |= {f"G{k}": first_pin[k] + centre[k], f"a_G{k}": acceleration[k]}
-        points[f"v_G{k}"] = v_foot[k] + spin[k] * centre[k]
-    _put(y, points)
 
-    force = {k: x[f"m{k}"] * polar(x["g"], x["g_angle"]) if "g" in x else zero for k in MOVING_BARS}
-    moment = {k: x.get(f"couple_{k}", arb(0)) for k in MOVING_BARS}  # about G; a probe may add one
-    directions = {1: polar(arb(1), x["theta_1"]), **w}
-    _add_effects(scene, x, directions, first_pin, centre, force, moment)
+def _sum_acting(scene: Scene, x: Values, bars: BallBars) -> tuple[dict[int, Complex], dict[int, Ball]]:
+    """Sum what acts on each bar: a force, and a moment about the mass centre."""
+    force = {bar: x[f"m{bar}"] * polar(x["g"], x["g_angle"]) if "g" in x else acb(0) for bar in MOVING_BARS}
+    moment = {bar: x.get(f"couple_{bar}", arb(0)) for bar in MOVING_BARS}  # a probe may add one
+    _add_effects(scene, x, bars.directions(x), bars.first_pin, bars.centre, force, moment)
     for effect in scene.effects:
         if isinstance(effect, Flywheel):
-            moment[effect.bar] -= x["J"] * alpha[effect.bar]
+            moment[effect.bar] -= x["J"] * bars.alpha[effect.bar]
     for pin, (i, j) in PINS.items():
-        slip = omega.get(j, 0) - omega.get(i, 0)
+        slip = bars.omega.get(j, 0) - bars.omega.get(i, 0)
         sign = arb(1) if slip > 0 else arb(-1) if slip < 0 else arb(0) if slip == 0 else arb(0, 1)
         couple = -x.get(f"viscous_{pin}", arb(0)) * slip - x.get(f"friction_{pin}", arb(0)) * sign
         _add_twist(moment, pin, couple)
-    line = find_line(scene.drive, x, directions, first_pin) if scene.drive else None
-    # unknowns F12 F32 F23 F43 F34 F14 (x, y each) and T
-    joints = {2: ((0, "first_pin"), (1, "tip")), 3: ((2, "first_pin"), (3, "tip")), 4: ((4, "tip"), (5, "first_pin"))}
+    return force, moment
+
+
+def _solve_thirteen(
+    x: Values,
+    bars: BallBars,
+    force: dict[int, Complex],
+    moment: dict[int, Ball],
+    drives: dict[int, tuple[Ball, Ball, Ball]],
+) -> tuple[dict[str, Complex], Ball]:
+    """Solve for the pin forces and the driving torque or force; ZeroDivisionError where they are singular.
+
+    Unknowns F12 F32 F23 F43 F34 F14 (x, y each) and the drive, whose force and moment on each bar, for one of it, are
+    `drives`. Equations: Newton and Euler about each mass centre, then action and reaction at A and B.
+    """
+    at_pin = {bar: -bars.centre[bar] for bar in MOVING_BARS}
+    at_tip = {bar: bars.tip[bar] - bars.centre[bar] for bar in MOVING_BARS}
+    joints = {2: ((0, at_pin), (1, at_tip)), 3: ((2, at_pin), (3, at_tip)), 4: ((4, at_tip), (5, at_pin))}
     matrix = [[arb(0)] * 13 for _ in range(13)]
-    known = []
-    for n, k in enumerate(MOVING_BARS):
-        for column, end in joints[k]:
-            arm = -centre[k] if end == "first_pin" else tip[k] - centre[k]
+    constants = []
+    for n, bar in enumerate(MOVING_BARS):
+        for column, arms in joints[bar]:
+            arm = arms[bar]
             matrix[3 * n][2 * column] = matrix[3 * n + 1][2 * column + 1] = arb(1)
             matrix[3 * n + 2][2 * column], matrix[3 * n + 2][2 * column + 1] = -arm.imag, arm.real
-        pushed = line.push(k, centre[k]) if line else (arb(0), arb(0), arb(k == scene.drive_bar))
-        for row, value in enumerate(pushed, start=3 * n):
+        for row, value in enumerate(drives[bar], start=3 * n):
             matrix[row][12] = value
-        needed = x[f"m{k}"] * acceleration[k] - force[k]
-        known += [needed.real, needed.imag, x[f"I{k}"] * alpha[k] - moment[k]]
+        needed = x[f"m{bar}"] * bars.acceleration(bar) - force[bar]
+        constants += [needed.real, needed.imag, x[f"I{bar}"] * bars.alpha[bar] - moment[bar]]
     for row, (i, j) in enumerate(((2, 4), (3, 5), (6, 8), (7, 9)), start=9):
         matrix[row][i] = matrix[row][j] = arb(1)
-        known.append(arb(0))
-    if line is None:
-        drive, y["drive_condition"], speed = "torque", abs(sines[scene.drive_bar]), omega[scene.drive_bar]
-    else:
-        drive, y["drive_condition"] = "drive_force", compute_condition(line, x, tip[2], sines)
-        speed = line.speed({1: zero, **v_foot}, {1: arb(0), **omega})
-        y |= {"stroke": line.stroke, "stroke_speed": speed}
-        _put(y, {"drive_line": line.line})
-    try:
-        solved = solve_linear(matrix, known)
-    except ZeroDivisionError:
-        return y
+        constants.append(arb(0))
+    solved = solve_linear(matrix, constants)
     columns = {"F12": 0, "F32": 1, "F43": 3, "F14": 5}
-    _put(y, {name: acb(solved[2 * column], solved[2 * column + 1]) for name, column in columns.items()})
-    y[drive], y["power"] = solved[12], solved[12] * speed
-    return y
+    return {name: acb(solved[2 * k], solved[2 * k + 1]) for name, k in columns.items()}, solved[12]
 
 
 def _put(y: Values, vectors: dict[str, Complex]) -> None:
