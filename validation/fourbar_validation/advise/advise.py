@@ -71,16 +71,16 @@ class Advice:
     def reason(self) -> str:
         """Write the attempt in one line for the reader."""
         s, e = self.best.settings, self.best.errors
-        result = f"torque {e.torque:.1e}, worst pin force {e.force:.1e}"
+        errors = f"torque {e.torque:.1e}, worst pin force {e.force:.1e}"
         setting = (
             f"RK4, {self.best.steps} steps ({self.best.steps_per_revolution:.0f} per revolution), "
             f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad}, tolerance 0, flywheel {s.flywheel:g}"
         )
         if self.reached:
-            return f"{setting}: {result}, required {self.required:g}"
+            return f"{setting}: {errors}, required {self.required:g}"
         return (
             f"no setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.required:g}; "
-            f"the best was {setting}: {result}. "
+            f"the best was {setting}: {errors}. "
             f"The formulas, and inverse dynamics of either engine with loop multipliers, reach round-off"
         )
 
@@ -97,12 +97,12 @@ def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> Advic
 
 def choose_positions(scene: Scene) -> Command:
     """Take the scene's positions and others between them: the error peaks there, most near a pole of T3, T4."""
-    own = command_of(scene)
-    if np.ptp(own.branch) != 0:
-        return own
-    between = np.linspace(own.theta_2.min(), own.theta_2.max(), BETWEEN + 1)
-    theta_2 = np.union1d(own.theta_2, between)
-    return own._replace(angle=theta_2, branch=np.full(theta_2.shape, own.branch[0], dtype=np.int8))
+    at = command_of(scene)
+    if np.ptp(at.branch) != 0:
+        return at
+    between = np.linspace(at.theta_2.min(), at.theta_2.max(), BETWEEN + 1)
+    theta_2 = np.union1d(at.theta_2, between)
+    return at._replace(angle=theta_2, branch=np.full(theta_2.shape, at.branch[0], dtype=np.int8))
 
 
 class _CheapestSearch:
@@ -117,9 +117,9 @@ class _CheapestSearch:
         first, tc = guess(self.error)
         self._bisect(tc, first)
         for factor in (0.5, 2.0, 4.0):
-            other = min(max(tc * factor, SHORTEST), LONGEST)
-            if other != tc:
-                self._polish(other)
+            constant = min(max(tc * factor, SHORTEST), LONGEST)
+            if constant != tc:
+                self._polish(constant)
         served = self._is_served()
         best = min(served, key=lambda a: a.steps) if served else _find_nearest(self.attempts)
         return Advice(self.error, best, tuple(self.attempts), bool(served))
@@ -218,12 +218,14 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
             rows.append((file.name, "-", "-", "-", "cannot be simulated"))
             reached = False
             continue
-        result = measure_influences(scene, setup, advice.best.settings)
+        influences = measure_influences(scene, setup, advice.best.settings)
         click.echo(f"{file.name}: {advice.reason}")
-        click.echo(f"{write_sentence(result)}")
+        click.echo(f"{write_sentence(influences)}")
         click.echo(f"{len(advice.attempts)} runs of the scene, {sum(a.steps for a in advice.attempts)} steps")
         reached &= advice.reached
-        rows.append((file.name, *advice.cells(), result[0].setting if result[0].times >= MATTERS else "none by itself"))
+        rows.append(
+            (file.name, *advice.cells(), influences[0].setting if influences[0].times >= MATTERS else "none by itself")
+        )
         if output is not None and advice.reached:
             write_text(output, write_mjcf(scene, advice.best.settings))
             click.echo(f"written to {output}")

@@ -46,10 +46,10 @@ def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
     """Compute the errors of a trial, at its steps and between them; none where MuJoCo lost the motion."""
     if trial.broken:
         return NO_ANSWER
-    result = [compute_errors(scene, trial.at, trial.quantities)]
+    errors = [compute_errors(scene, trial.at, trial.quantities)]
     if scene.drive_bar == 2:  # the torque of another bar has poles, through which no curve can be drawn
-        result += [each for segment in trial.segments for each in compute_errors_between(scene, trial, *segment)]
-    return WorstErrors(*map(max, *result)) if len(result) > 1 else result[0]
+        errors += [between for segment in trial.segments for between in compute_errors_between(scene, trial, *segment)]
+    return WorstErrors(*map(max, *errors)) if len(errors) > 1 else errors[0]
 
 
 def compute_errors_between(scene: Scene, trial: Trial, samples: slice, steps: int) -> Iterator[WorstErrors]:
@@ -68,29 +68,29 @@ def compute_errors_between(scene: Scene, trial: Trial, samples: slice, steps: in
     if len(theta_2) < 2 or not all(np.isfinite(values).all() for values in read.values()):
         yield NO_ANSWER
         return
-    where = np.linspace(theta_2[0], theta_2[-1], 2 * n)
+    places = np.linspace(theta_2[0], theta_2[-1], 2 * n)
     degree = min(SPLINE, len(theta_2) - 1)
-    there = {name: make_interp_spline(theta_2, values, degree)(where) for name, values in read.items()}
-    branch = np.full(where.shape, trial.at.branch[samples][0], dtype=np.int8)
-    at = Command(where, branch, there.pop("omega_2"), there.pop("alpha_2"))
-    yield compute_errors(scene, at, there)
+    curves = {name: make_interp_spline(theta_2, values, degree)(places) for name, values in read.items()}
+    branch = np.full(places.shape, trial.at.branch[samples][0], dtype=np.int8)
+    at = Command(places, branch, curves.pop("omega_2"), curves.pop("alpha_2"))
+    yield compute_errors(scene, at, curves)
 
 
 def measure_influences(scene: Scene, setup: TrialSetup, settings: Settings) -> list[SettingInfluence]:
     """List every setting changed alone, the one that matters most first."""
     before = judge_trial(scene, setup.try_out(settings)).worst
-    result = []
-    for name, changed, other, why in _describe_changes(scene, settings):
-        worst = judge_trial(scene, setup.try_out(other)).worst
+    influences = []
+    for name, changed, varied, why in _describe_changes(scene, settings):
+        worst = judge_trial(scene, setup.try_out(varied)).worst
         times = worst / before if before > 0.0 and math.isfinite(before) else math.nan
-        result.append(SettingInfluence(name, changed, worst, times, why(setup)))
-    return sorted(result, key=lambda each: -each.times if each.times == each.times else math.inf)
+        influences.append(SettingInfluence(name, changed, worst, times, why(setup)))
+    return sorted(influences, key=lambda one: -one.times if one.times == one.times else math.inf)
 
 
-def write_sentence(found: list[SettingInfluence]) -> str:
+def write_sentence(influences: list[SettingInfluence]) -> str:
     """Name the setting that matters most, and why."""
-    if found and found[0].times >= MATTERS:
-        return str(found[0])
+    if influences and influences[0].times >= MATTERS:
+        return str(influences[0])
     return f"no setting matters by itself here: changed alone none makes the error {MATTERS:g} times as large"
 
 
@@ -135,8 +135,8 @@ def _explain_timestep(setup: TrialSetup) -> str:
     sines = np.abs(motion.sin_mu)
     nearest = int(np.nanargmin(sines))
     if sines[nearest] < IN_LINE:
-        near, where = (math.degrees(x) for x in (math.asin(sines[nearest]), float(setup.command.theta_2[nearest])))
-        return f"bars 3 and 4 come within {near:.2g} deg of one line at theta_2 = {where:.4g} deg and speed up there"
+        near, angle = (math.degrees(x) for x in (math.asin(sines[nearest]), float(setup.command.theta_2[nearest])))
+        return f"bars 3 and 4 come within {near:.2g} deg of one line at theta_2 = {angle:.4g} deg and speed up there"
     return "the error of RK4 goes as the fourth power of it"
 
 

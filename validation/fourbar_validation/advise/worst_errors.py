@@ -53,11 +53,11 @@ def compute_errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> W
         return NO_ANSWER
     worst = {}
     for name in QUANTITIES:
-        ours, where = getattr(formulas, name), judged
+        ours, counted = getattr(formulas, name), judged
         if name == "torque" and scene.drive_bar != 2:
-            where = judged & mark_turning(getattr(formulas, f"omega_{scene.drive_bar}"))
+            counted = judged & mark_turning(getattr(formulas, f"omega_{scene.drive_bar}"))
         error = find_error(name, ours, quantities[name], scale_of(name, scene, formulas, ours))
-        worst[name] = find_greatest(error[where])
+        worst[name] = find_greatest(error[counted])
     return WorstErrors(**worst)
 
 

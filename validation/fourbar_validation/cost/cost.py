@@ -51,17 +51,17 @@ def cost(scenes: tuple[Path, ...], out: Path) -> int:
         setup = TrialSetup(scene, command_of(scene))
         study = CostStudy(name, scene, out / name)
         curves = dict(track(study.points(), name, total=len(study), console=Console(stderr=True)))
-        result = fit_laws(curves)
+        laws = fit_laws(curves)
         ranked = measure_influences(scene, setup, BEST)
-        fitted += [law for law in result if law.decided]
-        written = write(study, curves, result, scene.title or name)
+        fitted += [law for law in laws if law.decided]
+        written = write(study, curves, laws, scene.title or name)
         Console().print(make_table(HEAD, list_front(curves), title=f"{name}: what accuracy costs"))
-        lines = [*write_laws(result), *(f"warning: {line}" for line in list_warnings(curves))]
+        lines = [*write_laws(laws), *(f"warning: {line}" for line in list_warnings(curves))]
         lines += [*(f"left out: {line}" for line in study.left_out), write_sentence(ranked)]
         click.echo("\n".join(lines))
-        held = sum(law.holds for law in result if law.decided)
+        held = sum(law.holds for law in laws if law.decided)
         most = ranked[0].setting if ranked[0].times >= MATTERS else "none by itself"
-        rows.append((name, *find_cheapest(curves), f"{held} of {sum(law.decided for law in result)}", most))
+        rows.append((name, *find_cheapest(curves), f"{held} of {sum(law.decided for law in laws)}", most))
         click.echo(f"written to {out / name}: {', '.join(sorted(path.name for path in written))}")
     if len(rows) > 1:
         head = ("scene", *(f"RK4 steps for {error:g}" for error in WANTED), "laws hold", "matters most")
@@ -72,7 +72,7 @@ def cost(scenes: tuple[Path, ...], out: Path) -> int:
 
 
 def write(
-    study: CostStudy, curves: Mapping[str, Sequence[CostPoint]], found: Sequence[ErrorLaw], title: str
+    study: CostStudy, curves: Mapping[str, Sequence[CostPoint]], laws: Sequence[ErrorLaw], title: str
 ) -> list[Path]:
     """Write cost.csv, cost.md and the pictures."""
     from fourbar_validation.cost.pictures import draw
@@ -82,7 +82,7 @@ def write(
         "title": title,
         "setup": describe_setup(),
         "pictures": [path.stem for path in pictures if path.suffix == ".svg"],
-        "laws": write_laws(found),
+        "laws": write_laws(laws),
         "head": HEAD,
         "front": list_front(curves),
         "warnings": list_warnings(curves),

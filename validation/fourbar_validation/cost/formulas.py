@@ -52,9 +52,12 @@ def evaluate_single(scene: Scene, at: Command) -> Quantities:
         position = path.position(theta_2, path.half_angle(theta_2), at.branch)
         state = case.state(theta_2, change_numbers(position, _round_single), at.branch, speed, growth)
         state = change_numbers(state, _round_single)
-        result = case.dynamics(state, growth)
-    assert result.drive.dtype == np.float32
-    return {"torque": result.drive, **{name: _stack(getattr(result.pins, name), len(theta_2)) for name in PIN_FORCES}}
+        dynamics = case.dynamics(state, growth)
+    assert dynamics.drive.dtype == np.float32
+    return {
+        "torque": dynamics.drive,
+        **{name: _stack(getattr(dynamics.pins, name), len(theta_2)) for name in PIN_FORCES},
+    }
 
 
 def _round_single(value: Any) -> Any:
@@ -64,8 +67,8 @@ def _round_single(value: Any) -> Any:
 
 def _stack(vector: Any, n: int) -> Array:
     """Stack the components of a complex vector, (n, 2)."""
-    whole = np.broadcast_to(vector, (n,))
-    return np.stack([whole.real, whole.imag], axis=1)
+    values = np.broadcast_to(vector, (n,))
+    return np.stack([values.real, values.imag], axis=1)
 
 
 def solve_thirteen_equations(scene: Scene, at: Command) -> Quantities:
@@ -104,14 +107,14 @@ def evaluate_balls(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quant
 
     before, ctx.prec = ctx.prec, bits
     try:
-        result = []
+        outputs = []
         for theta_2, branch in zip(at.theta_2.tolist(), at.branch.tolist(), strict=True):
             x = {name: arb(value) for name, value in collect_inputs(scene, theta_2).items()}
-            result.append(compute_outputs(scene, branch, x) or {})
+            outputs.append(compute_outputs(scene, branch, x) or {})
     finally:
         ctx.prec = before
-    out: Quantities = {"torque": [y.get("torque") for y in result]}
-    return out | {name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in result] for name in PIN_FORCES}
+    out: Quantities = {"torque": [y.get("torque") for y in outputs]}
+    return out | {name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in outputs] for name in PIN_FORCES}
 
 
 def compare_with_reference(scene: Scene, at: Command, quantities: Quantities, reference: Quantities) -> WorstErrors:
@@ -120,12 +123,12 @@ def compare_with_reference(scene: Scene, at: Command, quantities: Quantities, re
     worst = {}
     for name in ("torque", *PIN_FORCES):
         sizes = scale_of(name, scene, formulas, getattr(formulas, name))
-        result = []
+        errors = []
         for ours, exact, size in zip(quantities[name], reference[name], sizes.tolist(), strict=True):
             pairs = ((ours, exact),) if name == "torque" else tuple(zip(ours, exact, strict=True))
             if all(y is not None for _, y in pairs):
-                result.append(float(divide(math.hypot(*(_compute_difference(x, y) for x, y in pairs)), size)))
-        worst[name] = find_greatest(result)
+                errors.append(float(divide(math.hypot(*(_compute_difference(x, y) for x, y in pairs)), size)))
+        worst[name] = find_greatest(errors)
     return WorstErrors(**worst)
 
 

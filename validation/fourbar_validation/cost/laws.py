@@ -59,36 +59,36 @@ class ErrorLaw:
         return f"{'holds' if self.holds else 'FAILS'}, {self.exponent:.2f} +- {self.sigma:.2f}"
 
 
-def write_laws(found: Sequence[ErrorLaw]) -> list[str]:
+def write_laws(all_laws: Sequence[ErrorLaw]) -> list[str]:
     """Write each law in one line, quantity by quantity."""
     shown = []
-    for name in dict.fromkeys(law.name for law in found):
-        each = [law for law in found if law.name == name]
-        texts = _group([(law.quantity, str(law)) for law in each])
-        shown.append(f"{name}, expected {each[0].expected:g}: {'; '.join(texts)}")
+    for name in dict.fromkeys(law.name for law in all_laws):
+        laws = [law for law in all_laws if law.name == name]
+        texts = _group([(law.quantity, str(law)) for law in laws])
+        shown.append(f"{name}, expected {laws[0].expected:g}: {'; '.join(texts)}")
     return shown
 
 
 def _group(pairs: Sequence[tuple[str, str]]) -> list[str]:
     """Quantities with the same text, together."""
     texts = dict.fromkeys(text for _, text in pairs)
-    return [f"{', '.join(quantity for quantity, other in pairs if other == text)}: {text}" for text in texts]
+    return [f"{', '.join(quantity for quantity, text_of in pairs if text_of == text)}: {text}" for text in texts]
 
 
 def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     """Slope of log y over log x by least squares, and its standard error."""
     from scipy.stats import linregress
 
-    result = linregress(np.log(x), np.log(y))
-    return float(result.slope), float(result.stderr) if len(x) > 2 else math.inf
+    line = linregress(np.log(x), np.log(y))
+    return float(line.slope), float(line.stderr) if len(x) > 2 else math.inf
 
 
 def find_floor(points: Sequence[CostPoint], quantity: str) -> float | None:
     """Find the error that more steps no longer lessen; None where it still falls at the end of the ladder."""
-    result = [getattr(point, quantity) for point in _list_by_steps(points)]
-    if len(result) < 2 or not math.isfinite(result[-1]) or result[-1] < FLOORED * result[-2]:
+    errors = [getattr(point, quantity) for point in _list_by_steps(points)]
+    if len(errors) < 2 or not math.isfinite(errors[-1]) or errors[-1] < FLOORED * errors[-2]:
         return None
-    return float(result[-1])  # before it two sources may cancel: a dip is not a floor
+    return float(errors[-1])  # before it two sources may cancel: a dip is not a floor
 
 
 def find_steps_at_floor(points: Sequence[CostPoint], quantity: str) -> CostPoint | None:
@@ -105,18 +105,21 @@ def _list_by_steps(points: Sequence[CostPoint]) -> list[CostPoint]:
 
 def find_jumps(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
     """Return the points where an error jumps up as steps get finer, once the motion is the scene's."""
-    result = []
+    jumps = []
     for i, point in enumerate(points[1:], 1):
-        value, before = getattr(point, quantity), [getattr(each, quantity) for each in points[max(i - 2, 0) : i]]
+        value, before = (
+            getattr(point, quantity),
+            [getattr(point_before, quantity) for point_before in points[max(i - 2, 0) : i]],
+        )
         # two sources that cancel make a dip, and its far side is no jump; a motion that is lost again is one
         if before[-1] < TOO_LARGE and not value <= JUMP * (max(before) if value < TOO_LARGE else before[-1]):
-            result.append(point)
-    return result
+            jumps.append(point)
+    return jumps
 
 
 def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
     """Fit every law that the study was laid out for, of each quantity, as far as its curves exist."""
-    result = []
+    laws = []
     one_state = [point for point in curves.get("one state", ()) if point.setting_value > 0.0]
     ladders = [
         ("softness in (1-d)", curves.get("softness d", ()), 1.0),
@@ -126,9 +129,9 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
     ]
     for integrator, order in EXPECTED_ORDER.items():
         points, name = curves.get(f"{integrator}, tc held", ()), f"order of {integrator} in the timestep"
-        result += [_fit_law(name, quantity, points, order, by_steps=True) for quantity in QUANTITIES if points]
-    result += [_fit_law(name, quantity, points, n) for name, points, n in ladders for quantity in QUANTITIES if points]
-    return result + [law for quantity in QUANTITIES if (law := _fit_stiff(curves, quantity)).points > 0]
+        laws += [_fit_law(name, quantity, points, order, by_steps=True) for quantity in QUANTITIES if points]
+    laws += [_fit_law(name, quantity, points, n) for name, points, n in ladders for quantity in QUANTITIES if points]
+    return laws + [law for quantity in QUANTITIES if (law := _fit_stiff(curves, quantity)).points > 0]
 
 
 def _fit_law(
@@ -166,7 +169,7 @@ def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> Erro
 
 def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
     """List warnings where a quantity jumps towards finer steps, and where it has passed its floor."""
-    result = []
+    warnings = []
     for name, points in curves.items():
         ladder = _list_by_steps(
             [p for p in points if p.kind == STEPPED and p.setting_value == p.setting_value and p.setting_value >= 2.0]
@@ -176,15 +179,15 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
         if len({round(p.steps_per_revolution) for p in ladder}) < 4:
             continue
         leaps = [(q, _measure_leap(p, ladder, q)) for q in QUANTITIES for p in find_jumps(ladder, q)]
-        result += [f"{name}: {line}" for line in _group(leaps)]
+        warnings += [f"{name}: {line}" for line in _group(leaps)]
         floored = [(q, p) for q in QUANTITIES if (p := find_steps_at_floor(ladder, q)) is not None]
         if floored:
             beyond = (f"{q} beyond {p.steps_per_revolution:.0f} ({find_floor(ladder, q):.1e})" for q, p in floored)
-            result.append(f"{name}: more steps per revolution buy nothing: {', '.join(beyond)}")
+            warnings.append(f"{name}: more steps per revolution buy nothing: {', '.join(beyond)}")
         never = [q for q in QUANTITIES if not any(getattr(p, q) < TOO_LARGE for p in ladder)]
         if never:
-            result.append(f"{name}: no timestep of the ladder brings {', '.join(never)} below {TOO_LARGE:g}")
-    return result
+            warnings.append(f"{name}: no timestep of the ladder brings {', '.join(never)} below {TOO_LARGE:g}")
+    return warnings
 
 
 def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:

@@ -234,8 +234,10 @@ def _draw_sources(curves: Mapping[str, Sequence[CostPoint]], title: str) -> Any:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.5, 5.6))
-    left, right, both = 0.075, 0.985, 0.3
-    panels = [figure.add_axes((left + i * (right - left + 0.012) / 3.0, 0.105, both - 0.008, 0.6)) for i in range(3)]
+    left_edge, right, both = 0.075, 0.985, 0.3
+    panels = [
+        figure.add_axes((left_edge + i * (right - left_edge + 0.012) / 3.0, 0.105, both - 0.008, 0.6)) for i in range(3)
+    ]
     for axes, heading, label, rows in (
         (panels[0], "Time step", "time step, part of a revolution", CURVES),
         (panels[1], "Softness of the closure", "1 - d", SOFTNESS),

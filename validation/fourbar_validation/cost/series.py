@@ -87,16 +87,16 @@ def trace_steps(
 
 def design_curves(scene: Scene) -> list[Curve]:
     """Design the curves of one scene."""
-    result = [_vary_default_closure(name, abs(scene.motion.omega_2 or 1.0)) for name in INTEGRATORS]
+    curves = [_vary_default_closure(name, abs(scene.motion.omega_2 or 1.0)) for name in INTEGRATORS]
     for suffix, tc, held in (("pads, tc = 10 h", 10.0, None), ("tc held", 20.0, PART_OF_TURN)):
         for name in INTEGRATORS:
             settings = replace(BEST, integrator=name, time_constant_steps=tc)
-            result.append(trace_steps(f"{name}, {suffix}", settings, None, _choose_ladder(name), held))
+            curves.append(trace_steps(f"{name}, {suffix}", settings, None, _choose_ladder(name), held))
     for tc in (3.0, 30.0, 100.0):
-        result.append(trace_steps(f"RK4, pads, tc = {tc:g} h", replace(BEST, time_constant_steps=tc)))
-    result.append(trace_steps("RK4, no pads, tc = 10 h", PLAIN))
-    result += [*_vary_softness(), *_vary_tolerance()]
-    return result + (_vary_drives() if scene.motion.alpha_2 == 0.0 else [])
+        curves.append(trace_steps(f"RK4, pads, tc = {tc:g} h", replace(BEST, time_constant_steps=tc)))
+    curves.append(trace_steps("RK4, no pads, tc = 10 h", PLAIN))
+    curves += [*_vary_softness(), *_vary_tolerance()]
+    return curves + (_vary_drives() if scene.motion.alpha_2 == 0.0 else [])
 
 
 PLAIN = replace(BEST, pad=None, time_constant_steps=10.0)
@@ -116,7 +116,7 @@ def _vary_default_closure(integrator: str, speed: float) -> Curve:
     if integrator == "Euler":
         n = 2.0 * math.pi / speed / DEFAULT_TIMESTEP
         spots.append(Spot("MuJoCo's defaults", replace(settings, steps_per_revolution=n), drives.restore_defaults, n))
-    return replace(curve, spots=tuple(sorted(spots, key=lambda each: each.x)), settled=True)
+    return replace(curve, spots=tuple(sorted(spots, key=lambda spot: spot.x)), settled=True)
 
 
 def _vary_softness() -> list[Curve]:
@@ -146,19 +146,19 @@ def _vary_softness() -> list[Curve]:
 
 
 def _vary_tolerance() -> list[Curve]:
-    result = []
+    curves = []
     for solver, iterations in (("Newton", 10), ("CG", 100), ("PGS", 100)):
         settings = replace(BEST, solver=solver, iterations=iterations)
         label = solver + ", tolerance {:g}"
-        result.append(trace(f"tolerance, {solver}", label, TOLERANCES, lambda x, s=settings: replace(s, tolerance=x)))  # type: ignore[misc]
-    return result
+        curves.append(trace(f"tolerance, {solver}", label, TOLERANCES, lambda x, s=settings: replace(s, tolerance=x)))  # type: ignore[misc]
+    return curves
 
 
 def _vary_drives() -> list[Curve]:
     """List each drive with the integrator that carries it."""
     at = replace(BEST, flywheel=1.0)
     fast = replace(at, integrator="implicitfast", time_constant_steps=3.0)
-    result = [trace_steps(f"flywheel {f:g}, RK4", replace(BEST, flywheel=f)) for f in (1e2, 1e4, 1e6, 1e8)]
+    curves = [trace_steps(f"flywheel {f:g}, RK4", replace(BEST, flywheel=f)) for f in (1e2, 1e4, 1e6, 1e8)]
     tried: list[tuple[str, Build]] = [
         ("joint equality, RK4", drives.WheelEquality),
         ("joint equality, softness edited, RK4", drives.StiffWheelEquality),
@@ -169,5 +169,5 @@ def _vary_drives() -> list[Curve]:
     ]
     for name, drive in tried:
         carried = (at, drive) if name.endswith("RK4") else (fast, drive, MORE_STEPS)
-        result.append(trace_steps(name, *carried))
-    return result
+        curves.append(trace_steps(name, *carried))
+    return curves

@@ -115,12 +115,12 @@ class CostStudy:
                     continue
                 reasons = []
                 try:
-                    result = unit()
+                    points = unit()
                 except (FourBarError, NotImplementedError) as error:
-                    result, reasons = [], [f"{name}: {error}"]
+                    points, reasons = [], [f"{name}: {error}"]
                 self.left_out += reasons
-                store.put(number, [[asdict(point) for point in result], reasons])
-                yield name, result
+                store.put(number, [[asdict(point) for point in points], reasons])
+                yield name, points
 
     def setup(self, slow: bool = False, bare: bool = False, settled: bool = False) -> TrialSetup:
         """Assemble the scene for trials: at its own speed or slow, as it is or bare, after a turn or not."""
@@ -159,12 +159,12 @@ class CostStudy:
         points = []
         for spot, trial, (cost, scatter) in zip(spots, trials, per_step, strict=True):
             # the laws are those of the steps themselves: between them the advice judges
-            result = NO_ANSWER if trial.broken else compute_errors(setup.scene, trial.at, trial.quantities)
+            errors = NO_ANSWER if trial.broken else compute_errors(setup.scene, trial.at, trial.quantities)
             n = trial.steps_per_revolution or spot.settings.steps_per_revolution
             samples = max(len(trial.at.theta_2), 1)
             points.append(
                 CostPoint(
-                    *(name, STEPPED, spot.label, spot.x, trial.steps, n, *result),
+                    *(name, STEPPED, spot.label, spot.x, trial.steps, n, *errors),
                     *(cost * n, trial.reading / samples, cost * n / reference, scatter, trial.broken),
                 )
             )
@@ -188,7 +188,7 @@ class CostStudy:
         name: str,
         kind: str,
         label: str,
-        found: WorstErrors,
+        errors: WorstErrors,
         times: Sequence[float],
         n: int,
         setting_value: float = math.nan,
@@ -199,7 +199,7 @@ class CostStudy:
         reference, (seconds, scatter) = self._time_rk4_step(), summarise_timings(times)
         cost = seconds / n * per_revolution
         return CostPoint(
-            name, kind, label, setting_value, n, per_revolution, *found, cost, seconds / n, cost / reference, scatter
+            name, kind, label, setting_value, n, per_revolution, *errors, cost, seconds / n, cost / reference, scatter
         )
 
     def _time_rk4_step(self) -> float:
@@ -215,13 +215,13 @@ class CostStudy:
         points = []
         for label, method in formulas.METHODS.items():
             try:
-                result = formulas.compare_with_reference(self.scene, few, method(self.scene, few), exact)
+                errors = formulas.compare_with_reference(self.scene, few, method(self.scene, few), exact)
             except (NotImplementedError, AssertionError) as error:
                 self.left_out.append(f"{label}: {error}")
                 continue
             at = few if label == "50 digits" else self.command
             times = [time_call(partial(method, self.scene, at)) for _ in range(ROUNDS)]
-            points.append(self._make_point("formulas", FORMULAS, label, result, times, len(at.theta_2)))
+            points.append(self._make_point("formulas", FORMULAS, label, errors, times, len(at.theta_2)))
         return points
 
     def _time_inverse(self) -> list[CostPoint]:
@@ -238,10 +238,10 @@ class CostStudy:
         assert answer.assembled is not None
         rows = np.flatnonzero(answer.assembled)
         at = self.command._replace(angle=self.command.theta_2[rows], branch=self.command.branch[rows])
-        result = compute_errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
+        errors = compute_errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
         times = [time_call(partial(engine.answer, self.scene, self.command)) for _ in range(ANSWERS)]
         return self._make_point(
-            curve, EXACT, label or engine.name, result, times, len(self.command.theta_2), setting_value
+            curve, EXACT, label or engine.name, errors, times, len(self.command.theta_2), setting_value
         )
 
     def _time_one_state(self) -> list[CostPoint]:
@@ -260,12 +260,12 @@ class CostStudy:
         reference = self._time_rk4_step()
         for n in FORWARD_STEPS:
             ran = PinocchioForward(self.scene, self.command, n, FORWARD_TIME_CONSTANT * n).forward()
-            result = compute_errors(self.scene, ran.at, ran.quantities)
+            errors = compute_errors(self.scene, ran.at, ran.quantities)
             cost = ran.stepping / ran.steps * ran.steps_per_revolution
             points.append(
                 CostPoint(
                     *("Pinocchio forward", STEPPED, f"Pinocchio RK4, {n}/rev", n, ran.steps, ran.steps_per_revolution),
-                    *(*result, cost, math.nan, cost / reference, math.nan),
+                    *(*errors, cost, math.nan, cost / reference, math.nan),
                 )
             )
         return points
@@ -290,7 +290,7 @@ def _time_interleaved(
     """Time the steps, and their scatter over rounds; all take turns, so that a slow spell hits all of them."""
     every = list(zip((reference, *clocks), (TIMED_STEPS, *steps), strict=True))
     times = time_in_turns({number: partial(clock, n) for number, (clock, n) in enumerate(every)}, ROUNDS)
-    base, *rest = ([each / n for each in times[number]] for number, (_, n) in enumerate(every))
+    base, *rest = ([seconds / n for seconds in times[number]] for number, (_, n) in enumerate(every))
     return [summarise_timings(kept) for kept in rest], median(base)
 
 

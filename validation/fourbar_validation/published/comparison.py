@@ -52,14 +52,14 @@ def check(show_all: bool) -> int:
 
     console = Console(highlight=False, markup=False)
     counts: Counter[tuple[str, str]] = Counter()
-    named: Counter[str] = Counter()
+    met: Counter[str] = Counter()
     unexplained, reproduced = [], 0
     console.print("Printed figures that differ from ours, and why:" if not show_all else "Printed figures:")
     for figure in list_figures():
         verdict = figure.verdict()
         counts[figure.table, verdict] += 1
         if verdict == "differs":
-            named.update(figure.errata)
+            met.update(figure.errata)
             reproduced += figure.reproduced()
             if not is_explained(figure):
                 unexplained.append(figure)
@@ -84,7 +84,7 @@ def check(show_all: bool) -> int:
     click.echo(click.wrap_text(summary, WIDTH) + "\n")
     console.print("The errata met above (all: errata.toml of published/):")
     for name, erratum in ERRATA.items():
-        if named[name]:
+        if met[name]:
             text = f"#{name} {erratum.where}: printed {erratum.printed}. Right: {erratum.right}. "
             text += f"Why: {erratum.derivation}. Effect: {erratum.effect}."
             click.echo(click.wrap_text(text, WIDTH, "", "    "))

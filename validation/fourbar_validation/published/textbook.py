@@ -51,13 +51,13 @@ def compute_value(solution: fourbar.Solution, quantity: str, position: int) -> f
     if quantity.startswith("-"):
         return -compute_value(solution, quantity[1:], position)
     name, axis = (quantity[:-2], AXES[quantity[-2:]]) if quantity[-2:] in AXES else (quantity, None)
-    result: Any
+    values: Any
     if name == "v_A":
         assert solution.omega_2 is not None
-        result = solution.omega_2[:, None] * np.stack([-solution.A[:, 1], solution.A[:, 0]], axis=1)
+        values = solution.omega_2[:, None] * np.stack([-solution.A[:, 1], solution.A[:, 0]], axis=1)
     else:
-        result = getattr(solution, name)
-    return float(result[position] if axis is None else result[position, axis])
+        values = getattr(solution, name)
+    return float(values[position] if axis is None else values[position, axis])
 
 
 @cache

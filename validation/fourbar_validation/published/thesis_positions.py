@@ -31,9 +31,9 @@ d, a, b, c = LENGTHS
 def list_positions() -> Iterator[PublishedFigure]:
     """Section 2.4's table: theta_3 and theta_4 of both roots at 281 positions."""
     rows = list(csv.DictReader((DATA / "positions.csv").read_text(encoding="utf-8").splitlines()))
-    where = np.radians([float(row["theta2_deg"]) for row in rows])
+    theta_2 = np.radians([float(row["theta2_deg"]) for row in rows])
     for branch, third, fourth in ((1, "theta3_1", "theta4_2"), (-1, "theta3_2", "theta4_1")):
-        s = compute_motion(where, branch)
+        s = compute_motion(theta_2, branch)
         for row, theta_3, theta_4 in zip(rows, s.theta_3, s.theta_4, strict=True):
             for name, angle in ((third, float(theta_3)), (fourth, to_ours(float(theta_4)))):
                 text = row[f"{name}_deg"]
@@ -55,9 +55,9 @@ def list_half_angle_constants() -> Iterator[PublishedFigure]:
         "theta4_1": to_ours(float(roots[-1].theta_4[0])),
         "theta4_2": to_ours(float(roots[1].theta_4[0])),
     }
-    for name, own, other in (("theta4", c, b), ("theta3", b, c)):
-        k1, k2, k3 = 2.0 * own * x, 2.0 * own * y, x * x + y * y - other**2
-        ours = {"k1": k1, "k2": k2, "k3": k3, "A": k3 + own**2 - k1, "B": 2.0 * k2, "C": k3 + own**2 + k1}
+    for name, length, second in (("theta4", c, b), ("theta3", b, c)):
+        k1, k2, k3 = 2.0 * length * x, 2.0 * length * y, x * x + y * y - second**2
+        ours = {"k1": k1, "k2": k2, "k3": k3, "A": k3 + length**2 - k1, "B": 2.0 * k2, "C": k3 + length**2 + k1}
         ours |= {f"{key}_deg": math.degrees(angle) for key, angle in angles.items()}
         for key, text in read_printed()["published"]["section_2_4_theta2_90"][name].items():
             yield PublishedFigure("2.4 constants", key if key.startswith("theta") else f"{name} {key}", text, ours[key])
@@ -84,16 +84,16 @@ def list_limits() -> Iterator[PublishedFigure]:
         3: (a**2 + d**2 - (b + c) ** 2) / (2.0 * a * d),
         4: (a**2 + d**2 - (b - c) ** 2) / (2.0 * a * d),
     }
-    result = {2: to_degrees(output[-1].theta_2), 4: to_degrees(dead_centre[0].theta_2)}
+    limits = {2: to_degrees(output[-1].theta_2), 4: to_degrees(dead_centre[0].theta_2)}
     for row in json.loads((DATA / "limits.json").read_text(encoding="utf-8"))["table_3_2"]:
         number = row["row"]
         yield PublishedFigure("3.2 limits", f"row {number} cosine", row["discriminant_printed"], cosines[number])
         if number == 2:
-            made = result[2] - to_degrees(THETA_1)
-            yield PublishedFigure("3.2 limits", "row 2 theta_2", row["value_printed_deg"], result[2], ("14",), made)
+            made = limits[2] - to_degrees(THETA_1)
+            yield PublishedFigure("3.2 limits", "row 2 theta_2", row["value_printed_deg"], limits[2], ("14",), made)
         if number == 4:
-            yield PublishedFigure("3.2 limits", "row 4 theta_2", row["value_printed_deg"], result[4])
-            arc = result[4] - math.degrees(to_ours(THETA_1))
+            yield PublishedFigure("3.2 limits", "row 4 theta_2", row["value_printed_deg"], limits[4])
+            arc = limits[4] - math.degrees(to_ours(THETA_1))
             yield PublishedFigure("3.2 limits", "row 4 arc cosine", row["acos_printed_deg"], arc)
 
 

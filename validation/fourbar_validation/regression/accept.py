@@ -16,14 +16,7 @@ from fourbar_validation.compare.rows import FAILS, Row
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Differences, compare_runs
 from fourbar_validation.regression.history import HISTORY, append
-from fourbar_validation.regression.record import (
-    ABOUT,
-    ACCEPTED,
-    TABLES,
-    accept,
-    find_baseline,
-    open_run,
-)
+from fourbar_validation.regression.record import ABOUT, ACCEPTED, TABLES, accept, find_baseline, open_run
 from fourbar_validation.regression.scenes import find_renamed
 
 FORMS: dict[str, Callable[[Differences], str]] = {
@@ -68,14 +61,14 @@ def report_differences(
     keep = _is_chosen(chosen or {}, lambda column: chain(before.words(column), after.words(column)), names)
     engines = set(after.words("engine"))
     scenes = track(after.scenes(keep), "comparing", console=Console(stderr=True), transient=True)
-    result = compare_runs((before.about, before.scenes(keep)), (after.about, scenes), engines)
+    differences = compare_runs((before.about, before.scenes(keep)), (after.about, scenes), engines)
     unproven = [str(run.table) for run in (before, after) if not run.verified]
-    result.notes += [f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing" for table in unproven]
+    differences.notes += [f"{table}: not verified, its {ABOUT} states no SHA-256 or is missing" for table in unproven]
     for form, path in forms.items():
         if path is not None:
-            write_text(path, FORMS[form](result))
-    click.echo(render.write_text(result), nl=False)
-    return result.status
+            write_text(path, FORMS[form](differences))
+    click.echo(render.write_text(differences), nl=False)
+    return differences.status
 
 
 def _is_chosen(
@@ -92,13 +85,13 @@ def _is_chosen(
         if text is None:
             continue
         names = {name.strip() for name in text.split(",") if name.strip()}
-        missing, known = set(names), set[str]()
+        missing, offered = set(names), set[str]()
         for word in words(CHOICES[option]):
             missing.discard(word)
-            if len(known) < NAMED:
-                known.add(word)
+            if len(offered) < NAMED:
+                offered.add(word)
         for name in sorted(missing) or ([] if names else [text]):
-            raise InputError(f"--{option}", name, "must be among " + ", ".join(sorted(known)))
+            raise InputError(f"--{option}", name, "must be among " + ", ".join(sorted(offered)))
         both = {name for pair in renamed.items() if names & {*pair} for name in pair} if option == "only" else set()
         wanted[CHOICES[option]] = names | both
     return lambda row: all(getattr(row, column) in names for column, names in wanted.items())

@@ -32,8 +32,8 @@ class Group:
         """Add the rows of one more scene."""
         self.scenes += 1
         self.rows += len(changes)
-        self.quantities.update(each.key[3] for each in changes)
-        self.worst = max((*changes, *([self.worst] if self.worst else [])), key=lambda each: each.severity)
+        self.quantities.update(change.key[3] for change in changes)
+        self.worst = max((*changes, *([self.worst] if self.worst else [])), key=lambda change: change.severity)
 
     def __str__(self) -> str:
         names = ", ".join(name if n == 1 else f"{name} {n}" for name, n in self.quantities.most_common(6))
@@ -53,39 +53,41 @@ class Fault:
     def add(self, changes: Iterable[Change]) -> None:
         """Add the rows of one scene."""
         changes = list(changes)
-        self._scenes.update({each.key[1] for each in changes if each.kind is not Kind.NOT_RUN})
+        self._scenes.update({change.key[1] for change in changes if change.kind is not Kind.NOT_RUN})
         groups: dict[tuple[str, Kind, str], list[Change]] = {}
-        for each in changes:
-            groups.setdefault((each.key[1], each.kind, find_cause(each)), []).append(each)
+        for change in changes:
+            groups.setdefault((change.key[1], change.kind, find_cause(change)), []).append(change)
         for key, some in groups.items():
             if key not in self._groups and len(self._groups) >= MOST_CAUSES:
                 key = (*key[:2], "other causes")  # noqa: PLW2901
             self._groups.setdefault(key, Group(*key)).add(some)
-        worse = {each.key[1] for each in changes if each.regression}
+        worse = {change.key[1] for change in changes if change.regression}
         if worse:
             exact = {
-                each.key[1] for each in changes if _is_compared_exactly(each.old) or _is_compared_exactly(each.new)
+                change.key[1]
+                for change in changes
+                if _is_compared_exactly(change.old) or _is_compared_exactly(change.new)
             }
             self._who[write_sentence(worse, exact), frozenset(worse)] += 1
 
     def groups(self, kinds: Iterable[Kind]) -> list[Group]:
         """Return the groups of some kinds, the worst first, each with the number of its engine's scenes."""
         wanted = set(kinds)
-        result = [group for group in self._groups.values() if group.kind in wanted]
-        for group in result:
+        groups = [group for group in self._groups.values() if group.kind in wanted]
+        for group in groups:
             group.of_scenes = self._scenes[group.engine]
         order = list(Kind)
-        return sorted(result, key=lambda g: (order.index(g.kind), *(-x for x in _rank_severity(g)), -g.rows, g.engine))
+        return sorted(groups, key=lambda g: (order.index(g.kind), *(-x for x in _rank_severity(g)), -g.rows, g.engine))
 
     @property
     def sentences(self) -> list[str]:
         """List who disagrees, and in how many of their scenes; the most frequent first."""
         counts: Counter[str] = Counter()
-        of: Counter[str] = Counter()
+        of_scenes: Counter[str] = Counter()
         for (text, engines), n in self._who.items():
             counts[text] += n
-            of[text] = max(of[text], min(self._scenes[engine] for engine in engines))
-        return [f"{text}, {n} of {of[text]} scenes" for text, n in counts.most_common()]
+            of_scenes[text] = max(of_scenes[text], min(self._scenes[engine] for engine in engines))
+        return [f"{text}, {n} of {of_scenes[text]} scenes" for text, n in counts.most_common()]
 
 
 def _rank_severity(group: Group) -> tuple[bool, float]:
@@ -96,11 +98,11 @@ def _is_compared_exactly(row: Row | None) -> bool:
     return row is not None and row.setting == EXACT and row.compared and row.engine != FORMULAS
 
 
-def find_cause(of: Change) -> str:
+def find_cause(change: Change) -> str:
     """Take the reason without its numbers: one cause has one text in all scenes."""
-    if of.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE) and of.new is not None:
-        came = f"{of.old.verdict} -> {of.new.verdict}" if of.old is not None else of.new.verdict
-        return f"{came}: {NUMBER.sub('#', of.new.reason)}"
+    if change.kind in (Kind.VERDICT_WORSE, Kind.VERDICT_BETTER, Kind.NEW_FAILURE) and change.new is not None:
+        came = f"{change.old.verdict} -> {change.new.verdict}" if change.old is not None else change.new.verdict
+        return f"{came}: {NUMBER.sub('#', change.new.reason)}"
     return ""
 
 

@@ -58,9 +58,9 @@ class About:
 
 def describe_run(engines: Sequence[Engine], suite: str, scenes: Mapping[str, Mapping[str, str]] | None = None) -> About:
     """Describe a run made here and now."""
-    simulated = next((each.tolerance.factor for each in engines if each.tolerance.in_time), SIMULATED.factor)
+    simulated = next((engine.tolerance.factor for engine in engines if engine.tolerance.in_time), SIMULATED.factor)
     settings = {
-        "engines": ", ".join(each.name for each in engines),
+        "engines": ", ".join(engine.name for engine in engines),
         "suite": suite,
         "K": repr(K),
         "simulated": repr(simulated),
@@ -87,8 +87,8 @@ def _find_commit() -> str:
 
 def write_about(record: About, folder: Path) -> None:
     """Write record.json next to the results, with rows and SHA-256 of each table, and of itself."""
-    there = [path for name in TABLES if (path := folder / name).is_file()]
-    tables = {path.name: {"rows": count_rows(path), "sha256": _hash_file(path)} for path in there}
+    present = [path for name in TABLES if (path := folder / name).is_file()]
+    tables = {path.name: {"rows": count_rows(path), "sha256": _hash_file(path)} for path in present}
     kept = asdict(record) | {"tables": tables}
     write_text(folder / ABOUT, json.dumps(kept | {"sha256": _hash_own(kept)}, indent=1, sort_keys=True) + "\n")
 
@@ -104,12 +104,12 @@ def _hash_own(kept: Mapping[str, Any]) -> str:
 
 def _require_whole(tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str, key: str) -> None:
     """InputError that names the first table of a folder that is not what its record says."""
-    there = {name for name in TABLES if (folder / name).is_file()}
-    for name in sorted({*tables, *there, read}):
+    present = {name for name in TABLES if (folder / name).is_file()}
+    for name in sorted({*tables, *present, read}):
         path = folder / name
         if name not in tables:
             why = f"is not of this run: its {ABOUT} does not name it"
-        elif name not in there:
+        elif name not in present:
             why = f"is missing: {ABOUT} says that it has {tables[name]['rows']} rows"
         elif _hash_file(path) == tables[name]["sha256"]:
             continue
@@ -164,9 +164,9 @@ class Recorded:
         except (KeyError, TypeError, ValueError, csv.Error):
             raise InputError(self.key, str(table), "is not a table of times written by `run`") from None
 
-    def _read(self, found: Iterator[T]) -> Iterator[T]:
+    def _read(self, entries: Iterator[T]) -> Iterator[T]:
         try:
-            yield from found
+            yield from entries
         except (KeyError, TypeError, ValueError, OSError):  # a column, a cell or a number is missing, or is no text
             raise InputError(self.key, str(self.table), "is not a table written by `run`") from None
 
@@ -185,10 +185,10 @@ def open_run(path: Path, key: str = "RESULTS") -> Recorded:
     if (table.parent / UNFINISHED).is_file():
         raise InputError(key, str(table), "must be of a run that was finished: run it again, and it is resumed")
     record = table.parent / ABOUT
-    result = _open_described(record, table, key) if record.is_file() else Recorded(NOTHING_KNOWN, table, key=key)
-    if next(result.rows(), None) is None:
+    run = _open_described(record, table, key) if record.is_file() else Recorded(NOTHING_KNOWN, table, key=key)
+    if next(run.rows(), None) is None:
         raise InputError(key, str(table), "must hold at least one comparison: it has none")
-    return result
+    return run
 
 
 def _open_described(record: Path, table: Path, key: str) -> Recorded:

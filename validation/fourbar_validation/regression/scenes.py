@@ -38,11 +38,11 @@ def describe_changes(scene: Scene) -> dict[str, str]:
 
 def _flatten(prefix: str, value: Any) -> Iterable[tuple[str, str]]:
     if isinstance(value, dict):
-        for key, each in value.items():
-            yield from _flatten(f"{prefix}.{key}" if prefix else key, each)
-    elif isinstance(value, list) and any(isinstance(each, dict) for each in value):
-        for number, each in enumerate(value, 1):
-            yield from _flatten(f"{prefix}.{number}", each)
+        for key, entry in value.items():
+            yield from _flatten(f"{prefix}.{key}" if prefix else key, entry)
+    elif isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
+        for number, entry in enumerate(value, 1):
+            yield from _flatten(f"{prefix}.{number}", entry)
     else:
         yield prefix, ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
@@ -67,8 +67,8 @@ class SceneChange:
 
 def _shorten(old: str, new: str) -> str:
     """Write a unit that both have once: "0.048 -> 0.05 kg m^2"."""
-    (number, _, unit), (_, _, other) = old.partition(" "), new.partition(" ")
-    return f"{number} -> {new}" if unit and unit == other and "," not in old else f"{old} -> {new}"
+    (number, _, unit), (_, _, new_unit) = old.partition(" "), new.partition(" ")
+    return f"{number} -> {new}" if unit and unit == new_unit and "," not in old else f"{old} -> {new}"
 
 
 def find_renamed(old: Mapping[str, Description], new: Mapping[str, Description]) -> dict[str, str]:
@@ -76,13 +76,13 @@ def find_renamed(old: Mapping[str, Description], new: Mapping[str, Description])
     names: dict[str, list[str]] = {}
     for name in sorted(new.keys() - old.keys(), reverse=True):
         names.setdefault(repr(sorted(new[name].items())), []).append(name)
-    result = ((name, names.get(repr(sorted(old[name].items())))) for name in sorted(old.keys() - new.keys()))
-    return {name: same.pop() for name, same in result if same}
+    pairs = ((name, names.get(repr(sorted(old[name].items())))) for name in sorted(old.keys() - new.keys()))
+    return {name: same.pop() for name, same in pairs if same}
 
 
 def list_scene_changes(old: Mapping[str, Description], new: Mapping[str, Description]) -> list[SceneChange]:
     """List the scenes of both runs that ask something else now."""
-    result = []
+    changes = []
     for name in sorted(old.keys() & new.keys()):
         before, after = old[name], new[name]
         entries = tuple(
@@ -91,5 +91,5 @@ def list_scene_changes(old: Mapping[str, Description], new: Mapping[str, Descrip
             if before.get(key) != after.get(key)
         )
         if entries:
-            result.append(SceneChange(name, entries))
-    return result
+            changes.append(SceneChange(name, entries))
+    return changes

@@ -157,12 +157,12 @@ def find_worst_of_segments(error: Array, phase: float) -> np.ndarray[Any, np.dty
     """
     edges = (np.arange(STRETCHES + 2) - 1.0 + phase) * len(error) / STRETCHES
     bounds = np.clip(edges.astype(int), 0, len(error))
-    found = []
+    worst = []
     for start, stop in pairwise(bounds):
         piece = error[start:stop]
         if np.isfinite(piece).any():
-            found.append(start + int(np.nanargmax(np.where(np.isfinite(piece), piece, np.nan))))
-    return np.array(found, dtype=np.intp)
+            worst.append(start + int(np.nanargmax(np.where(np.isfinite(piece), piece, np.nan))))
+    return np.array(worst, dtype=np.intp)
 
 
 def _mark(answer: Answer, size: float) -> dict[str, Any]:

@@ -63,11 +63,11 @@ def list_approaches() -> list[Approach]:
 
 def list_errors(scene: Scene, quantity: str, engine: Engine) -> tuple[Array, Array] | None:
     """Return (theta_2, error relative to the value itself) of one engine, or None where it refuses."""
-    where = command(scene)
+    at = command(scene)
     if engine.through_time:
-        psi = np.abs(where.theta_2 - where.theta_2[0]) - abs(where.theta_2[-1] - where.theta_2[0])
-        where = Command(where.theta_2[-psi > SIMULATED_FROM], where.branch[-psi > SIMULATED_FROM], *where[2:4])
-    answer: Answer = engine.start().answer(scene, where)
+        psi = np.abs(at.theta_2 - at.theta_2[0]) - abs(at.theta_2[-1] - at.theta_2[0])
+        at = Command(at.theta_2[-psi > SIMULATED_FROM], at.branch[-psi > SIMULATED_FROM], *at[2:4])
+    answer: Answer = engine.start().answer(scene, at)
     if answer.refusal is not None or quantity not in answer.quantities or answer.at is None:
         return None
     ours = solve(scene, "force", at=answer.at)
@@ -114,9 +114,9 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
         label="computed: predicted to ten times that",
     )
     for engine in HARD_ENGINES:
-        found = list_errors(approach.scene, quantity, engine)
-        if found is not None and len(found[0]):
-            axes.loglog(np.abs(found[0] - singular), found[1], label=engine.name, **choose_style(engine.name).line)
+        curve = list_errors(approach.scene, quantity, engine)
+        if curve is not None and len(curve[0]):
+            axes.loglog(np.abs(curve[0] - singular), curve[1], label=engine.name, **choose_style(engine.name).line)
     axes.set_xlim(approach.distances[0] * 2, approach.distances[-1] / 2)
     axes.set_ylim(FLOOR, 1e3)
     axes.grid(visible=True, color=INK, alpha=0.2)

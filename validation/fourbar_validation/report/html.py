@@ -121,7 +121,9 @@ def write_html(
         no_pictures=no_pictures,
         sections=sections,
         independence=[(engine, *texts) for engine, texts in sorted(summary.independence.items())],
-        tolerances=[(each.name, count_or_size(each.factor), each.reason) for each in summary.tolerances],
+        tolerances=[
+            (tolerance.name, count_or_size(tolerance.factor), tolerance.reason) for tolerance in summary.tolerances
+        ],
         orders=[
             (scene, *map(write_number, (e["error_at_4h"], e["error_at_2h"])), f"{e['observed_order']:.1f}")
             for scene, e in summary.orders
@@ -138,13 +140,16 @@ def write_markdown(summary: Summary) -> str:
 
 def _make_view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> SceneView:
     rows = sort_rows(scene.rows)
-    cells = [Cell(line, *each) for line, each in enumerate(zip(rows, compute_shares(rows), strict=True), first_line)]
+    cells = [
+        Cell(line, *row_and_share)
+        for line, row_and_share in enumerate(zip(rows, compute_shares(rows), strict=True), first_line)
+    ]
     ranked = sorted(reversed(cells), key=lambda cell: (cell.row.compared, cell.used))  # the last cell of a place stays
     by_place = {(cell.row.quantity, cell.row.engine): cell for cell in ranked}
     # a share of undecided numbers is no error, unless it fails
     worst = {cell.row.engine: cell for cell in ranked if cell.row.quantity != "undecided" or cell.row.failed}
-    found = {cell.row.quantity for cell in cells}
-    quantities = [name for name in ORDER if name in found] + sorted(found.difference(ORDER))
+    names = {cell.row.quantity for cell in cells}
+    quantities = [name for name in ORDER if name in names] + sorted(names.difference(ORDER))
     engines = _list_engines(cell.row for cell in cells)
     return SceneView(scene, cells, engines, quantities, by_place, worst, pictures.get(scene.name))
 

@@ -23,14 +23,14 @@ BUILT = (".so", ".pyd", ".dylib", ".py")
 
 def list_versions() -> dict[str, str]:
     """Version of Python and of every library that decides a number; "not installed" where missing."""
-    found = {"python": platform.python_version()}
+    versions = {"python": platform.python_version()}
     for name, package in DISTRIBUTIONS.items():
         try:
-            found[name] = version(package)
+            versions[name] = version(package)
         except PackageNotFoundError:
             if name in PACKAGES:
-                found[name] = "not installed"
-    return found
+                versions[name] = "not installed"
+    return versions
 
 
 def name_machine() -> str:
@@ -59,9 +59,9 @@ def find_kernels() -> dict[str, str]:
 
     config: dict[str, Any] = np.show_config(mode="dicts")  # type: ignore[assignment]
     simd = config["SIMD Extensions"]
-    found = {"cpu_features": " ".join((*simd.get("baseline", ()), *simd.get("found", ())))}
+    kernels = {"cpu_features": " ".join((*simd.get("baseline", ()), *simd.get("found", ())))}
     kernel = find_blas()
-    return found | ({"blas_kernel": kernel} if kernel else {})
+    return kernels | ({"blas_kernel": kernel} if kernel else {})
 
 
 def find_blas() -> str:
@@ -82,8 +82,8 @@ def find_blas() -> str:
 def name_code(*further: Path) -> dict[str, str]:
     """Name and version or hash of everything that decides a number, `further` packages among it; one for a run."""
     builds = {name: build(package) for name, package in DISTRIBUTIONS.items()}
-    known = {f"build of {name}": found for name, found in builds.items() if found and name != "fourbar"}
-    return {"code": hash_modules(FORMULAS, PACKAGE, *further), **list_versions(), **known}
+    build_hashes = {f"build of {name}": digest for name, digest in builds.items() if digest and name != "fourbar"}
+    return {"code": hash_modules(FORMULAS, PACKAGE, *further), **list_versions(), **build_hashes}
 
 
 def hash_modules(*packages: Path) -> str:
@@ -107,10 +107,10 @@ def build(package: str) -> str:
     return hashlib.sha256("\n".join(files).encode()).hexdigest()[:16] if files else ""
 
 
-def find_differing(here: dict[str, str], there: dict[str, str]) -> str:
+def find_differing(here: dict[str, str], elsewhere: dict[str, str]) -> str:
     """Name the first entry in which two differ; nothing where they are the same."""
-    for name in [*here, *there]:
-        one, other = here.get(name, "none"), there.get(name, "none")
-        if one != other:
-            return f"{name} is {other} there and {one} here"
+    for name in [*here, *elsewhere]:
+        ours, theirs = here.get(name, "none"), elsewhere.get(name, "none")
+        if ours != theirs:
+            return f"{name} is {theirs} there and {ours} here"
     return ""

@@ -71,18 +71,18 @@ class Record:
         """Return the record from the data that `kept_all` returned."""
         rows = [Row(*row) for row in kept["rows"]]
         timings = [Timing(**timing) for timing in kept["timings"]]
-        independence = {engine: (shared, own) for engine, (shared, own) in kept["independence"].items()}
+        independence = {engine: (shared, alone) for engine, (shared, alone) in kept["independence"].items()}
         return cls(**{**kept, "timings": timings, "independence": independence, "rows": rows})
 
-    def joined(self, other: "Record") -> "Record":
+    def joined(self, further: "Record") -> "Record":
         """Add the answers of another set of engines; the rows of the formulas stand once."""
-        known = set(self.rows)
+        rows = set(self.rows)
         return replace(
             self,
-            rows=[*self.rows, *(row for row in other.rows if row not in known)],
-            timings=[*self.timings, *(timing for timing in other.timings if timing.engine != FORMULAS)],
-            left_out=[*self.left_out, *other.left_out],
-            independence={**self.independence, **other.independence},
-            evidence={**self.evidence, **other.evidence},
-            output={**self.output, **other.output},
+            rows=[*self.rows, *(row for row in further.rows if row not in rows)],
+            timings=[*self.timings, *(timing for timing in further.timings if timing.engine != FORMULAS)],
+            left_out=[*self.left_out, *further.left_out],
+            independence={**self.independence, **further.independence},
+            evidence={**self.evidence, **further.evidence},
+            output={**self.output, **further.output},
         )

@@ -42,9 +42,9 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
 
         sections += [collect_hard_cases(hard, draw_picture()), _list_limits()]
     elif results.is_file() and (out / HARD / "report.html").is_file():
-        found = collect_hard_cases(read_columns(results))
+        section = collect_hard_cases(read_columns(results))
         links = [(f"{HARD}/report.html",) * 2]
-        sections.append(replace(found, text=f"From the run in {HARD}/: {MUST}", links=links))
+        sections.append(replace(section, text=f"From the run in {HARD}/: {MUST}", links=links))
     folders = sorted(path.parent for path in (out / COST).glob("*/cost.csv"))
     return [*sections, *(_read_study(folder) for folder in folders[:MOST])]
 
@@ -81,7 +81,7 @@ def _list_limits() -> Section:
     """List the limits that engines declare, with the reason of each."""
     from fourbar_validation.engines.limits import LIMITS
 
-    rows = [(of.engine, of.name, f"{of.boundary:g} {of.unit}".rstrip(), of.reason) for of in LIMITS]
+    rows = [(limit.engine, limit.name, f"{limit.boundary:g} {limit.unit}".rstrip(), limit.reason) for limit in LIMITS]
     text = "Where an engine refuses to answer, declared as data before it is asked."
     return Section("engine-limits", "Limits of the engines", text, ("engine", "of what", "boundary", "why"), rows)
 

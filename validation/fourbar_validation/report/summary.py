@@ -142,9 +142,9 @@ class Summary:
             kind = (engine, NUMBER.sub("#", reason))
             self._refusals[kind] += 1
             self._first_reason.setdefault(kind, reason)
-        found = _find_worst(scene.rows)
-        self.judged += len(found)
-        self._worst = _keep_largest(WORST_SHOWN, [*self._worst, *found], lambda w: w.used)
+        worst = _find_worst(scene.rows)
+        self.judged += len(worst)
+        self._worst = _keep_largest(WORST_SHOWN, [*self._worst, *worst], lambda w: w.used)
         for row in scene.rows:
             if row.reason.startswith(EQUIVALENCE.name) and math.isfinite(row.error):
                 k = row.error * row.condition / EPS
@@ -155,8 +155,8 @@ class Summary:
         if bad:
             self._failing += [scene][: SCENES_SHOWN - len(self._failing)]
         else:
-            most = max((w.used for w in found), default=0.0)
-            self._holding = _keep_largest(SCENES_SHOWN, [*self._holding, (most, scene)], lambda each: each[0])
+            most = max((w.used for w in worst), default=0.0)
+            self._holding = _keep_largest(SCENES_SHOWN, [*self._holding, (most, scene)], lambda entry: entry[0])
 
     def picture(self, drawn: Record) -> None:
         """Add what was drawn and measured of a scene that is shown."""
@@ -174,14 +174,14 @@ class Summary:
                 times.append((1e6 * timing.seconds / timing.positions, ratio))
 
     def _add_orders(self, scene: Record) -> None:
-        known = [(scene.name, each) for each in scene.evidence.values() if "observed_order" in each]
-        self._orders = _keep_largest(ORDERS_SHOWN, [*self._orders, *known], _find_lowest)
+        orders = [(scene.name, evidence) for evidence in scene.evidence.values() if "observed_order" in evidence]
+        self._orders = _keep_largest(ORDERS_SHOWN, [*self._orders, *orders], _find_lowest)
 
     @property
     def verdict(self) -> str:
         """Say it in one sentence."""
-        left = f"; not run: {', '.join(engine for engine, _ in self.missing)}" if self.missing else ""
-        return self.counts.sentence() + left
+        not_run = f"; not run: {', '.join(engine for engine, _ in self.missing)}" if self.missing else ""
+        return self.counts.sentence() + not_run
 
     @property
     def loosest(self) -> str:
@@ -189,8 +189,8 @@ class Summary:
         if not self.loose:
             return ""
         worst = nlargest(LOOSEST_SHOWN, self._loosest, key=ALLOWANCE)
-        named = ", ".join(f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})" for row in worst)
-        return f'{self.loose} of {self.pairs} quantities of a scene are at best "{DEGRADED}"; the widest: {named}'
+        examples = ", ".join(f"{row.quantity} of {row.scene} (allowed {row.allowed:.1e})" for row in worst)
+        return f'{self.loose} of {self.pairs} quantities of a scene are at best "{DEGRADED}"; the widest: {examples}'
 
     @property
     def good(self) -> bool:
@@ -242,7 +242,7 @@ class Summary:
         return self._find_most_used(PICTURED)
 
     def _find_most_used(self, most: int) -> list[Record]:
-        holding = nlargest(most - len(self._failing), self._holding, key=lambda each: each[0])
+        holding = nlargest(most - len(self._failing), self._holding, key=lambda entry: entry[0])
         return [*self._failing, *(scene for _, scene in holding)]
 
 
@@ -265,8 +265,8 @@ def _count_compared(rows: Sequence[Row]) -> tuple[int, list[Row]]:
     for row in rows:
         if row.compared:
             by_quantity.setdefault(row.quantity, []).append(row)
-    loose = [of for of in by_quantity.values() if all(row.verdict == DEGRADED for row in of)]
-    return len(by_quantity), [min(of, key=ALLOWANCE) for of in loose]
+    loose = [rows_of_one for rows_of_one in by_quantity.values() if all(row.verdict == DEGRADED for row in rows_of_one)]
+    return len(by_quantity), [min(rows_of_one, key=ALLOWANCE) for rows_of_one in loose]
 
 
 def _find_worst(rows: Sequence[Row]) -> list[Worst]:
@@ -274,16 +274,16 @@ def _find_worst(rows: Sequence[Row]) -> list[Worst]:
     for share, row in zip(compute_shares(rows), rows, strict=True):
         if row.compared:
             groups.setdefault((row.engine, row.setting), []).append((share, row))
-    found = []
+    worst = []
     for group in groups.values():
-        share, row = max(group, key=lambda each: each[0])
-        found.append(Worst(row, share, len(group), sum(each.failed for _, each in group)))
-    return found
+        share, row = max(group, key=lambda entry: entry[0])
+        worst.append(Worst(row, share, len(group), sum(row_of_group.failed for _, row_of_group in group)))
+    return worst
 
 
-def _keep_largest(most: int, of: list[T], key: Callable[[T], float]) -> list[T]:
+def _keep_largest(most: int, entries: list[T], key: Callable[[T], float]) -> list[T]:
     """Cut the list to its largest once it is twice too long."""
-    return of if len(of) <= 2 * most else nlargest(most, of, key=key)
+    return entries if len(entries) <= 2 * most else nlargest(most, entries, key=key)
 
 
 def _find_lowest(order: tuple[str, dict[str, float]]) -> float:

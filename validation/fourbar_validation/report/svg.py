@@ -102,7 +102,7 @@ def draw_svg(figure: Any, salt: str) -> str:
 def shrink_svg(svg: str) -> str:
     """Make the SVG smaller, and take the colours of the page around it."""
     svg = METADATA.sub("", svg)
-    svg = COORDINATES.sub(lambda found: LONG_NUMBER.sub(r"\1", found.group()), svg)
+    svg = COORDINATES.sub(lambda match: LONG_NUMBER.sub(r"\1", match.group()), svg)
     svg = GROUP_NAME.sub("<g", BETWEEN_TAGS.sub("><", svg))
     for variable, colour in (("--ink", BLACK), *LIGHT.items()):
         svg = svg.replace(colour, f"var({variable})")
@@ -116,8 +116,8 @@ def _name_styles(svg: str) -> str:
     """
     classes: dict[str, str] = {}
 
-    def name(found: re.Match[str]) -> str:
-        style = found.group(1)
+    def name(match: re.Match[str]) -> str:
+        style = match.group(1)
         classes[style] = "m" + hashlib.sha256(style.encode()).hexdigest()[:8]
         return f' class="{classes[style]}"'
 

@@ -109,8 +109,8 @@ def make_table(headings: Sequence[str], rows: Iterable[Sequence[str]], words: in
     from rich.markup import escape
     from rich.table import Table
 
-    given: dict[str, Any] = {"box": SIMPLE_HEAD, "pad_edge": False}
-    shown = Table(**(given | options))
+    settings: dict[str, Any] = {"box": SIMPLE_HEAD, "pad_edge": False}
+    shown = Table(**(settings | options))
     for index, heading in enumerate(headings):
         shown.add_column(heading, justify="left" if index < words else "right", overflow="fold")
     for row in rows:

@@ -110,7 +110,7 @@ def check_statements(
     }
     if mobility.change_points(linkage):
         findings["through"] = limit_positions.check_through(linkage, engine)
-    return [make_worst_row(name, answer, quantity, list(each)) for quantity, each in findings.items()]
+    return [make_worst_row(name, answer, quantity, list(rows)) for quantity, rows in findings.items()]
 
 
 def compare_inertia(question: Question) -> Iterator[Row]:

@@ -85,11 +85,11 @@ def _check_sweep(question: Question) -> Row:
     return question.row("sweep", np.array([missed.max()]), allowed, reason)
 
 
-def _make_row(question: Question, quantity: str, equation: str, error: Array, where: Mask) -> Row:
+def _make_row(question: Question, quantity: str, equation: str, error: Array, judged: Mask) -> Row:
     """Make the row of an equation from its error, in parts of its terms, where it is worst."""
     condition = 1.0 / count_half_turns(question.scene.linkage.ground_angle, question.at.angle)
-    reason = f"identity: {equation}" if where.any() else NOWHERE
-    return question.row(quantity, error, IDENTITY.factor / condition, reason, where, condition)
+    reason = f"identity: {equation}" if judged.any() else NOWHERE
+    return question.row(quantity, error, IDENTITY.factor / condition, reason, judged, condition)
 
 
 class _Balance:
@@ -148,13 +148,13 @@ def _check_sums(question: Question) -> Iterator[Row]:
     with np.errstate(divide="ignore", invalid="ignore"):
         force_size = balance.forces / (find_lever(scene.linkage) * solution.drive_condition)
         moment_size = balance.moments / find_condition(drive, scene.linkage, solution)
-    where = solution.status_code == OK
+    judged = solution.status_code == OK
     # the sense of dry friction at a pin at rest is decided by rounding: not the same here as in the answer
-    where &= ~question.reversing(IDENTITY.factor)
-    yield _check_power(question, drive, where)
+    judged &= ~question.reversing(IDENTITY.factor)
+    yield _check_power(question, drive, judged)
     forces, moments = divide(magnitude(balance.force), force_size), divide(np.abs(balance.moment), moment_size)
-    yield _make_row(question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, where)
-    yield _make_row(question, "moment_sum", "moments about O2, with the torque", moments, where)
+    yield _make_row(question, "force_sum", "F12 + F14 + loads = sum of m a_G", forces, judged)
+    yield _make_row(question, "moment_sum", "moments about O2, with the torque", moments, judged)
 
 
 def _sum_actions(question: Question) -> tuple[Actions, Array]:
@@ -174,11 +174,11 @@ def _sum_actions(question: Question) -> tuple[Actions, Array]:
     return actions, np.array([O4.real, O4.imag])
 
 
-def _check_power(question: Question, drive: str, where: Mask) -> Row:
+def _check_power(question: Question, drive: str, judged: Mask) -> Row:
     """Compare the power of the drive with its torque or force times the speed at which it works."""
     solution = question.solution
     works = getattr(solution, drive) * getattr(solution, f"omega_{solution.drive_bar}", solution.stroke_speed)
-    return _make_row(question, "power", "of the drive", divide(np.abs(solution.power - works), np.abs(works)), where)
+    return _make_row(question, "power", "of the drive", divide(np.abs(solution.power - works), np.abs(works)), judged)
 
 
 def _compute_cross(u: Array, v: Array) -> Array:
@@ -201,8 +201,8 @@ def _solve_exactly(question: Question) -> tuple[OfSome | None, OfSome | None]:
     unknown = at.remainder is not None or at.commanded != "theta_2" or find_missing("flint")
     loaded = any(effect.loaded_pins for effect in scene.effects)
     return (
-        None if unknown else lambda where: compute_sines(scene.linkage, select_positions(at, where)),
-        (lambda where: count_solutions(scene, select_positions(at, where))) if loaded else None,
+        None if unknown else lambda indices: compute_sines(scene.linkage, select_positions(at, indices)),
+        (lambda indices: count_solutions(scene, select_positions(at, indices))) if loaded else None,
     )
 
 
@@ -228,9 +228,9 @@ def compare_status(
         differ |= sound & ~large & (np.isfinite(ours) != np.isfinite(theirs))
     differ &= formulas.status_code != NOT_ASSEMBLED
     if reference.drive_condition is not None:
-        own = [formulas.a_G2, formulas.a_G3, formulas.a_G4, *formulas.acceleration.values()]
+        accelerations = [formulas.a_G2, formulas.a_G3, formulas.a_G4, *formulas.acceleration.values()]
         # if everything that the forces need is finite, a missing number is the forces' own
-        moves = np.isfinite(np.hstack([a for a in own if a is not None])).all(axis=1)
+        moves = np.isfinite(np.hstack([a for a in accelerations if a is not None])).all(axis=1)
         in_line = reference.drive_condition < IN_ONE_LINE
         differ |= (formulas.status_code == OVERFLOW) & moves & in_line
         differ |= np.isin(formulas.status_code, (NO_TORQUE, NO_LEVER)) & (reference.drive_condition > NEAR)

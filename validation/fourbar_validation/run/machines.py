@@ -72,23 +72,23 @@ class Cluster:
             self.client.wait_for_workers(1, timeout=processes.STALL)
         except TimeoutError:
             raise self._say_no_workers() from None
-        there = self.client.nthreads()  # type: ignore[no-untyped-call]
-        result: Counter[str] = Counter()
+        workers = self.client.nthreads()  # type: ignore[no-untyped-call]
+        counts: Counter[str] = Counter()
         try:
-            tasks = {self.client.submit(describe_here, workers=[worker], pure=False): worker for worker in there}
+            tasks = {self.client.submit(describe_here, workers=[worker], pure=False): worker for worker in workers}
             for task, worker in tasks.items():
                 while not self.done([task], processes.STALL):
                     if self.lost([task]):
                         raise self._say_no_workers()
-                known, where = self.result(task)
-                if difference := find_differing(name_code(), known):
+                code, machine = self.result(task)
+                if difference := find_differing(name_code(), code):
                     raise ClusterError(f"{self.scheduler}: worker {worker} is not set up as this machine: {difference}")
-                result[where] += 1
+                counts[machine] += 1
         except DependencyError:
             raise
         except Exception as error:  # whatever a scheduler or a worker without this checkout comes up with
             raise self._find_unfit(error) from None
-        return "; ".join(f"{count} workers on {where}" for where, count in sorted(result.items()))
+        return "; ".join(f"{count} workers on {machine}" for machine, count in sorted(counts.items()))
 
     def over(
         self,

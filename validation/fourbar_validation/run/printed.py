@@ -80,9 +80,9 @@ def compare_points(
     usable = (solution.status_code == OK) & (reference.condition >= least)
     usable &= find_condition("F12", link, reference) * NOTHING_TO_TELL > EPS
     for point in scene.points:
-        own, first_pin = swing(point.bar, *point.from_pin), first_pins.get(point.bar, [zero, zero, zero])
+        arms, first_pin = swing(point.bar, *point.from_pin), first_pins.get(point.bar, [zero, zero, zero])
         tables, like = (solution.points, solution.velocity, solution.acceleration), ("B", "v_B", "a_B")
-        for ours, kind, arm, at_foot in zip(tables, like, own, first_pin, strict=True):
+        for ours, kind, arm, at_foot in zip(tables, like, arms, first_pin, strict=True):
             if point.name in ours:
                 theirs = np.stack(((arm + at_foot).real, (arm + at_foot).imag), axis=1)
                 size = np.abs(arm) + np.abs(at_foot) + sum_lengths(scene.linkage)
@@ -112,29 +112,29 @@ def check_blocks(question: Question) -> Iterator[Row]:
     repeated = select_positions(at, long)
     if sum(len(effect.loaded_pins) for effect in scene.effects) > 1:  # each may take a search
         repeated.angle[1 : BLOCK - 1] = np.nan
-    whole = solve(scene, "force", at=repeated)
-    error = (whole.status_code[ends] != solution.status_code[long[ends]]).astype(float)
+    together = solve(scene, "force", at=repeated)
+    error = (together.status_code[ends] != solution.status_code[long[ends]]).astype(float)
     for quantity in ("sin_mu", "B", "alpha_3", *FORCES):
         if (ours := getattr(solution, quantity)) is None:
             continue
-        one, other = getattr(whole, quantity)[ends], ours[long[ends]]
-        known = np.isfinite(magnitude(other))
-        error[known != np.isfinite(magnitude(one))] = np.inf
+        one, expected = getattr(together, quantity)[ends], ours[long[ends]]
+        finite = np.isfinite(magnitude(expected))
+        error[finite != np.isfinite(magnitude(one))] = np.inf
         with np.errstate(all="ignore"):  # beyond the range of doubles there is no size
             size = scale_of(quantity, scene, solution, ours)[long[ends]]
         condition = find_condition(quantity, scene.linkage, solution)[long[ends]]
         condition = np.where(np.isnan(condition), 1.0, condition)  # decided by the command where nothing closes
         # evaluated by the same code, but not in the same company of a processor's registers
-        apart = find_error(quantity, one, other, size) * condition
-        error[known] = np.maximum(error[known], apart[known])
+        apart = find_error(quantity, one, expected, size) * condition
+        error[finite] = np.maximum(error[finite], apart[finite])
     alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
     solve(scene, at=at, out=alone)  # they are found without vectors then
-    for angle, result in alone.items():
-        apart = find_error(angle, result, getattr(solution, angle), np.ones(n))
+    for angle, angles in alone.items():
+        apart = find_error(angle, angles, getattr(solution, angle), np.ones(n))
         apart *= find_condition(angle, scene.linkage, solution) / count_half_turns(scene.linkage.ground_angle, at.angle)
         error[-1] = max(error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0))
     reason = f"{len(long)} positions at once against {n}"
-    yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=whole.theta_2[ends])
+    yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=together.theta_2[ends])
 
 
 def check_error_bars(question: Question) -> Iterator[Row]:
@@ -147,17 +147,17 @@ def check_error_bars(question: Question) -> Iterator[Row]:
     if not len(usable):
         return
     spread = np.linspace(0, len(usable) - 1, SAMPLE).astype(int).tolist()
-    where = usable[
+    indices = usable[
         np.unique([*spread, *(int(np.argmin(pull[usable])) for pull in _compute_pulls(scene, at, solution))])
     ]
-    sampled = select_positions(at, where)
+    sampled = select_positions(at, indices)
     exact, ours = BallArithmetic().answer(scene, sampled), solve(scene, "error", at=sampled)
-    other = make_reference(scene, exact)
+    reference = make_reference(scene, exact)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width = getattr(ours, bar)
         true = np.max([magnitude(getattr(ours, q) - exact.quantities[q]) for q in quantities], axis=0)
-        size = np.max([take_smallest_scale(q, scene, ours, other) for q in quantities], axis=0)
-        condition = take_strictest_condition(quantities[0], scene.linkage, ours, other)
+        size = np.max([take_smallest_scale(q, scene, ours, reference) for q in quantities], axis=0)
+        condition = take_strictest_condition(quantities[0], scene.linkage, ours, reference)
         tells = condition * NOTHING_TO_TELL > EPS
         turns = np.array([count_half_turns(scene.linkage.ground_angle, theta_2) for theta_2 in sampled.theta_2])
         wide = divide(width, size) * condition / (K * EPS * turns)
@@ -195,16 +195,16 @@ def check_residual(question: Question) -> Iterator[Row]:
     for effect in scene.effects:
         for pin, mu, r in getattr(effect, "pins", ()):
             terms = np.fmax(terms, mu * r * magnitude(getattr(solution, PIN_FORCE[pin])))
-    known = np.isfinite(terms) & (terms > 0.0) & (solution.status_code == OK)
-    if np.any(solution.omega_2 == 0.0) or not known.any():
+    sliding = np.isfinite(terms) & (terms > 0.0) & (solution.status_code == OK)
+    if np.any(solution.omega_2 == 0.0) or not sliding.any():
         yield Row.unmeasured(
             question.name, FORMULAS, "exact", "friction_residual", UNDECIDED, "no pin slides under load"
         )
         return
-    error = np.where(known, residual / np.where(known, terms, 1.0) * solution.drive_condition, 0.0)
+    error = np.where(sliding, residual / np.where(sliding, terms, 1.0) * solution.drive_condition, 0.0)
     reason = "couples of mu r |F|, relative to the largest"
     row = question.row("friction_residual", error, K * EPS, reason, theta_2=solution.theta_2)
-    if np.count_nonzero(known) >= ROUNDED_SOMEWHERE and not residual[known].any():
+    if np.count_nonzero(sliding) >= ROUNDED_SOMEWHERE and not residual[sliding].any():
         row = replace(row, verdict=FAILS, reason="not even rounding is left at any position")
     yield row
 
@@ -246,7 +246,7 @@ def check_law(question: Question) -> Iterator[Row]:
         np.abs(alpha - at.acceleration) / bent,
     ]
     error = np.max(along, axis=0)
-    error[find_worst(error)] = np.max([error[find_worst(error)], *(each.max(initial=0.0) for each in errors)])
+    error[find_worst(error)] = np.max([error[find_worst(error)], *(misfit.max(initial=0.0) for misfit in errors)])
     yield question.row(
         "law", error, IDENTITY.factor, "the piecewise cubic through the table, its acceleration continuous"
     )

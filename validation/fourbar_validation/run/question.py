@@ -162,9 +162,9 @@ class Question:
 
 def ask_at(adapter: Adapter, scene: Scene, at: Command) -> Answer:
     """Give an engine what is commanded, and nothing that the formulas computed from it."""
-    given = remove_angles(at)
-    answer = adapter.answer(scene, given)
-    if answer.at is given:
+    bare = remove_angles(at)
+    answer = adapter.answer(scene, bare)
+    if answer.at is bare:
         return replace(answer, at=at)
     if at.stroke is not None and answer.at is not None:
         require_near(answer.at, at)
@@ -180,6 +180,6 @@ def remove_angles(at: Command) -> Command:
     return at._replace(angle=unknown, speed=speed, acceleration=unknown, condition=None, lost=None)
 
 
-def select_positions(at: Command, where: NDArray[np.intp]) -> Command:
+def select_positions(at: Command, indices: NDArray[np.intp]) -> Command:
     """Take some positions of a command."""
-    return at.part(where)._replace(remainder=None)
+    return at.part(indices)._replace(remainder=None)

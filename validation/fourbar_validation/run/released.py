@@ -76,9 +76,9 @@ class Pendulum(NamedTuple):
         # half the angle from the lowest point is the amplitude; it starts at phi_0 - pi, seen along the motion
         start = ellipkinc(0.5 * (sense * self.phi_0 - math.pi), m)
         turns = 0.5 * bottom * times + start
-        whole = np.round(turns / (2.0 * ellipk(m)))  # the amplitude grows by pi in every 2 K
-        _, _, dn, amplitude = ellipj(turns - whole * 2.0 * ellipk(m), m)
-        return sense * (2.0 * (amplitude + math.pi * whole) + math.pi), sense * bottom * dn
+        half_turns = np.round(turns / (2.0 * ellipk(m)))  # the amplitude grows by pi in every 2 K
+        _, _, dn, amplitude = ellipj(turns - half_turns * 2.0 * ellipk(m), m)
+        return sense * (2.0 * (amplitude + math.pi * half_turns) + math.pi), sense * bottom * dn
 
 
 def make_pendulum(scene: Scene) -> Pendulum | None:
@@ -159,8 +159,11 @@ def _compare_forces(question: Question) -> Iterator[Row]:
     held = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0), drive_bar=2, drive=None)
     at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
     driven_ones = [
-        (Question(name, own, select_positions(at, where), output=question.output), take_member(solution, where))
-        for own, where in _prescribe(held, at)
+        (
+            Question(name, prescribed, select_positions(at, indices), output=question.output),
+            take_member(solution, indices),
+        )
+        for prescribed, indices in _prescribe(held, at)
     ]
     for engine in question.engines:
         if engine.tolerance == EQUIVALENCE and "theta_3" in engine.answers and not engine.missing():
@@ -170,7 +173,7 @@ def _compare_forces(question: Question) -> Iterator[Row]:
 
 def _keep_worst_forces(engine: Engine, driven: list[tuple[Question, Solution]]) -> list[Row]:
     """Compare what one engine answers to each part of the motion, and keep the worst row of each quantity."""
-    return keep_worst(row for own, solution in driven for row in _compare_forces_by(engine, own, solution))
+    return keep_worst(row for question, solution in driven for row in _compare_forces_by(engine, question, solution))
 
 
 def _compare_forces_by(engine: Engine, driven: Question, solution: Solution) -> list[Row]:
@@ -207,8 +210,8 @@ def _prescribe(scene: Scene, at: Command) -> Iterator[tuple[Scene, NDArray[np.in
     bare = replace(scene, effects=tuple(effect for effect in scene.effects if effect is not friction))
     numbers = np.stack((at.theta_2, at.alpha_2), axis=1)[resting]
     for first in resting[np.unique(numbers, axis=0, return_index=True)[1]].tolist():
-        where = np.array([first])
-        here = select_positions(at, where)
+        index = np.array([first])
+        here = select_positions(at, index)
         needed, begins = FreeBody().answer(bare, here).quantities["torque"][0], float(np.sign(here.alpha_2)[0])
         turning = FreeBody().answer(bare, here._replace(speed=np.ones(1))).quantities
         rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}
@@ -221,7 +224,7 @@ def _prescribe(scene: Scene, at: Command) -> Iterator[tuple[Scene, NDArray[np.in
             for bar, sense in zip(PINS[pin], (-1.0, 1.0), strict=True)
             if bar != 1
         ]
-        yield replace(bare, loads=(*scene.loads, *loads)), where
+        yield replace(bare, loads=(*scene.loads, *loads)), index
 
 
 class _Truth(NamedTuple):
@@ -241,13 +244,13 @@ def _make_rows(question: Question, fine: ReleasedAnswer, coarse: ReleasedAnswer 
     if len(fine.theta_2) < n:
         return [Row.unmeasured(*who, "all", FAILS, f"it stopped after {len(fine.theta_2)} of {n} instants")]
 
-    def numbers(of: ReleasedAnswer) -> dict[str, Array]:
-        result = {"theta_2": of.theta_2[:n], "omega_2": of.omega_2[:n]}
+    def numbers(answer: ReleasedAnswer) -> dict[str, Array]:
+        series = {"theta_2": answer.theta_2[:n], "omega_2": answer.omega_2[:n]}
         if coarse is not None:  # the formulas integrate the energy equation itself; their drift is part of their test
-            result["energy"] = of.energy[:n] - of.energy[0]
+            series["energy"] = answer.energy[:n] - answer.energy[0]
             if through == "sign":
-                result["stopped_at"] = _find_end(of.stopped_at, free.duration)
-        return result
+                series["stopped_at"] = _find_end(answer.stopped_at, free.duration)
+        return series
 
     right_and_size = {
         "theta_2": (truth.theta_2, 1.0),
@@ -260,9 +263,9 @@ def _make_rows(question: Question, fine: ReleasedAnswer, coarse: ReleasedAnswer 
         right, size = right_and_size[name][0], replace_zero_size(np.array(right_and_size[name][1]))
         error, expected = divide(np.abs(values - right), size), 0.0
         if coarse is not None:
-            other = numbers(coarse)[name]
-            alike = len(other) == len(values)
-            expected = float(divide(np.abs(values - other).max(), size)) if alike else math.nan
+            coarser = numbers(coarse)[name]
+            alike = len(coarser) == len(values)
+            expected = float(divide(np.abs(values - coarser).max(), size)) if alike else math.nan
         index = find_worst(error)
         full = FULL[name] * max(1.0, free.duration / UNIT)
         allowed = max(full, TIMES_PREDICTED * expected)

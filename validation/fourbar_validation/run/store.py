@@ -78,15 +78,15 @@ class Store:
 
     def done(self) -> set[int]:
         """List the chunks whose parts are complete and of this run; others are removed, and noted."""
-        result = set()
+        done = set()
         for path in sorted(self.parts.iterdir()):
             try:
                 self._unpack(path)
-                result.add(int(path.name))
+                done.add(int(path.name))
             except ValueError as error:
                 self.notes.append(f"made again: {path.parent.name}/{path.name}: {error}")
                 _remove(path)
-        return result
+        return done
 
     def put(self, chunk: int, results: Sequence[Any]) -> None:
         """Write a finished chunk, its results as JSON has them."""

@@ -73,9 +73,13 @@ def replace_bars(scene: Scene, **bars: Bar) -> Scene:
     return replace(scene, linkage=replace(scene.linkage, **bars))  # type: ignore[arg-type]
 
 
-def _compute_corners(one: float, other: float, opposite: float) -> list[float]:
+def _compute_corners(side: float, second_side: float, opposite: float) -> list[float]:
     """Compute the angles, of either sign, between two sides of a triangle by its third side, if it closes."""
-    cosine = (one * one + other * other - opposite * opposite) / (2 * one * other) if other else 2.0
+    cosine = (
+        (side * side + second_side * second_side - opposite * opposite) / (2 * side * second_side)
+        if second_side
+        else 2.0
+    )
     return [math.acos(cosine), -math.acos(cosine)] if abs(cosine) < 1.0 else []
 
 
@@ -92,28 +96,28 @@ def find_collinear_3_4(lengths: Lengths) -> list[tuple[float, bool]]:
 def find_collinear_2_3(lengths: Lengths) -> list[tuple[float, int]]:
     """Find (psi, branch) where bars 2, 3 are collinear, so omega_4 = 0: triangle O2, B, O4 with O2 B = |a +- b|."""
     d, a, b, c = lengths
-    result = []
+    places = []
     for along in (a + b, a - b):
         for psi in _compute_corners(d, along, c):
             u = complex(math.cos(psi), math.sin(psi))
-            result.append((psi, _find_side(d - a * u, (along - a) * u)))
-    return result
+            places.append((psi, _find_side(d - a * u, (along - a) * u)))
+    return places
 
 
 def find_parallel_2_4(lengths: Lengths) -> list[tuple[float, int]]:
     """Find (psi, branch) where bars 2, 4 are parallel, omega_3 = 0: (a - c) e^{i psi} + b e^{i psi_3} = d, or a + c."""
     d, a, b, c = lengths
-    result = []
+    places = []
     for joined, side in ((a - c, 1.0), (a + c, -1.0)):
         for psi in _compute_corners(d, joined, b):
             u = complex(math.cos(psi), math.sin(psi))
-            result.append((psi, _find_side(d - joined * u, side * c * u)))
-    return result
+            places.append((psi, _find_side(d - joined * u, side * c * u)))
+    return places
 
 
-def _find_side(one: complex, other: complex) -> int:
+def _find_side(one: complex, second: complex) -> int:
     """Return the sign of the rotation from one direction to another."""
-    return 1 if (one.conjugate() * other).imag > 0.0 else -1
+    return 1 if (one.conjugate() * second).imag > 0.0 else -1
 
 
 def toggle(*, distances: tuple[float, ...] = TOGGLE, seeds: range = range(2)) -> Scenes:
@@ -135,8 +139,8 @@ def approach_poles(*, bar: int, distances: tuple[float, ...] = POLE, seeds: rang
     offsets = np.array([*(-x for x in (*REGULAR, *distances)), *distances[::-1], *REGULAR[::-1]])
     for seed in seeds:
         lengths = draw_linkage(CRANK, seed)
-        result = find_parallel_2_4(lengths) if bar == 3 else find_collinear_2_3(lengths)
-        for number, (psi, branch) in enumerate(result[:3]):
+        poles = find_parallel_2_4(lengths) if bar == 3 else find_collinear_2_3(lengths)
+        for number, (psi, branch) in enumerate(poles[:3]):
             yield f"{seed} {number}", set_angles(dress(lengths, seed), psi + offsets, branch, drive_bar=bar)
 
 
@@ -337,9 +341,9 @@ class Hard:
 @cache
 def _make_scenes() -> list[tuple[str, Scene]]:
     """Make the scenes, by name."""
-    result = []
+    scenes = []
     for family in FAMILIES:
         for label, scene in family.scenes():
             titled = replace(scene, title=f"{family.name}: {label}", source=family.statement)
-            result.append((f"{family.name} {label}".replace(" ", "-"), titled))
-    return sorted(result, key=lambda pair: pair[0])
+            scenes.append((f"{family.name} {label}".replace(" ", "-"), titled))
+    return sorted(scenes, key=lambda pair: pair[0])

@@ -144,9 +144,9 @@ def _draw_springs(rng: np.random.Generator, linkage: FourBar, weight: float, ran
     effects: list[Any] = []
     size = weight * abs(ranges.load(rng))
     if rng.random() < ranges.sprung:
-        one, other = (int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False))
+        one, second = (int(bar) for bar in rng.choice([1, *MOVING_BARS], 2, replace=False))
         start, end = (
-            SpringEnd(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, other)
+            SpringEnd(bar, linkage.lengths[bar - 1] * ranges.arm(rng), ANY_ANGLE(rng)) for bar in (one, second)
         )
         length = max(linkage.lengths)
         effects.append(
@@ -174,12 +174,7 @@ class DrawnType(Enum):
     TRIPLE_ROCKER = "triple-rocker"
 
 
-SHORTEST = {
-    DrawnType.DRAG_LINK: 0,
-    DrawnType.CRANK_ROCKER: 1,
-    DrawnType.DOUBLE_ROCKER: 2,
-    DrawnType.ROCKER_CRANK: 3,
-}
+SHORTEST = {DrawnType.DRAG_LINK: 0, DrawnType.CRANK_ROCKER: 1, DrawnType.DOUBLE_ROCKER: 2, DrawnType.ROCKER_CRANK: 3}
 """Index in (ground, input, coupler, output) of the shortest bar of a Grashof linkage of each type."""
 UNEVEN_TYPE = "uneven"
 """Name that stands for the family `UNEVEN_FAMILY` in place of types."""

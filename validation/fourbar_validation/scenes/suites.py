@@ -172,10 +172,10 @@ def read_suite(path: Path) -> Files:
     for entry in entries:
         if Path(entry).is_absolute() or ".." in Path(entry).parts or "\0" in entry:
             raise refuse(entry, "must lie in the folder of the list, or below it")
-        result = [path.parent / entry]
+        matches = [path.parent / entry]
         if "*" in entry:
-            result = sorted(file for file in path.parent.glob(entry) if not file.samefile(path))
-        if not result:
+            matches = sorted(file for file in path.parent.glob(entry) if not file.samefile(path))
+        if not matches:
             raise refuse(entry, "names no file")
-        files += result
+        files += matches
     return read_scene_files(files)

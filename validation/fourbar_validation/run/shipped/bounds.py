@@ -45,13 +45,13 @@ def extremes(question: Question) -> list[Row]:
             scene, tolerances=tuple(fourbar.Tolerance(f"lengths.{k}", GIVEN * x) for k, x in lengths.items())
         )
     try:
-        result = fourbar.extremes(scene, [drive])
+        bounds = fourbar.extremes(scene, [drive])
     except (InputError, LimitError) as limit:
         return [Row.unmeasured(question.name, "extremes", "exact", drive, REFUSES, str(limit))]
-    assert result.nominal is not None
-    ends = [each[drive] for of in (result, result.nominal) for each in (of.least, of.greatest)]
+    assert bounds.nominal is not None
+    ends = [each[drive] for part in (bounds, bounds.nominal) for each in (part.least, part.greatest)]
     theta_2 = np.concatenate(
-        [*(np.linspace(low, high, POSITIONS) for low, high in result.parts), [each.theta_2 for each in ends]]
+        [*(np.linspace(low, high, POSITIONS) for low, high in bounds.parts), [each.theta_2 for each in ends]]
     )
     reach = {each.key: each.reach for each in scene.tolerances[:MOST]}
     bare = replace(scene, tolerances=(), motion=scene.motion.replace(angle=theta_2, through="sign"))
@@ -61,8 +61,8 @@ def extremes(question: Question) -> list[Row]:
     values = np.array([ask_free_bodies(member).quantities[drive] for member in moved])
     size = max(abs(end) for each in ends for end in each[:2])
     error = np.zeros_like(theta_2)
-    whole = len(reach) == len(scene.tolerances)
-    for of, own, within in ((result, values, whole), (result.nominal, values[:1], True)):
+    all_moved = len(reach) == len(scene.tolerances)
+    for of, own, within in ((bounds, values, all_moved), (bounds.nominal, values[:1], True)):
         for sign, each in ((-1.0, of.least[drive]), (1.0, of.greatest[drive])):
             proven, reached = (each.high, each.low) if sign > 0 else (-each.low, -each.high)
             beyond = (sign * own).max(axis=0) - proven  # NaN where a linkage has no torque: nothing holds there

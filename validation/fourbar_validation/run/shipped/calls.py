@@ -40,9 +40,9 @@ def furnish(scene: Scene, question: Question) -> Scene:
         scene = replace(scene, points=tuple(Point(f"P{bar}", bar, arm) for bar, arm in arms.items()))
     assert question.free_body is not None
     size = magnitude(question.free_body.quantities["F12"])
-    known = size[np.isfinite(size) & (size > 0.0)]
-    if not any(load.table for load in scene.loads) and known.size and scene.motion.law is None:
-        force, table = 0.5 * float(np.median(known)), Table(tuple(first + x for x in CORNERS), (1.0, -0.5, 2.0, 1.0))
+    positive = size[np.isfinite(size) & (size > 0.0)]
+    if not any(load.table for load in scene.loads) and positive.size and scene.motion.law is None:
+        force, table = 0.5 * float(np.median(positive)), Table(tuple(first + x for x in CORNERS), (1.0, -0.5, 2.0, 1.0))
         load = Load(3, (force, 0.3), (0.2 * coupler.length, 0.5), 0.1 * force * coupler.length, "bar", table)
         scene = replace(scene, loads=(*scene.loads, load))
     return scene
@@ -58,15 +58,15 @@ def study(question: Question) -> list[Row]:
         key: np.array([x + number * APART * step for number in range(MEMBERS)]) for key, (x, step) in stated.items()
     }
     # the places of each member lie within those of the scene: nothing says that a table reaches further
-    each = np.array([places + APART * number * (places.mean() - places) for number in range(MEMBERS)])
+    positions = np.array([places + APART * number * (places.mean() - places) for number in range(MEMBERS)])
     members: dict[int, Scene] = {}
-    for number, own in enumerate(each):
+    for number, member_positions in enumerate(positions):
         with suppress(NotAskedError):  # the others are judged, beside one that never assembles
             changes = {name: number * APART * entry.step for name, entry in stated.items()}
-            members[number] = SceneFile(at_places(scene, own)).move(changes)
+            members[number] = SceneFile(at_places(scene, member_positions)).move(changes)
     rows = []
     with np.errstate(all="ignore"):
-        result = fourbar.solve(fourbar.vary(scene, values | {key: each}))
+        solved = fourbar.solve(fourbar.vary(scene, values | {key: positions}))
         for number, one in members.items():
-            rows += hold_to(question, "study", one, take_member(result, number), ask_free_bodies(one))
+            rows += hold_to(question, "study", one, take_member(solved, number), ask_free_bodies(one))
     return keep_worst(rows)

@@ -51,13 +51,13 @@ def internal_forces(question: Question) -> list[Row]:
         length = scene.linkage.bar(bar).length
         cuts = np.array([part * length for part in WHERE])
         pieces = [_free(scene, motion, answer, bar, cut) for cut in cuts]
-        result = fourbar.internal_forces(scene, solution, bar, cuts)
-        for name, ours in (("N", result.N), ("V", result.V), ("M", result.M)):
+        forces = fourbar.internal_forces(scene, solution, bar, cuts)
+        for name, ours in (("N", forces.N), ("V", forces.V), ("M", forces.M)):
             theirs = np.stack([getattr(piece, name) for piece in pieces], axis=1)
             size = np.stack([piece.turning if name == "M" else piece.pushing for piece in pieces], axis=1)
             error = divide(np.abs(ours - theirs), size).max(axis=1)
             if name == "M":
-                beyond = np.abs(theirs).max(axis=1) - np.abs(result.largest.moment)
+                beyond = np.abs(theirs).max(axis=1) - np.abs(forces.largest.moment)
                 error = np.maximum(error, divide(beyond, size.max(axis=1)))
             reason = f"bar {bar} cut at {len(cuts)} places, at {len(error)} positions"
             rows.append(make_row(question, "internal_forces", f"{name}{bar}", error, CUT, solution.theta_2, reason))
@@ -92,13 +92,13 @@ class _Piece(BodyWrenches):
         """Add a force, world axes, at an arm from the bar's first pin, to the piece on which its foot lies."""
         if bar != self.bar:
             return
-        own, at = (np.conj(self.motion.unit[bar]) * vector for vector in (force, arm))
+        turned, at = (np.conj(self.motion.unit[bar]) * vector for vector in (force, arm))
         beyond = at.real > self.cut
-        self.N += np.where(beyond, own.real, 0.0)
-        self.V -= np.where(beyond, own.imag, 0.0)
-        self.M += np.where(beyond, (at.real - self.cut) * own.imag - at.imag * own.real, 0.0)
-        self.pushing += np.abs(own)
-        self.turning += np.abs(own) * (np.abs(at) + abs(self.cut))
+        self.N += np.where(beyond, turned.real, 0.0)
+        self.V -= np.where(beyond, turned.imag, 0.0)
+        self.M += np.where(beyond, (at.real - self.cut) * turned.imag - at.imag * turned.real, 0.0)
+        self.pushing += np.abs(turned)
+        self.turning += np.abs(turned) * (np.abs(at) + abs(self.cut))
 
     def twist(self, bar: int, couple: Any) -> None:
         """Add a couple, to the piece on which its place lies."""

@@ -57,8 +57,8 @@ def equilibria(question: Question) -> Iterator[Row]:
     scene = _at_rest(question.scene)
     if missing := find_missing("flint"):
         raise NotAskedError(missing)
-    theta_2, result = _list_samples(question), fourbar.equilibrium(question.scene)
-    if result.indifferent:
+    theta_2, answer = _list_samples(question), fourbar.equilibrium(question.scene)
+    if answer.indifferent:
         raise NotAskedError("the linkage is indifferent")
     branches: tuple[int, ...] = (1, -1)
     if turns_fully(scene.linkage) and not change_points(scene.linkage):
@@ -66,19 +66,23 @@ def equilibria(question: Question) -> Iterator[Row]:
     torques = {branch: _hold(scene, theta_2, branch) for branch in branches}
     if not any(np.any(torque[np.isfinite(torque)]) for torque in torques.values()):
         raise NotAskedError("no position is held by a torque")
-    judged = [(each, _judge(scene, each)) for each in result.found]
+    judged = [(equilibrium, _judge(scene, equilibrium)) for equilibrium in answer.found]
     missed = 0
     for branch, torque in torques.items():
-        found = [(each.place.theta_2, off) for each, (off, _) in judged if each.place.branch in (branch, 0)]
-        missed += _count_missed(scene, branch, theta_2, torque, found)
-    reason = f"{len(result.found)} equilibria; {SAMPLES} positions of a turn held by free bodies"
+        places = [
+            (equilibrium.place.theta_2, off)
+            for equilibrium, (off, _) in judged
+            if equilibrium.place.branch in (branch, 0)
+        ]
+        missed += _count_missed(scene, branch, theta_2, torque, places)
+    reason = f"{len(answer.found)} equilibria; {SAMPLES} positions of a turn held by free bodies"
     yield Row.judged((question.name, "equilibria", "exact"), "missed", missed, 0.0, reason)
     for name in ("torque", "slope", "inertia", "frequency"):
-        of = [(each.place.theta_2, errors[name]) for each, (_, errors) in judged if name in errors]
-        if of:
-            where, error = np.array(of).T
-            compared = f"{len(of)} of {len(result.found)} equilibria"
-            yield make_row(question, "equilibria", name, error, REST, where, compared)
+        errors_at = [(equilibrium.place.theta_2, errors[name]) for equilibrium, (_, errors) in judged if name in errors]
+        if errors_at:
+            angles, error = np.array(errors_at).T
+            compared = f"{len(errors_at)} of {len(answer.found)} equilibria"
+            yield make_row(question, "equilibria", name, error, REST, angles, compared)
 
 
 def _at_rest(scene: Scene) -> Scene:
@@ -123,14 +127,14 @@ def _hold(scene: Scene, angle: Array, branch: int) -> Array:
     return np.where(sound, answer.quantities["torque"], np.nan)
 
 
-def _count_missed(scene: Scene, branch: int, theta_2: Array, torque: Array, found: list[tuple[float, float]]) -> int:
+def _count_missed(scene: Scene, branch: int, theta_2: Array, torque: Array, places: list[tuple[float, float]]) -> int:
     """Count the steps in which the torque changes its sign and no equilibrium was found, or the reverse.
 
-    `found`: angles of the equilibria on the branch, and how far off each may be: a step that one may be in or not is
+    `places`: angles of the equilibria on the branch, and how far off each may be: a step that one may be in or not is
     not counted, nor one at an end of which 320 bits find another sign than the free bodies, or none.
     """
     counted, open_steps = np.zeros(len(torque) - 1, dtype=int), ~np.isfinite(torque[:-1] * torque[1:])
-    for place, off in found:
+    for place, off in places:
         at = theta_2[0] + np.remainder(place - theta_2[0], 2.0 * np.pi)
         index = int(np.searchsorted(theta_2, at)) - 1
         if 0 <= index < len(counted):
@@ -147,29 +151,32 @@ def _count_missed(scene: Scene, branch: int, theta_2: Array, torque: Array, foun
     return sum(is_certain(index) and is_certain(index + 1) for index in np.flatnonzero(differing).tolist())
 
 
-def _judge(scene: Scene, each: Equilibrium) -> tuple[float, dict[str, float]]:
+def _judge(scene: Scene, equilibrium: Equilibrium) -> tuple[float, dict[str, float]]:
     """Compare torque, slope, inertia and frequency; also, how far off the equilibrium may be, rad.
 
     No errors where nothing is decided: that near to a singular position first order predicts nothing.
     """
-    place, bar = each.place, int(each.angle[-1])
+    place, bar = equilibrium.place, int(equilibrium.angle[-1])
     theta = {2: place.theta_2, 3: place.theta_3, 4: place.theta_4}
-    one, other = (theta[k] for k in MOVING_BARS if k != bar)
-    held = _derive(scene, bar, theta[bar], 1 if np.sin(other - one) > 0.0 else -1)
-    if held is None or each.stability == "undecided":
+    one, further = (theta[k] for k in MOVING_BARS if k != bar)
+    held = _derive(scene, bar, theta[bar], 1 if np.sin(further - one) > 0.0 else -1)
+    if held is None or equilibrium.stability == "undecided":
         return math.inf, {}
     torque, slope, inertia = held
-    errors = {"torque": _divide(torque.value, torque.size), "slope": _divide(slope.value + each.slope, slope.size)}
-    errors["inertia"] = _divide(inertia.value - each.inertia, inertia.size)
+    errors = {
+        "torque": _divide(torque.value, torque.size),
+        "slope": _divide(slope.value + equilibrium.slope, slope.size),
+    }
+    errors["inertia"] = _divide(inertia.value - equilibrium.inertia, inertia.size)
     part = [K * EPS * x.size / abs(x.value) if x.value else math.inf for x in (slope, inertia)]
     off = K * EPS * torque.size / abs(slope.value) if part[0] < 1.0 else math.inf
     if part[0] < FIRST_ORDER:
         stable = slope.value > 0.0
-        if (each.stability == "stable") != stable or (each.frequency is not None and not stable):
+        if (equilibrium.stability == "stable") != stable or (equilibrium.frequency is not None and not stable):
             errors["frequency"] = math.inf
         elif stable and part[1] < FIRST_ORDER:
             frequency = math.sqrt(slope.value / inertia.value) / (2.0 * math.pi)
-            apart = math.inf if each.frequency is None else abs(each.frequency - frequency)
+            apart = math.inf if equilibrium.frequency is None else abs(equilibrium.frequency - frequency)
             errors["frequency"] = apart / frequency / (0.5 * sum(part)) * K * EPS
     return off, errors
 
@@ -188,22 +195,25 @@ def _derive(scene: Scene, bar: int, angle: float, branch: int) -> tuple[Derived,
 
     from fourbar_validation.engines.balls import OF_PIECE, STEP_BITS, compute_outputs, make_balls
 
-    given: Any = {f"theta_{bar}": angle, f"omega_{bar}": 0.0}
-    scene = replace(scene, motion=Motion(**given), drive_bar=bar)
+    commanded_motion: Any = {f"theta_{bar}": angle, f"omega_{bar}": 0.0}
+    scene = replace(scene, motion=Motion(**commanded_motion), drive_bar=bar)
     x = make_balls(scene, angle)
     x |= {f"{name}_{k}": arb(1) for k, load in enumerate(scene.loads) if load.table for name in OF_PIECE}
     step, commanded = arb(2) ** -STEP_BITS, f"theta_{bar}"
 
     def derive(**changed: Any) -> tuple[list[Any], dict[str, Any], Any] | None:
         """Return torque, slope, inertia and angles; all outputs; and the change of theta_2 per rad of the bar."""
-        given = x | changed
-        turned = [given | {commanded: given[commanded] + side * step} for side in (1, -1)]
-        answers = [compute_outputs(scene, branch, each) for each in (given, *turned, given | {f"alpha_{bar}": arb(1)})]
+        base_inputs = x | changed
+        turned = [base_inputs | {commanded: base_inputs[commanded] + side * step} for side in (1, -1)]
+        answers = [
+            compute_outputs(scene, branch, inputs)
+            for inputs in (base_inputs, *turned, base_inputs | {f"alpha_{bar}": arb(1)})
+        ]
         held, ahead, behind, pushed = (answer if answer and "torque" in answer else None for answer in answers)
         if held is None or ahead is None or behind is None or pushed is None:
             return None
         slope = (ahead["torque"] - behind["torque"]) / (2 * step)
-        angles = [held.get(f"theta_{k}", given[commanded]) for k in MOVING_BARS]
+        angles = [held.get(f"theta_{k}", base_inputs[commanded]) for k in MOVING_BARS]
         numbers = [held["torque"], slope, pushed["torque"] - held["torque"], *angles]
         return numbers, held, (ahead.get("theta_2", step) - held.get("theta_2", 0)) / step
 
@@ -218,7 +228,9 @@ def _derive(scene: Scene, bar: int, angle: float, branch: int) -> tuple[Derived,
             weight = max(weight, min(AT_LIMIT, 1.0 / max(abs(float(rate.mid())), 1.0 / AT_LIMIT)))
         moved = next((m for side in (1, -1) if weight and (m := derive(**{name: value + side * weight * step}))), None)
         if moved is not None:
-            sizes += [abs(float(((own - of) / step).mid())) for own, of in zip(moved[0], numbers, strict=True)]
+            sizes += [
+                abs(float(((after - before) / step).mid())) for after, before in zip(moved[0], numbers, strict=True)
+            ]
     if not np.isfinite(sizes).all() or ROUNDINGS * EPS * sizes[3:].max() >= FIRST_ORDER * float(outputs["condition"]):
         return None
     sizes[2] = max(sizes[2], _sum_inertias(scene))

@@ -99,8 +99,8 @@ def build_scene(held: Contents, scene: Scene) -> Scene:
 def _read_sdf(text: str) -> Contents:
     root = ET.fromstring(text)
 
-    def numbers(of: ET.Element, path: str) -> list[float]:
-        return [float(number) for number in of.findtext(path, "nan").split()]
+    def numbers(element: ET.Element, path: str) -> list[float]:
+        return [float(number) for number in element.findtext(path, "nan").split()]
 
     bodies = {}
     for link in root.iter("link"):
@@ -122,33 +122,36 @@ def _read_sdf(text: str) -> Contents:
 
 
 def _read_usd(text: str) -> Contents:
-    def numbers(of: str, key: str) -> list[float]:
-        result = re.search(rf"{re.escape(key)} = (.*)", of)
-        return [float(number) for number in re.findall(NUMBER, result[1])] if result else [math.nan] * 4
+    def numbers(block: str, key: str) -> list[float]:
+        match = re.search(rf"{re.escape(key)} = (.*)", block)
+        return [float(number) for number in re.findall(NUMBER, match[1])] if match else [math.nan] * 4
 
-    def turn(of: str, key: str) -> float:
-        w, _, _, z = numbers(of, key)
+    def turn(block: str, key: str) -> float:
+        w, _, _, z = numbers(block, key)
         return 2.0 * math.atan2(z, w)
 
     blocks = dict(re.findall(r'def (?:Xform|PhysicsRevoluteJoint|PhysicsScene) "(\w+)"[^{]*\{([^{}]*)\}', text))
     bodies = {"ground": FileBody(0j, 0.0, math.nan, math.nan, 0j)}
     for bar in BARS:
-        of = blocks[bar]
-        place, centre = (complex(*numbers(of, f"{key}")[:2]) for key in ("xformOp:translate", "physics:centerOfMass"))
-        mass, inertia = numbers(of, "physics:mass")[0], numbers(of, "physics:diagonalInertia")[2]
-        bodies[bar] = FileBody(place, turn(of, "xformOp:orient"), mass, inertia, centre)
+        block = blocks[bar]
+        place, centre = (
+            complex(*numbers(block, f"{key}")[:2]) for key in ("xformOp:translate", "physics:centerOfMass")
+        )
+        mass, inertia = numbers(block, "physics:mass")[0], numbers(block, "physics:diagonalInertia")[2]
+        bodies[bar] = FileBody(place, turn(block, "xformOp:orient"), mass, inertia, centre)
     size = sum(abs(body.place) + abs(body.centre) for body in bodies.values())
     pins, at_joints = {}, {"ground": 0.0}
     for pin in ("O2", "A", "O4", "B"):
-        of = blocks[pin]
-        ends = {end: re.search(rf"physics:body{end} = </four_bar/(\w+)>", of) for end in (0, 1)}
+        block = blocks[pin]
+        ends = {end: re.search(rf"physics:body{end} = </four_bar/(\w+)>", block) for end in (0, 1)}
         names = [match[1] if match else "ground" for match in ends.values()]
-        one, other = (
-            bodies[bar].place + complex(*numbers(of, f"physics:localPos{end}")[:2]) * cmath.rect(1.0, bodies[bar].turn)
+        one, second = (
+            bodies[bar].place
+            + complex(*numbers(block, f"physics:localPos{end}")[:2]) * cmath.rect(1.0, bodies[bar].turn)
             for end, bar in enumerate(names)
         )
-        pins[pin] = one if abs(one - other) <= K * EPS * size else complex(math.nan)
-        between = turn(of, "physics:localRot0") - turn(of, "physics:localRot1")
+        pins[pin] = one if abs(one - second) <= K * EPS * size else complex(math.nan)
+        between = turn(block, "physics:localRot0") - turn(block, "physics:localRot1")
         if pin == "B":
             at_joints["coupler at B"] = at_joints[names[0]] + between
         else:
@@ -166,7 +169,7 @@ def _read_turns(bodies: dict[str, FileBody]) -> dict[str, float]:
 def _read_noted(text: str) -> dict[str, float]:
     """Read the angles that the file states in words."""
     return {
-        bar: float(result[1])
+        bar: float(match[1])
         for bar, number in BARS.items()
-        if (result := re.search(f"theta_{number} = ({NUMBER})", text))
+        if (match := re.search(f"theta_{number} = ({NUMBER})", text))
     }

@@ -16,13 +16,7 @@ from fourbar_validation.compare.answer import Array
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.compare.tolerance import ErrorBound, divide, magnitude
 from fourbar_validation.run.question import Question
-from fourbar_validation.run.shipped.variants import (
-    SceneFile,
-    ask_free_bodies,
-    make_row,
-    split_parts,
-    take_few,
-)
+from fourbar_validation.run.shipped.variants import SceneFile, ask_free_bodies, make_row, split_parts, take_few
 
 STEP = 1e-4
 """Relative step of each number, for an angle in rad: truncation at fourth order and rounding are then about equal."""
@@ -64,9 +58,9 @@ NODES = {False: (0.6**0.5, 5.0 / 18.0), True: (3.0**0.5, 1.0 / 6.0)}
 def sensitivity(question: Question) -> list[Row]:
     """Judge the derivatives of the unknowns and of the scene's points along one direction."""
     scene = take_few(question)
-    result = fourbar.sensitivity(scene)
+    derivatives = fourbar.sensitivity(scene)
     file = SceneFile(scene)
-    directions = {key: step for key, (_, step) in file.find_stated(result.keys).items()}
+    directions = {key: step for key, (_, step) in file.find_stated(derivatives.keys).items()}
     if scene.motion.stroke is None:
         directions[command_key(scene)] = 1.0
 
@@ -75,17 +69,19 @@ def sensitivity(question: Question) -> list[Row]:
 
     near, far = [(along(part), along(-part)) for part in (1.0, 2.0)]
     rows = []
-    for name in (name for name in (*UNKNOWNS, LINE.value) if name in result.by):
+    for name in (name for name in (*UNKNOWNS, LINE.value) if name in derivatives.by):
         first, second = (_subtract(name, up[name], down[name]) for up, down in (near, far))
         slope, coarse = (8.0 * first - second) / (12.0 * STEP), first / (2.0 * STEP)
-        terms = np.array([step * result.of(name, key) for key, step in directions.items()])
-        size = magnitude(result.value(name)) + sum(magnitude(term) for term in terms)
-        known = np.array([status == "ok" for status in result.status]) | (name not in FORCES)
-        known &= divide(magnitude(slope - coarse), size) <= CONVERGED
-        error = np.where(known, divide(magnitude(terms.sum(axis=0) - slope), size), 0.0)
-        if known.any():
+        terms = np.array([step * derivatives.of(name, key) for key, step in directions.items()])
+        size = magnitude(derivatives.value(name)) + sum(magnitude(term) for term in terms)
+        comparable = np.array([status == "ok" for status in derivatives.status]) | (name not in FORCES)
+        comparable &= divide(magnitude(slope - coarse), size) <= CONVERGED
+        error = np.where(comparable, divide(magnitude(terms.sum(axis=0) - slope), size), 0.0)
+        if comparable.any():
             reason = f"along one direction in {len(directions)} numbers"
-            rows.append(make_row(question, "sensitivity", name, error, DIFFERENCES, result.solution.theta_2, reason))
+            rows.append(
+                make_row(question, "sensitivity", name, error, DIFFERENCES, derivatives.solution.theta_2, reason)
+            )
     return rows
 
 
@@ -93,19 +89,19 @@ def tolerances(question: Question) -> list[Row]:
     """Judge the spread that a few tolerances make: the scene's own, or those that the run gives it."""
     scene = take_few(question)
     width, names = GIVEN * min(scene.linkage.lengths), ("input", "coupler", "output")
-    given = (fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names)
-    scene = replace(scene, tolerances=(scene.tolerances or tuple(given))[:MOST])
-    result, expected = fourbar.tolerances(scene, SAMPLES), _compute_expected(scene)
+    defaults = (fourbar.Tolerance(f"lengths.{name}", width, name == "output") for name in names)
+    scene = replace(scene, tolerances=(scene.tolerances or tuple(defaults))[:MOST])
+    spread, expected = fourbar.tolerances(scene, SAMPLES), _compute_expected(scene)
     errors: dict[str, Array] = {}
     for name in (*UNKNOWNS, LINE.value):
-        own = [part for part in expected if part in (name, f"{name}_x", f"{name}_y", f"|{name}|")]
-        if not own:
+        parts = [part for part in expected if part in (name, f"{name}_x", f"{name}_y", f"|{name}|")]
+        if not parts:
             continue
-        slight = SLIGHT * max(float(np.max(expected[part].worst)) for part in own)
-        errors[name] = np.max([_compute_off(result.spreads[part], expected[part], slight) for part in own], axis=0)
-    reason = ", ".join(each.key for each in scene.tolerances)
+        slight = SLIGHT * max(float(np.max(expected[part].worst)) for part in parts)
+        errors[name] = np.max([_compute_off(spread.spreads[part], expected[part], slight) for part in parts], axis=0)
+    reason = ", ".join(tolerance.key for tolerance in scene.tolerances)
     return [
-        make_row(question, "tolerances", name, each, SPREAD, result.theta_2, reason) for name, each in errors.items()
+        make_row(question, "tolerances", name, error, SPREAD, spread.theta_2, reason) for name, error in errors.items()
     ]
 
 
@@ -131,30 +127,41 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
     numbers = file.find_stated(tolerance.key for tolerance in scene.tolerances)
 
     def changed(changes: dict[str, float]) -> dict[str, Array]:
-        result = split_parts(ask_free_bodies(file.move(changes)))
-        return {part: _subtract(part, values, nominal[part]) for part, values in result.items()}
+        parts = split_parts(ask_free_bodies(file.move(changes)))
+        return {part: _subtract(part, values, nominal[part]) for part, values in parts.items()}
 
     weights, off = [], []
-    nodes = [[(0.0, 1.0 - 2.0 * w), (x, w), (-x, w)] for x, w in (NODES[each.sigma] for each in scene.tolerances)]
+    nodes = [
+        [(0.0, 1.0 - 2.0 * w), (x, w), (-x, w)] for x, w in (NODES[tolerance.sigma] for tolerance in scene.tolerances)
+    ]
     for node in product(*nodes):
-        off.append(changed({each.key: x * each.width for each, (x, _) in zip(scene.tolerances, node, strict=True)}))
+        off.append(
+            changed(
+                {tolerance.key: x * tolerance.width for tolerance, (x, _) in zip(scene.tolerances, node, strict=True)}
+            )
+        )
         weights.append(math.prod(w for _, w in node))
     slopes = []
-    for each in scene.tolerances:
-        h = SMALL * max(abs(numbers[each.key].number), each.width)
-        up, down = (changed({each.key: change}) for change in (h, -h))
+    for tolerance in scene.tolerances:
+        h = SMALL * max(abs(numbers[tolerance.key].number), tolerance.width)
+        up, down = (changed({tolerance.key: change}) for change in (h, -h))
         slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
     rng, w = np.random.default_rng(0), np.array(weights)[:, None]
-    drawn = [rng.normal(size=DRAWN) if each.sigma else rng.uniform(-1.0, 1.0, DRAWN) for each in scene.tolerances]
-    result = {}
+    drawn = [
+        rng.normal(size=DRAWN) if tolerance.sigma else rng.uniform(-1.0, 1.0, DRAWN) for tolerance in scene.tolerances
+    ]
+    expected = {}
     for part in nominal:
-        values, slope = np.array([each[part] for each in off]), np.array([each[part] for each in slopes])
+        values, slope = (
+            np.array([values_of[part] for values_of in off]),
+            np.array([values_of[part] for values_of in slopes]),
+        )
         mean = (w * values).sum(axis=0)
-        widths = np.array([[each.width] for each in scene.tolerances])
-        variances = np.array([[1.0 if each.sigma else 1.0 / 3.0] for each in scene.tolerances])
-        reaches = widths * np.array([[3.0 if each.sigma else 1.0] for each in scene.tolerances])
+        widths = np.array([[tolerance.width] for tolerance in scene.tolerances])
+        variances = np.array([[1.0 if tolerance.sigma else 1.0 / 3.0] for tolerance in scene.tolerances])
+        reaches = widths * np.array([[3.0 if tolerance.sigma else 1.0] for tolerance in scene.tolerances])
         low, high = np.percentile(np.array(drawn).T @ (slope * widths), (1.0, 99.0), axis=0)
-        result[part] = Expected(
+        expected[part] = Expected(
             np.sqrt((w * (values - mean) ** 2).sum(axis=0)),
             np.abs(mean),
             np.sqrt((variances * (slope * widths) ** 2).sum(axis=0)),
@@ -162,7 +169,7 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
             low,
             high,
         )
-    return result
+    return expected
 
 
 def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
@@ -178,13 +185,13 @@ def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
         (spread.high - spread.nominal, expected.high, expected.deviation, 0.1, straight),
     ]
     errors = [
-        np.where(where & (expected.worst > slight), part * divide(np.abs(ours - theirs), size), 0.0)
-        for ours, theirs, size, part, where in pairs
+        np.where(judged & (expected.worst > slight), part * divide(np.abs(ours - theirs), size), 0.0)
+        for ours, theirs, size, part, judged in pairs
     ]
     return np.asarray(np.max(errors, axis=0))
 
 
-def _subtract(name: str, one: Array, other: Array) -> Array:
+def _subtract(name: str, one: Array, minus: Array) -> Array:
     """Subtract, angles within half a turn."""
-    difference = one - other
+    difference = one - minus
     return np.asarray(np.angle(np.exp(1j * difference)) if name.startswith("theta") else difference)

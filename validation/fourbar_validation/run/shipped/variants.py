@@ -56,10 +56,10 @@ def take_few(question: Question) -> Scene:
     for load in scene.loads:
         for corner in () if load.table is None else load.table.theta_2:
             fit &= np.abs(np.angle(np.exp(1j * (solution.theta_2 - corner)))) > FROM_A_CORNER
-    where = np.flatnonzero(fit)
-    if not len(where):
+    indices = np.flatnonzero(fit)
+    if not len(indices):
         raise NotAskedError("no position that is well-conditioned and moves")
-    few = where[np.unique(np.linspace(0, len(where) - 1, SAMPLE + 2).astype(int)[1:-1])]
+    few = indices[np.unique(np.linspace(0, len(indices) - 1, SAMPLE + 2).astype(int)[1:-1])]
     return at_places(replace(scene, title="", source="", pictures=()), at.places[few])
 
 
@@ -161,16 +161,16 @@ def hold_to(question: Question, engine: str, scene: Scene, solution: Solution, a
 
 def keep_worst(rows: Iterable[Row]) -> list[Row]:
     """Keep the worst of several rows of a quantity."""
-    result: dict[tuple[str, str], Row] = {}
+    worst: dict[tuple[str, str], Row] = {}
 
     def badness(row: Row) -> tuple[int, float]:
         return VERDICTS.index(row.verdict), float(find_used(row.error, row.allowed))
 
     for row in rows:
         key = row.setting, row.quantity
-        if key not in result or badness(row) > badness(result[key]):
-            result[key] = row
-    return list(result.values())
+        if key not in worst or badness(row) > badness(worst[key]):
+            worst[key] = row
+    return list(worst.values())
 
 
 def make_row(
@@ -184,24 +184,26 @@ def make_row(
 def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
     """Take one linkage of a solved study, or some positions of one linkage."""
 
-    def own(value: Any) -> Any:
+    def take(value: Any) -> Any:
         if isinstance(value, dict):
-            return {name: each[index] for name, each in value.items()}
+            return {name: values[index] for name, values in value.items()}
         return value[index] if isinstance(value, np.ndarray) else value
 
-    one = replace(study, **{field.name: own(getattr(study, field.name)) for field in fields(study) if field.init})
-    one.points, one.velocity, one.acceleration = (own(of) for of in (study.points, study.velocity, study.acceleration))
+    one = replace(study, **{field.name: take(getattr(study, field.name)) for field in fields(study) if field.init})
+    one.points, one.velocity, one.acceleration = (
+        take(table) for table in (study.points, study.velocity, study.acceleration)
+    )
     one.drive, one.at = study.drive, study.at.part(index)
     return one
 
 
 def split_parts(answer: Answer) -> dict[str, Array]:
     """Split the unknowns of a position: vectors as components, pin forces also as their magnitudes."""
-    result = {}
+    parts = {}
     for name in (name for name in (*UNKNOWNS, LINE.value) if name in answer.quantities):
         values = answer.quantities[name]
         if name in SCALARS:
-            result[name] = values
+            parts[name] = values
         else:
-            result |= {f"{name}_x": values[:, 0], f"{name}_y": values[:, 1], f"|{name}|": magnitude(values)}
-    return result
+            parts |= {f"{name}_x": values[:, 0], f"{name}_y": values[:, 1], f"|{name}|": magnitude(values)}
+    return parts
