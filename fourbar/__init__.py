@@ -102,8 +102,8 @@ def __getattr__(name: str) -> _Any:
 
 def __dir__() -> list[str]:
     """List the public names; the modules behind them stay out of the list."""
-    own = [name for name, value in globals().items() if name[0] != "_" and not isinstance(value, _ModuleType)]
-    return sorted([*own, *_ON_FIRST_USE, "__version__"])
+    public = [name for name, value in globals().items() if name[0] != "_" and not isinstance(value, _ModuleType)]
+    return sorted([*public, *_ON_FIRST_USE, "__version__"])
 
 
 __all__ = __dir__()  # noqa: PLE0605 - the names above, once

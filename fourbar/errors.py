@@ -36,8 +36,8 @@ class InputError(FourBarError):
         shown = " ".join(repr(value).split())  # arrays take several lines
         if len(shown) > LONGEST_SHOWN:  # of a long path the end says which
             shown = f"{shown[: LONGEST_SHOWN // 2 - 3]}...{shown[-LONGEST_SHOWN // 2 :]}"
-        where = f"{file}: " if file else ""
-        super().__init__(f"{where}{key}{'' if value is None else f' = {shown}'}: {allowed}")
+        prefix = f"{file}: " if file else ""
+        super().__init__(f"{prefix}{key}{'' if value is None else f' = {shown}'}: {allowed}")
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         """Let the error cross from one process to another as it was made."""
@@ -75,10 +75,10 @@ def say_install(extra: str) -> str:
 
     def needed(name: str) -> list[str]:
         wanted = f"extra == [\"']{name}[\"']"
-        found = [each.partition(";")[0].strip() for each in requires("fourbar") or () if re.search(wanted, each)]
-        inner = [each.removeprefix("fourbar[").removesuffix("]").split(",") for each in found if "fourbar[" in each]
-        own = [each for each in found if "fourbar[" not in each]
-        return own + [each for names in inner for name in names for each in needed(name)]
+        packages = [line.partition(";")[0].strip() for line in requires("fourbar") or () if re.search(wanted, line)]
+        inner = [line.removeprefix("fourbar[").removesuffix("]").split(",") for line in packages if "fourbar[" in line]
+        direct = [line for line in packages if "fourbar[" not in line]
+        return direct + [line for names in inner for name in names for line in needed(name)]
 
     return "pip install " + " ".join(f'"{each}"' for each in dict.fromkeys(needed(extra)))
 
@@ -94,15 +94,15 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None, 
     """
     import click  # on the command line alone
 
-    given = sys.argv[1:] if arguments is None else arguments
+    words = sys.argv[1:] if arguments is None else arguments
     # a program without a console, or one started with `>&-`, has none
-    streams = tuple(each or open(os.devnull, "w", encoding="utf-8") for each in (sys.stdout, sys.stderr))  # noqa: SIM115
+    streams = tuple(stream or open(os.devnull, "w", encoding="utf-8") for stream in (sys.stdout, sys.stderr))  # noqa: SIM115
     sys.stdout, sys.stderr = streams
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal that has no Greek still gets its table
     try:
-        result = group.main(args=given, prog_name=program, standalone_mode=False)
-        status = HOLDS if result is None else int(result)
+        returned = group.main(args=words, prog_name=program, standalone_mode=False)
+        status = HOLDS if returned is None else int(returned)
         _flush()
         return status
     except SystemExit as left:
@@ -118,15 +118,15 @@ def run(group: "click.Group", program: str, arguments: list[str] | None = None, 
     except ModuleNotFoundError as error:
         return _say(f"{error.name} is not installed: {say_install(extra)}", BROKEN)
     except OSError as error:
-        named = error.filename2 or error.filename or "output"  # of a file that is put in place the second is its place
-        return _say(f"{named}: {error.strerror or error}", BROKEN)
+        file = error.filename2 or error.filename or "output"  # of a file that is put in place the second is its place
+        return _say(f"{file}: {error.strerror or error}", BROKEN)
     except Exception as error:
-        if "--traceback" in given or os.environ.get("FOURBAR_TRACEBACK"):
+        if "--traceback" in words or os.environ.get("FOURBAR_TRACEBACK"):
             raise
         return _say(f"internal error: {type(error).__name__}: {error} (FOURBAR_TRACEBACK=1 shows where)", BROKEN)
 
 
-def _read_exit(left: SystemExit, streams: tuple[TextIO, ...]) -> int:
+def _read_exit(raised: SystemExit, streams: tuple[TextIO, ...]) -> int:
     """Return the exit status of a command that raised SystemExit.
 
     Click and rich leave with 1 where the reader of a pipe has gone; it has what it wants. Click lets go of standard
@@ -134,11 +134,11 @@ def _read_exit(left: SystemExit, streams: tuple[TextIO, ...]) -> int:
     """
     if sys.stdout is not streams[0]:
         return HOLDS if any(map(_is_unread, streams)) else _say("a pipe inside the program broke", BROKEN)
-    if isinstance(left.__context__, BrokenPipeError):
+    if isinstance(raised.__context__, BrokenPipeError):
         return HOLDS
-    if left.code is None or isinstance(left.code, int):
-        return left.code or HOLDS
-    return _say(left.code, BROKEN)
+    if raised.code is None or isinstance(raised.code, int):
+        return raised.code or HOLDS
+    return _say(raised.code, BROKEN)
 
 
 def _is_unread(stream: TextIO) -> bool:

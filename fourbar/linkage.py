@@ -72,7 +72,7 @@ def require_whole(key: str, value: object, among: Container[int], allowed: str) 
 def convert_to_unit(key: str, value: object, unit: str) -> object:
     """Convert each text like "48 cm" of a value, in lists too, as `require` does; numbers and arrays stay."""
     if isinstance(value, (list, tuple)):
-        return [convert_to_unit(key, each, unit) for each in value]
+        return [convert_to_unit(key, entry, unit) for entry in value]
     return require(key, value, unit) if unit != "1" and isinstance(value, str) else value
 
 
@@ -124,10 +124,12 @@ class Declared(NamedTuple):
 def check_numbers(description: Any, key: str) -> None:
     """Check the numbers that a frozen description states by its `numbers`, and convert those with units."""
     for name, stated in description.numbers.items():
-        value, own = getattr(description, name), f"{key}.{name}".strip(".")
+        value, full_key = getattr(description, name), f"{key}.{name}".strip(".")
         if value is not None or stated.left_out is not None:
-            of = require_pair(own, value, stated.unit) if stated.pair else require(own, value, *stated[:2])
-            object.__setattr__(description, name, of)
+            checked = (
+                require_pair(full_key, value, stated.unit) if stated.pair else require(full_key, value, *stated[:2])
+            )
+            object.__setattr__(description, name, checked)
 
 
 @dataclass(frozen=True, slots=True)

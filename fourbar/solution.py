@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import POSITIVE, require
-from fourbar.quantities import NOT_ASSEMBLED, OF_LINE, PIN_FORCES, SCALARS, STATUS_NAMES, UNITS, Quantities
+from fourbar.quantities import LINE_QUANTITIES, NOT_ASSEMBLED, PIN_FORCES, SCALARS, STATUS_NAMES, UNITS, Quantities
 from fourbar.scene import Command
 from fourbar.writing import describe_extent, list_names, make_data_frame, write_between, write_object, write_text
 
@@ -137,27 +137,29 @@ class Solution(Quantities):
 
         Raises DependencyError where pandas is not installed.
         """
-        known = {
+        columns = {
             name: values for name, values in list_scalars(self, require_units(units)).items() if values is not None
         }
-        return make_data_frame({**list_leading(self), **known})
+        return make_data_frame({**list_leading(self), **columns})
 
 
 def split_parts(name: str, values: Array) -> dict[str, Array]:
     """Split a quantity into scalars: components, and the magnitude of a pin force."""
     if name in SCALARS:
         return {name: values}
-    found = {f"{name}_x": values[..., 0], f"{name}_y": values[..., 1]}
-    return {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **found} if name in PIN_FORCES else found
+    parts = {f"{name}_x": values[..., 0], f"{name}_y": values[..., 1]}
+    return {f"|{name}|": np.hypot(values[..., 0], values[..., 1]), **parts} if name in PIN_FORCES else parts
 
 
 def list_parts(values: Mapping[str, Array | None], scalars: tuple[str, ...]) -> dict[str, Array]:
     """List the given scalars and the magnitudes of the pin forces, as far as they have values."""
-    found: dict[str, Array] = {}
+    parts: dict[str, Array] = {}
     for name in (*scalars, *PIN_FORCES):
-        if (own := values.get(name)) is not None:
-            found |= {part: array for part, array in split_parts(name, own).items() if part[-2:] not in ("_x", "_y")}
-    return found
+        if (quantity := values.get(name)) is not None:
+            parts |= {
+                part: array for part, array in split_parts(name, quantity).items() if part[-2:] not in ("_x", "_y")
+            }
+    return parts
 
 
 def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
@@ -215,20 +217,20 @@ def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array 
     Of a pin force the magnitude too, and where it is known the time. In other units than SI every heading names its
     own: `F12_x [lbf]`.
     """
-    found: dict[str, Array | None] = {}
+    columns: dict[str, Array | None] = {}
     for name in _list_quantities(solution):
         values, unit = find_values(solution, name, units), find_unit(name)
         heading = f" [{find_unit_in(unit, units)[0]}]" if units and unit != "1" else ""
         if name not in SCALARS:
             for axis, letter in enumerate("xy"):
-                found[f"{name}_{letter}{heading}"] = None if values is None else values[..., axis].ravel()
+                columns[f"{name}_{letter}{heading}"] = None if values is None else values[..., axis].ravel()
             if name in PIN_FORCES:
-                found[f"|{name}|{heading}"] = None if values is None else np.hypot(*values.T).T.ravel()
+                columns[f"|{name}|{heading}"] = None if values is None else np.hypot(*values.T).T.ravel()
         else:
-            found[name + heading] = None if values is None else values.ravel()
+            columns[name + heading] = None if values is None else values.ravel()
     if solution.time is None and (time := _compute_times(solution)) is not None:
-        found["time [s]" if units else "time"] = time
-    return found
+        columns["time [s]" if units else "time"] = time
+    return columns
 
 
 def _compute_times(solution: Solution) -> Array | None:
@@ -259,7 +261,7 @@ def find_unit_in(unit: str, units: Conversion) -> tuple[str, float]:
 
 def _list_quantities(solution: "Solution") -> list[str]:
     """Every quantity of a solution, evaluated or not; time and those of a linear drive only where there is one."""
-    left_out = () if solution.drive is not None else OF_LINE
+    left_out = () if solution.drive is not None else LINE_QUANTITIES
     names = [name for name in UNITS if name not in left_out and (name != "time" or solution.time is not None)]
     points = dict.fromkeys((*solution.points, *solution.velocity, *solution.acceleration))
     return names + [f"{start}{name}" for name in points for start in ("", "v_", "a_")]
@@ -290,8 +292,8 @@ def unwrap(angles: Array) -> None:
     if angles.shape[-1] < 2 or (np.ptp(angles) < np.pi and not (angles[..., 0] == -np.pi).any()):
         return
     rows = angles.reshape(-1, angles.shape[-1])
-    known = ~np.isnan(rows)
-    place = np.where(known, np.arange(rows.shape[1]), np.argmax(known, axis=1)[:, None])
+    finite = ~np.isnan(rows)
+    place = np.where(finite, np.arange(rows.shape[1]), np.argmax(finite, axis=1)[:, None])
     raw = np.take_along_axis(rows, np.maximum.accumulate(place, axis=1), axis=1)
     jumps = np.diff(raw, axis=1, prepend=raw[:, :1])
     # -pi as a double lies inside (-pi, pi], yet reads as the excluded end

@@ -15,9 +15,9 @@ from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
 from fourbar.quantities import (
     ANGLES,
     COUPLE,
-    OF_DRY_FRICTION,
-    OF_LINE,
-    OF_PIN_LOADS,
+    DRY_FRICTION_QUANTITIES,
+    LINE_QUANTITIES,
+    PIN_LOAD_QUANTITIES,
     SCALARS,
     STAGE_OF,
     STAGES,
@@ -25,7 +25,7 @@ from fourbar.quantities import (
 )
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import COMMANDS
-from fourbar.scene.point import OF_POINTS
+from fourbar.scene.point import POINT_STAGES
 from fourbar.scene.scene import Independent
 from fourbar.solution import Array, Solution, unwrap
 
@@ -52,7 +52,7 @@ class Members(Protocol):
     def begin(self, rows: slice) -> Scene:
         """Make the scene with effects that begin where each member's motion does."""
 
-    def refuse(self, result: Mapping[str, Array], code: NDArray[np.uint8]) -> None:
+    def refuse(self, arrays: Mapping[str, Array], code: NDArray[np.uint8]) -> None:
         """Mark the members that no scene could be."""
 
 
@@ -90,64 +90,64 @@ def solve(
         if at is not None:
             raise InputError("at", "a command", "a study states its own positions: vary the commanded angle")
         study = scene
-        scene, where = study.scene, study.at
+        scene, commanded = study.scene, study.at
     elif at is not None:
         _refuse(at)
-        where = at
+        commanded = at
     elif scene.motion.free is not None:
         from fourbar.evaluation.free_motion import release
 
         released = release(scene)
-        where, stopped_at = released.command, released.stopped_at
+        commanded, stopped_at = released.command, released.stopped_at
     else:
-        where = command(scene)
-    shape = where.angle.shape
-    wanted, names = find_requested(scene, shape, where, stage, out)
+        commanded = command(scene)
+    shape = commanded.angle.shape
+    wanted, names = find_requested(scene, shape, commanded, stage, out)
     code = np.zeros(shape, dtype=np.uint8)
     with np.errstate(all="ignore"):
-        result = None
-        if shape == (1,) and study is None and where.independent is None and out is None:
-            result = _solve_alone(_begin(scene, where, wanted, side), where, wanted, names, code)
-        if result is None:
-            result, found = make_arrays(names, shape, out), None
-            blocks = _list_members(study, wanted, side) if study else _list_blocks(scene, where, wanted, side)
+        arrays = None
+        if shape == (1,) and study is None and commanded.independent is None and out is None:
+            arrays = _solve_alone(_begin(scene, commanded, wanted, side), commanded, wanted, names, code)
+        if arrays is None:
+            arrays, evaluated = make_arrays(names, shape, out), None
+            blocks = _list_members(study, wanted, side) if study else _list_blocks(scene, commanded, wanted, side)
             for part, case, block in blocks:
                 # what a block found is freed when the next has its own: else its memory goes back to the system
-                found = evaluate(case, block, wanted, names)
-                _store_block(case, found, result, code, part)
-    unwrap_angles(result, where.bar)
-    for name, stated in (("stroke", where.stroke), ("stroke_speed", where.stroke_speed)):
-        if stated is not None and name in result:  # as commanded, wherever it has a value
-            result[name][...] = stated + 0.0 * result[name]
+                evaluated = evaluate(case, block, wanted, names)
+                _store_block(case, evaluated, arrays, code, part)
+    unwrap_angles(arrays, commanded.bar)
+    for name, stated in (("stroke", commanded.stroke), ("stroke_speed", commanded.stroke_speed)):
+        if stated is not None and name in arrays:  # as commanded, wherever it has a value
+            arrays[name][...] = stated + 0.0 * arrays[name]
     if study is not None:
-        study.refuse(result, code)
-    solution = make_solution(scene if study is None else study.members(None, 1), where, code, result)
-    solution.time, solution.stopped_at = where.time, stopped_at
+        study.refuse(arrays, code)
+    solution = make_solution(scene if study is None else study.members(None, 1), commanded, code, arrays)
+    solution.time, solution.stopped_at = commanded.time, stopped_at
     return solution
 
 
-def _begin(scene: Scene, where: Command, wanted: int, side: int) -> Case:
+def _begin(scene: Scene, commanded: Command, wanted: int, side: int) -> Case:
     """Make the case of one linkage, with effects that count turns from where the motion begins."""
-    case = Case.of(scene, where.bar)._replace(side=side)
+    case = Case.of(scene, commanded.bar)._replace(side=side)
     if wanted < FORCE or not scene.counts_turns:
         return case
-    if where.independent is not None:
-        return case.with_start(where.part(slice(0, 1)))
-    own = command(scene)
-    return case.with_start(own if own.bar == where.bar else where)
+    if commanded.independent is not None:
+        return case.with_start(commanded.part(slice(0, 1)))
+    stated = command(scene)
+    return case.with_start(stated if stated.bar == commanded.bar else commanded)
 
 
-def _list_blocks(scene: Scene, where: Command, wanted: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
+def _list_blocks(scene: Scene, commanded: Command, wanted: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
     """List the positions of one linkage block by block, those of a released one by their independent angle."""
-    case, free = _begin(scene, where, wanted, side), where.independent
+    case, free = _begin(scene, commanded, wanted, side), commanded.independent
     if free is None:
-        for part in _split(len(where.angle), BLOCK if wanted < ERROR else LONG_BLOCK):
-            yield (part,), case, where.part(part)
+        for part in _split(len(commanded.angle), BLOCK if wanted < ERROR else LONG_BLOCK):
+            yield (part,), case, commanded.part(part)
         return
     for bar in (2, 4):
         index = np.flatnonzero(free.bar == bar)
         if index.size:
-            yield (index,), case.freed(bar, free.side[index]), where.part(index)
+            yield (index,), case.freed(bar, free.side[index]), commanded.part(index)
 
 
 def _list_members(study: Members, wanted: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
@@ -169,7 +169,7 @@ def _split(size: int, most: int) -> Iterator[slice]:
     return (slice(start, min(start + most, size)) for start in range(0, size, most))
 
 
-def take_members(at: Command, rows: slice, columns: slice) -> Command:
+def take_members(commanded: Command, rows: slice, columns: slice) -> Command:
     """Take some positions of some members, one after the other, (k,)."""
     count = columns.stop - columns.start
 
@@ -180,24 +180,24 @@ def take_members(at: Command, rows: slice, columns: slice) -> Command:
             return value[rows, 0] if count == 1 else np.repeat(value[rows, 0], count)
         return value[rows, columns].reshape(-1, *value.shape[2:])
 
-    return Command(*(flat(value) for value in at))
+    return Command(*(flat(value) for value in commanded))
 
 
 def _store_block(
-    case: Case, found: Evaluated, result: Mapping[str, Array], code: NDArray[np.uint8], part: Part
+    case: Case, evaluated: Evaluated, arrays: Mapping[str, Array], code: NDArray[np.uint8], part: Part
 ) -> None:
     """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so."""
-    codes, values, _ = found
-    withhold_in_place(case, found)
+    codes, values, _ = evaluated
+    withhold_in_place(case, evaluated)
     shape = code[part].shape
     code[part] = codes.reshape(shape)
     for name, value in values.items():
         if len(shape) > 1 and np.ndim(value):
             value = value.reshape(shape)  # noqa: PLW2901
         if name in SCALARS:
-            result[name][part] = value
+            arrays[name][part] = value
         else:
-            array = result[name]
+            array = arrays[name]
             if array.strides[-1] == array.itemsize:  # x and y next to each other: one copy
                 array.view(complex)[*part, 0] = value
             else:
@@ -208,40 +208,42 @@ RATES = ("acceleration", "speed", "stroke_speed")
 """Fields of a command that are one number for all positions or an array."""
 
 
-def _refuse(at: Command) -> None:
+def _refuse(commanded: Command) -> None:
     """Raise an InputError where a command is none."""
-    expect("at", at, Command)
-    require_bar("at.bar", at.bar)
-    named = dict(zip(("angle", "speed", "acceleration", "branch"), (*COMMANDS[at.bar], "branch"), strict=True))
-    named |= {name: name for name in ("condition", "stroke", "stroke_speed") if getattr(at, name) is not None}
-    for name in (name for name in named if name not in RATES):
-        value = getattr(at, name)
-        expect(f"at.{named[name]}", value, np.ndarray)
-        if value.ndim != 1 or value.shape != at.angle.shape or value.dtype.kind not in "iuf":
-            allowed = f"must be numbers, shape (n,), as many of {at.commanded} as of branch"
-            raise InputError(f"at.{named[name]}", value, allowed)
-    branch = at.branch
+    expect("at", commanded, Command)
+    require_bar("at.bar", commanded.bar)
+    labels = dict(zip(("angle", "speed", "acceleration", "branch"), (*COMMANDS[commanded.bar], "branch"), strict=True))
+    labels |= {name: name for name in ("condition", "stroke", "stroke_speed") if getattr(commanded, name) is not None}
+    for name in (name for name in labels if name not in RATES):
+        value = getattr(commanded, name)
+        expect(f"at.{labels[name]}", value, np.ndarray)
+        if value.ndim != 1 or value.shape != commanded.angle.shape or value.dtype.kind not in "iuf":
+            allowed = f"must be numbers, shape (n,), as many of {commanded.commanded} as of branch"
+            raise InputError(f"at.{labels[name]}", value, allowed)
+    branch = commanded.branch
     if not (branch.item() in (1, -1) if branch.size == 1 else (np.abs(branch) == 1).all()):
         raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
-    for name in RATES[:1] if at.speed is None else (name for name in RATES if name in named):
-        value, key = getattr(at, name), f"at.{named[name]}"
+    for name in RATES[:1] if commanded.speed is None else (name for name in RATES if name in labels):
+        value, key = getattr(commanded, name), f"at.{labels[name]}"
         if isinstance(value, np.ndarray):
-            if value.shape not in ((), at.angle.shape) or value.dtype.kind not in "iuf":
-                raise InputError(key, value, f"must be numbers, shape () or {at.angle.shape}")
+            if value.shape not in ((), commanded.angle.shape) or value.dtype.kind not in "iuf":
+                raise InputError(key, value, f"must be numbers, shape () or {commanded.angle.shape}")
         elif not isinstance(value, float):
             expect(key, value, float, int, np.integer, np.floating)
             require(key, value)
-    if at.remainder is not None:
-        require("at.remainder", at.remainder)
-    expect("at.time", at.time, np.ndarray, type(None))
-    expect("at.independent", at.independent, Independent, type(None))
-    n = len(at.angle)
+    if commanded.remainder is not None:
+        require("at.remainder", commanded.remainder)
+    expect("at.time", commanded.time, np.ndarray, type(None))
+    expect("at.independent", commanded.independent, Independent, type(None))
+    n = len(commanded.angle)
     parts = (
         {}
-        if at.independent is None
-        else {f"independent.{name}": (of, (n,)) for name, of in at.independent._asdict().items()}
+        if commanded.independent is None
+        else {f"independent.{name}": (rows, (n,)) for name, rows in commanded.independent._asdict().items()}
     )
-    for key, (value, wanted) in (parts | ({} if at.lost is None else {"lost": (at.lost, (n, 3))})).items():
+    for key, (value, wanted) in (
+        parts | ({} if commanded.lost is None else {"lost": (commanded.lost, (n, 3))})
+    ).items():
         expect(f"at.{key}", value, np.ndarray)
         if value.shape != wanted or value.dtype.kind not in "iuf":
             raise InputError(f"at.{key}", value, f"must be numbers, shape {wanted}")
@@ -254,16 +256,16 @@ def find_last_stage(scene: Scene) -> str:
 
 
 def find_requested(
-    scene: Scene, shape: tuple[int, ...], at: Command, stage: str | None, out: Mapping[str, Array] | None
+    scene: Scene, shape: tuple[int, ...], commanded: Command, stage: str | None, out: Mapping[str, Array] | None
 ) -> tuple[int, KeysView[str]]:
     """Return the number of the last stage evaluated, and the names of the quantities; an InputError as of `solve`.
 
-    `shape`: of the positions. `at`: the command; of a bar other than the input theta_2 and sin_mu, whose sign is the
-    branch, are found too.
+    `shape`: of the positions. If `commanded` is a bar other than the input, theta_2 and sin_mu, whose sign is the
+    branch, are evaluated too.
     """
     if out is None:
         if stage is None:
-            stage = "position" if at.speed is None else "force"
+            stage = "position" if commanded.speed is None else "force"
         if not isinstance(stage, str) or stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
         wanted = STAGES.index(stage)
@@ -272,7 +274,7 @@ def find_requested(
         expect("out", out, Mapping)
         names = out.keys()
         foreign, stages = _list_foreign(scene), _list_stages(tuple(point.name for point in scene.points))
-        stages = {name: of for name, of in stages.items() if name not in foreign}
+        stages = {name: stage_of for name, stage_of in stages.items() if name not in foreign}
         for name, array in out.items():
             if name not in stages:
                 raise InputError("out", name, "must be among " + ", ".join(stages))
@@ -282,70 +284,74 @@ def find_requested(
                 allowed = f"must be float64 of shape {wanted_shape}, writeable"
                 raise InputError(f"out.{name}", (array.shape, str(array.dtype)), allowed)
         wanted = max((STAGES.index(stages[name]) for name in out), default=0)
-    if wanted > 0 and at.speed is None:
-        raise InputError(f"motion.omega_{at.bar}", None, f"is needed for the stage {STAGES[wanted]!r}")
-    return wanted, names if at.bar == 2 else {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
+    if wanted > 0 and commanded.speed is None:
+        raise InputError(f"motion.omega_{commanded.bar}", None, f"is needed for the stage {STAGES[wanted]!r}")
+    return wanted, names if commanded.bar == 2 else {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
 
 
 def make_arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None) -> dict[str, Array]:
     """Return the arrays to write into: the given ones, and new ones for the rest."""
-    given = {} if out is None else out
+    stated = {} if out is None else out
     return {
-        name: given[name] if name in given else np.empty(shape if name in SCALARS else (*shape, 2)) for name in names
+        name: stated[name] if name in stated else np.empty(shape if name in SCALARS else (*shape, 2)) for name in names
     }
 
 
 def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
     """Every quantity of a scene, those of its own points too, and its stage."""
-    return STAGE_OF | {start + name: stage for name in points for start, stage in OF_POINTS.items()}
+    return STAGE_OF | {start + name: stage for name in points for start, stage in POINT_STAGES.items()}
 
 
 @cache
 def _list_names(wanted: int, absent: tuple[str, ...], points: tuple[str, ...]) -> KeysView[str]:
     """List the quantities of the stages up to the last one wanted."""
     before = STAGES[: wanted + 1]
-    return {name: of for name, of in _list_stages(points).items() if of in before and name not in absent}.keys()
+    return {
+        name: stage for name, stage in _list_stages(points).items() if stage in before and name not in absent
+    }.keys()
 
 
-def make_solution(scene: Scene, at: Command, code: NDArray[np.uint8], result: Mapping[str, Array]) -> Solution:
+def make_solution(
+    scene: Scene, commanded: Command, code: NDArray[np.uint8], quantities_by_name: Mapping[str, Array]
+) -> Solution:
     """Put the arrays of a solution in their places."""
-    own: dict[str, dict[str, Array]] = {start: {} for start in OF_POINTS}
+    of_points: dict[str, dict[str, Array]] = {start: {} for start in POINT_STAGES}
     for point in scene.points:
-        for start, arrays in own.items():
-            if (array := result.get(start + point.name)) is not None:
+        for start, arrays in of_points.items():
+            if (array := quantities_by_name.get(start + point.name)) is not None:
                 arrays[point.name] = array
-    known: Mapping[str, Any] = result
+    quantities: Mapping[str, Any] = quantities_by_name
     if scene.points:
-        known = {name: array for name, array in result.items() if name in UNITS}
-    branch, theta_2 = np.asarray(at.branch), at.angle
-    if at.bar != 2:
-        theta_2, sine = known["theta_2"], known["sin_mu"]
-        known = {name: array for name, array in known.items() if name != "theta_2"}
+        quantities = {name: array for name, array in quantities_by_name.items() if name in UNITS}
+    branch, theta_2 = np.asarray(commanded.branch), commanded.angle
+    if commanded.bar != 2:
+        theta_2, sine = quantities["theta_2"], quantities["sin_mu"]
+        quantities = {name: array for name, array in quantities.items() if name != "theta_2"}
         branch = np.where(np.abs(sine) > 0.0, np.sign(sine), branch).astype(np.int8)
-    solution = Solution(scene.title, scene.drive_bar, code, branch, theta_2=theta_2, **known)
-    solution.drive, solution.at = scene.drive, at
-    solution.points, solution.velocity, solution.acceleration = own[""], own["v_"], own["a_"]
+    solution = Solution(scene.title, scene.drive_bar, code, branch, theta_2=theta_2, **quantities)
+    solution.drive, solution.at = scene.drive, commanded
+    solution.points, solution.velocity, solution.acceleration = of_points[""], of_points["v_"], of_points["a_"]
     solution.ground = (scene.linkage.ground, scene.linkage.ground_angle)
     return solution
 
 
-def unwrap_angles(result: Mapping[str, Array], bar: int) -> None:
+def unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
     """Make every angle that was found continuous along its sweep; the commanded one is as it is stated."""
     commanded = COMMANDS[bar][0]
     for name in ("theta_2", *ANGLES):
-        if name in result and name != commanded:
-            unwrap(result[name])
+        if name in arrays and name != commanded:
+            unwrap(arrays[name])
 
 
 def _solve_alone(
-    case: Case, where: Command, wanted: int, names: KeysView[str], code: NDArray[np.uint8]
+    case: Case, commanded: Command, wanted: int, names: KeysView[str], code: NDArray[np.uint8]
 ) -> dict[str, Array] | None:
     """Solve a single position in plain numbers, for arrays of one entry cost several times as much.
 
     None where any is no number: there NumPy goes on with inf and NaN, and statuses follow.
     """
     try:
-        codes, values, _ = evaluate(case, where.part((0,)), wanted, names)
+        codes, values, _ = evaluate(case, commanded.part((0,)), wanted, names)
     except ArithmeticError:
         return None
     code[0] = codes
@@ -359,12 +365,12 @@ def _solve_alone(
 
 def _list_foreign(scene: Scene) -> tuple[str, ...]:
     """Quantities of the kind of drive that the scene has not."""
-    return OF_LINE if scene.drive is None else COUPLE
+    return LINE_QUANTITIES if scene.drive is None else COUPLE
 
 
 def _list_absent(scene: Scene) -> tuple[str, ...]:
     """List quantities of the other kind of drive, and those of dry or load-dependent friction where there is none."""
     absent = _list_foreign(scene)
     if not any(effect.dry for effect in scene.effects):
-        absent = (*absent, *OF_DRY_FRICTION)
-    return absent if any(effect.loaded_pins for effect in scene.effects) else (*absent, *OF_PIN_LOADS)
+        absent = (*absent, *DRY_FRICTION_QUANTITIES)
+    return absent if any(effect.loaded_pins for effect in scene.effects) else (*absent, *PIN_LOAD_QUANTITIES)

@@ -107,10 +107,10 @@ def describe_extent(theta_2: Any) -> str:
 
 def write_between(values: Any) -> str:
     """Least and greatest of an array."""
-    known = values[np.isfinite(values)]
-    if not known.size:
+    finite = values[np.isfinite(values)]
+    if not finite.size:
         return "no value"
-    return f"{known.min():.6g}" if known.min() == known.max() else f"{known.min():.6g} to {known.max():.6g}"
+    return f"{finite.min():.6g}" if finite.min() == finite.max() else f"{finite.min():.6g} to {finite.max():.6g}"
 
 
 def list_names(what: str, names: Iterable[str]) -> str:
@@ -140,7 +140,7 @@ def null_nan(value: Any) -> Any:
     if hasattr(value, "_asdict"):
         value = value._asdict()
     if isinstance(value, dict):
-        return {name: null_nan(each) for name, each in value.items()}
+        return {name: null_nan(entry) for name, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [null_nan(each) for each in value]
+        return [null_nan(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -33,7 +33,7 @@ FILE_OF = {
     "Flywheel": "flywheel",
 }
 """The effects and their files; a new one is added here."""
-OTHERS = {
+OTHER_FILES = {
     "Effect": "effect",
     **dict.fromkeys(("Load", "Table"), "load"),
     **dict.fromkeys(("Spring", "SpringEnd"), "spring"),
@@ -43,7 +43,7 @@ OTHERS = {
 
 
 def __getattr__(name: str) -> Any:
-    file = FILE_OF.get(name) or OTHERS.get(name)
+    file = FILE_OF.get(name) or OTHER_FILES.get(name)
     if file is None:
         raise AttributeError(f"module 'fourbar.effects' has no attribute {name!r}")
     globals()[name] = value = getattr(import_module(f"fourbar.effects.{file}"), name)

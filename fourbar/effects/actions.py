@@ -17,11 +17,11 @@ AT_REST = 50.0 * 2.0**-52
 
 def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
     """List the inertial properties of bars 2, 3, 4, with the inertia that effects (a flywheel) add."""
-    own = [Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving]
+    bodies = [Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving]
     for effect in effects:
         for bar, inertia in effect.carried.items():
-            own[bar - 2] = own[bar - 2]._replace(I=own[bar - 2].I + inertia)
-    return own[0], own[1], own[2]
+            bodies[bar - 2] = bodies[bar - 2]._replace(I=bodies[bar - 2].I + inertia)
+    return bodies[0], bodies[1], bodies[2]
 
 
 class Actions:
@@ -95,8 +95,8 @@ class Actions:
             return
         first, second = PINS[pin]
         on_second = force if start.bar == second else -force
-        (one, square), (other, other_square) = (point.from_pin(pin, self.state) for point in (start, end))
-        by_one, by_other = one * self.state.direction(start.bar), other * self.state.direction(end.bar)
+        (from_start, square), (from_end, other_square) = (point.from_pin(pin, self.state) for point in (start, end))
+        by_one, by_other = from_start * self.state.direction(start.bar), from_end * self.state.direction(end.bar)
         self.couple(pin, select(square < other_square, cross(-on_second, by_one), cross(-on_second, by_other)))
         if first == 1:  # the pin is the first one of the other bar
             self.force(second, on_second)
@@ -110,15 +110,15 @@ class Actions:
 
     def plus(self, unit: "Actions", size: Number) -> "Actions":
         """Make the sum of these and of what a drive of a size does that does `unit` per newton."""
-        whole = Actions(self.state, self.bodies, self.side)
+        total = Actions(self.state, self.bodies, self.side)
         for name in ("forces", "moments", "couples", "through"):
             sums = dict(getattr(self, name))
             for key, of_one in getattr(unit, name).items():
                 sums[key] = sums.get(key, 0.0) + size * of_one
-            setattr(whole, name, sums)
+            setattr(total, name, sums)
         scaled = [(size * force, point, beyond, size * moment) for force, point, beyond, moment in unit.on_coupler]
-        whole.on_coupler = self.on_coupler + scaled
-        return whole
+        total.on_coupler = self.on_coupler + scaled
+        return total
 
     def work(self) -> tuple[Number, Number]:
         """Compute the generalised force Q (power over the independent angle's speed) of all and of bars 3, 4, N m.
@@ -186,6 +186,6 @@ class Actions:
 
 
 @cache
-def find_common_pin(one: int, other: int) -> str | None:
+def find_common_pin(first: int, second: int) -> str | None:
     """Return the pin at which two bars meet, or None if they have none in common."""
-    return next((pin for pin, bars in PINS.items() if {one, other} == {*bars}), None)
+    return next((pin for pin, bars in PINS.items() if {first, second} == {*bars}), None)

@@ -112,14 +112,16 @@ class PinRows(Effect):
     def __post_init__(self) -> None:
         key, numbers, rows = f"effects.{self.key}", self.numbers, self.rows
         expect(key, rows, tuple, list)
-        found: dict[str, tuple[Any, ...]] = {}
+        by_pin: dict[str, tuple[Any, ...]] = {}
         for row in rows:
             if not isinstance(row, (tuple, list)) or len(row) != 1 + len(numbers) or not isinstance(row[0], str):
                 raise InputError(key, row, f"must be (pin, {', '.join(name or 'value' for name in numbers)})")
             pin, *values = row
-            if pin not in PINS or pin in found:
+            if pin not in PINS or pin in by_pin:
                 raise InputError(f"{key}.{pin}", row[1:], f"the pins are {', '.join(PINS)}, each once")
-            given = zip(numbers.items(), values, strict=True)
-            checked = (require(f"{key}.{pin}.{name}".rstrip("."), value, *of[:2]) for (name, of), value in given)
-            found[pin] = (pin, *checked)
-        object.__setattr__(self, self.field, tuple(found[pin] for pin in PINS if pin in found))
+            pairs = zip(numbers.items(), values, strict=True)
+            checked = (
+                require(f"{key}.{pin}.{name}".rstrip("."), value, *declared[:2]) for (name, declared), value in pairs
+            )
+            by_pin[pin] = (pin, *checked)
+        object.__setattr__(self, self.field, tuple(by_pin[pin] for pin in PINS if pin in by_pin))

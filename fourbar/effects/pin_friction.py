@@ -98,19 +98,21 @@ class PinFriction(PinRows):
         C = np.stack(
             [np.stack([column(getattr(per_unit[q], PIN_FORCE[pin])) for q in names], axis=1) for pin in names], axis=1
         )
-        found = solve_sliding(F, C, k)
-        couples = {pin: make_like(found.x[:, p].reshape(shape), pins.F12.real) for p, pin in enumerate(names)}
+        sliding = solve_sliding(F, C, k)
+        couples = {pin: make_like(sliding.x[:, p].reshape(shape), pins.F12.real) for p, pin in enumerate(names)}
         if _make_plain(pins.F12) is not pins.F12:
             couples = self._refine(couples, pins, per_unit)
         for pin, couple in couples.items():
             actions.couple(pin, -senses[pin] * couple)
-        done = eliminate(actions)
-        left = [
-            np.abs(_make_plain(couple - arms[pin] * np.abs(getattr(done, PIN_FORCE[pin]))))
+        loaded = eliminate(actions)
+        residuals = [
+            np.abs(_make_plain(couple - arms[pin] * np.abs(getattr(loaded, PIN_FORCE[pin]))))
             for pin, couple in couples.items()
         ]
-        status = np.where(found.number == ONE, OK, np.where(found.number == NONE, JAMMED, SEVERAL)).astype(np.uint8)
-        return SolvedFriction(done, found.from_jamming.reshape(shape), np.max(left, axis=0), status.reshape(shape))
+        status = np.where(sliding.number == ONE, OK, np.where(sliding.number == NONE, JAMMED, SEVERAL)).astype(np.uint8)
+        return SolvedFriction(
+            loaded, sliding.from_jamming.reshape(shape), np.max(residuals, axis=0), status.reshape(shape)
+        )
 
     def _refine(self, couples: dict[str, Any], pins: PinForces, per_unit: dict[str, PinForces]) -> dict[str, Any]:
         """Take Newton's steps from couples in doubles, in the numbers of the forces: longer ones or with derivatives.
@@ -165,26 +167,28 @@ class Sliding(NamedTuple):
 def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
     """Solve n problems in p unknowns: F (n, p, 2) in N, C (n, p, p, 2) in 1/m, k (n, p) in m."""
     n, p = F.shape[:2]
-    known = np.isfinite(F).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2, 3))
+    finite = np.isfinite(F).all(axis=(1, 2)) & np.isfinite(C).all(axis=(1, 2, 3))
     x = np.full((n, p), np.nan)
     count = np.full(n, ONE, dtype=np.uint8)
     if p == 1:
         with np.errstate(invalid="ignore", divide="ignore"):
-            x[:, 0], found = _solve_quadratic(F[:, 0], C[:, 0, 0], k[:, 0])
-        count[known] = found[known]
+            x[:, 0], counted = _solve_quadratic(F[:, 0], C[:, 0, 0], k[:, 0])
+        count[finite] = counted[finite]
     else:
         K = k[:, :, None] * np.hypot(C[..., 0], C[..., 1])
         radius = np.full(n, np.nan)
-        radius[known] = np.abs(np.linalg.eigvals(K[known])).max(axis=1)
-        sure = np.flatnonzero(known & (radius < 1.0))
+        radius[finite] = np.abs(np.linalg.eigvals(K[finite])).max(axis=1)
+        sure = np.flatnonzero(finite & (radius < 1.0))
         x[sure] = _iterate(F[sure], C[sure], k[sure], np.zeros((len(sure), p)))
-        unsure = np.flatnonzero(known & ~(radius < 1.0))
+        unsure = np.flatnonzero(finite & ~(radius < 1.0))
         for start in range(0, len(unsure), SEARCHED):
             some = unsure[start : start + SEARCHED]
-            numbers = np.concatenate([of[some].reshape(len(some), math.prod(of.shape[1:])) for of in (F, C, k)], axis=1)
+            numbers = np.concatenate(
+                [array[some].reshape(len(some), math.prod(array.shape[1:])) for array in (F, C, k)], axis=1
+            )
             _, first, same = np.unique(numbers, axis=0, return_index=True, return_inverse=True)
             first = some[first]
-            x[some], count[some] = (of[same.ravel()] for of in _search(F[first], C[first], k[first]))
+            x[some], count[some] = (array[same.ravel()] for array in _search(F[first], C[first], k[first]))
     with np.errstate(invalid="ignore"):
         for _ in range(2):  # takes back the rounding of the search and of the quadratic
             right, slope = _compute_right_side(F, C, k, x)
@@ -208,8 +212,8 @@ def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.ui
     under = c - turned * turned
     root = np.sqrt(under)
     q = -(b + np.where(b < 0.0, -root, root))
-    one, other = np.where(a == 0.0, np.inf, q / a), np.where(q == 0.0, 0.0, c / q)
-    low, high = np.fmin(one, other), np.fmax(one, other)
+    first, second = np.where(a == 0.0, np.inf, q / a), np.where(q == 0.0, 0.0, c / q)
+    low, high = np.fmin(first, second), np.fmax(first, second)
     x = np.where(a < 0.0, high, low)
     count = np.full(len(x), ONE, dtype=np.uint8)
     count[~(a < 0.0) & ((under < 0.0) | (b >= 0.0)) & (c > 0.0)] = NONE
@@ -263,9 +267,9 @@ def _search(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.int_]]:
     x = (size[:, None, None] * starts).reshape(-1, p)
     problem, moving, before = np.repeat(np.arange(n), len(starts)), np.arange(len(x)), np.full_like(x, np.inf)
     for _ in range(60):
-        of, last = problem[moving], x[moving]
-        right, slope = _compute_right_side(F[of], C[of], k[of], last)
-        new = np.clip(last + compute_step(right - last, slope), 0.0, 1e12 * size[of, None])
+        members, last = problem[moving], x[moving]
+        right, slope = _compute_right_side(F[members], C[members], k[members], last)
+        new = np.clip(last + compute_step(right - last, slope), 0.0, 1e12 * size[members, None])
         least_change = np.minimum(np.abs(new - last).max(axis=1), np.abs(new - before[moving]).max(axis=1))
         x[moving], before[moving] = new, last
         moving = moving[least_change > SETTLED * new.max(axis=1)]  # the others stand still or alternate

@@ -29,7 +29,7 @@ COINCIDE = 16.0 * 2.0**-52
 """Two points nearer than this part of their paths from O2, bar by bar, have no direction between them."""
 
 
-AT = Declared("m", left_out=(0.0, 0.0), pair=True)
+END_POSITION = Declared("m", left_out=(0.0, 0.0), pair=True)
 """Declaration of the position of an end on its bar."""
 GAS = {
     **dict.fromkeys(("extended", "stroke"), Declared("m", POSITIVE)),
@@ -82,7 +82,7 @@ def require_ends(key: str, start: object, end: object) -> tuple[SpringEnd, Sprin
         if not isinstance(point, SpringEnd):
             raise InputError(f"{key}.{name}", point, "must be a fourbar.SpringEnd")
         bar = require_whole(f"{key}.{name}.bar", point.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
-        ends.append(SpringEnd(bar, *require_pair(f"{key}.{name}.at", point[1:], AT.unit)))
+        ends.append(SpringEnd(bar, *require_pair(f"{key}.{name}.at", point[1:], END_POSITION.unit)))
     if ends[0].bar == ends[1].bar:
         raise InputError(f"{key}.to.bar", ends[1].bar, "must be another bar than that of `from`")
     return ends[0], ends[1]
@@ -141,8 +141,10 @@ class Spring:
         compressed_force : at full stroke, N, no less; left out: the same.
         """
         key, last = "effects.springs.gas", extended_force if compressed_force is None else compressed_force
-        given = zip(GAS.items(), (extended, stroke, extended_force, last), strict=True)
-        extended, stroke, first, last = (require(f"{key}.{name}", value, *of[:2]) for (name, of), value in given)
+        pairs = zip(GAS.items(), (extended, stroke, extended_force, last), strict=True)
+        extended, stroke, first, last = (
+            require(f"{key}.{name}", value, *declared[:2]) for (name, declared), value in pairs
+        )
         if stroke >= extended:
             raise InputError(f"{key}.stroke", stroke, f"must be less than the extended length, {extended:.6g} m")
         if last < first:
@@ -174,7 +176,7 @@ class Springs(Effect):
         'springs = [{ from = { bar = 1, at = ["10 cm", "-90 deg"] }, to = { bar = 4, at = ["8 cm", "0 deg"] }, '
         'stiffness = "200 N/m", length = "12 cm", preload = "3 N" }]'
     )
-    numbers: ClassVar[dict[str, Declared]] = {**Spring.numbers, "at": AT}
+    numbers: ClassVar[dict[str, Declared]] = {**Spring.numbers, "at": END_POSITION}
 
     def __post_init__(self) -> None:
         expect("effects.springs", self.springs, tuple, list)

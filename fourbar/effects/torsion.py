@@ -98,7 +98,7 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     bar, theta_1, theta_2 = state.bar, state.theta_1, state.theta_2 if state.q is None else state.q
     d, a, *_ = reorder_lengths(bar, state.lengths[:4])
     turned = math.pi if bar == 4 else 0.0  # of the ground, and with it of the coupler
-    u2, u3, u4 = (state.direction(each) for each in ROLES[bar])
+    u2, u3, u4 = (state.direction(role) for role in ROLES[bar])
     theta_3, theta_4 = np.angle(u3) + turned, np.angle(u4)
     theta_1 = theta_1 + turned
     phi = np.angle(state.at.diagonal if bar == 2 else d * np.exp(1j * theta_1) - a * u2)
@@ -109,9 +109,9 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
         """Wrap the angle into half a turn, or as far outside as rounding puts it."""
         return wrap_angle(angle - 0.5 * math.pi) + 0.5 * math.pi
 
-    own = (
+    angles = (
         theta_2,
         phi + branch * beyond(branch * (theta_3 - phi)) - turned,
         phi + math.pi - branch * beyond(branch * (phi + math.pi - theta_4)),
     )
-    return {1: np.full_like(theta_2, theta_1 - turned), **dict(zip(ROLES[bar], own, strict=True))}
+    return {1: np.full_like(theta_2, theta_1 - turned), **dict(zip(ROLES[bar], angles, strict=True))}

@@ -39,7 +39,7 @@ U = 2.0**-53
 UNDECIDED = 32.0 * U
 """A factor of Heron's formula smaller than this times its terms is evaluated in many digits: in doubles it is wrong
 by at most about 12 U times them."""
-NOWHERE = np.empty(0, dtype=np.intp)
+NO_POSITIONS = np.empty(0, dtype=np.intp)
 NO_MOTION = Coefficients(*[np.nan] * 8)
 """Coefficients of NaN, used where only positions are wanted."""
 Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
@@ -141,11 +141,11 @@ class Case(NamedTuple):
         """Close the loop at a half angle and compute its motion: the one way from an angle to what forces act on."""
         return self.state(q, self.path.position(q, half, branch), branch, speed, acceleration, moving=moving)
 
-    def at(self, where: Command) -> State:
+    def at(self, commanded: Command) -> State:
         """Compute the positions of a command, and their motion."""
-        half, _ = self.half_angle(where.angle, where.remainder)
-        speed = 0.0 if where.speed is None else where.speed
-        return self.assemble(where.angle, half, where.branch, speed, where.acceleration)
+        half, _ = self.half_angle(commanded.angle, commanded.remainder)
+        speed = 0.0 if commanded.speed is None else commanded.speed
+        return self.assemble(commanded.angle, half, commanded.branch, speed, commanded.acceleration)
 
     def freed(self, bar: int, side: Any) -> "Case":
         """Return the case of a linkage that is released, read in the angle of bar 2 or 4, which no couple drives."""
@@ -153,10 +153,10 @@ class Case(NamedTuple):
         path = path._replace(lengths=meet_change_points(path.lengths))
         return self._replace(drive_bar=bar, path=path, side=side)
 
-    def started(self, at: Command) -> "Case":
+    def started(self, start: Command) -> "Case":
         """Return a copy whose path-dependent effects begin at this position; it may hold many linkages."""
-        state = self.at(at)
-        return self._replace(terms=tuple(term.counted_from(state, at.branch) for term in self.terms))
+        state = self.at(start)
+        return self._replace(terms=tuple(term.counted_from(state, start.branch) for term in self.terms))
 
     def with_start(self, motion: Command) -> "Case":
         """Let the effects begin where the linkage first assembles in a motion, if that keeps its branch."""
@@ -176,7 +176,7 @@ class Case(NamedTuple):
                 if is_any(constant < 0.0):  # else it is a sum of two positive terms
                     close = close | find_undecided(factor, constant, 4.0 * lengths.a * lengths.d)
         if not is_any(close):
-            return half, NOWHERE
+            return half, NO_POSITIONS
         from fourbar.formulas.many_digits import decide_half_angles
 
         index = np.flatnonzero(np.broadcast_to(close, np.shape(q)))
@@ -227,7 +227,7 @@ class Case(NamedTuple):
         if np.all(state.speed) and all(np.all(actions.turning(pin)) for pin in pins):
             return drive, drive, None
         ahead, back = (self.dynamics(state, acceleration, side) for side in (1, -1))
-        jammed = [found.status == JAMMED for found in (ahead, back) if found.status is not None]
+        jammed = [dynamics.status == JAMMED for dynamics in (ahead, back) if dynamics.status is not None]
         low, high = np.minimum(ahead.drive, back.drive), np.maximum(ahead.drive, back.drive)
         return low, high, np.any(jammed, axis=0) if jammed else None
 
@@ -294,7 +294,7 @@ class _FreeBodies(NamedTuple):
         return actions.at_pins(pins)
 
 
-def compute_state(scene: Scene, at: Command) -> State:
+def compute_state(scene: Scene, commanded: Command) -> State:
     """Compute the positions of a command and their motion, for what shows them."""
     with np.errstate(all="ignore"):
-        return Case.of(scene, at.bar).at(at)
+        return Case.of(scene, commanded.bar).at(commanded)

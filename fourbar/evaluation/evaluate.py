@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.evaluation.case import NOWHERE, Case, Dynamics, Evaluated
+from fourbar.evaluation.case import NO_POSITIONS, Case, Dynamics, Evaluated
 from fourbar.formulas.arithmetic import is_any, select
 from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.motion import State
@@ -21,11 +21,11 @@ from fourbar.formulas.position import HalfAngle
 from fourbar.quantities import (
     ANGLES,
     JAMMED,
+    LINE_QUANTITIES,
     NO_DIRECTION,
     NO_LEVER,
     NO_TORQUE,
     NOT_ASSEMBLED,
-    OF_LINE,
     OK,
     OVERFLOW,
     SEVERAL,
@@ -35,7 +35,7 @@ from fourbar.quantities import (
     WOUND,
 )
 from fourbar.scene import Command
-from fourbar.scene.point import OF_POINTS
+from fourbar.scene.point import POINT_STAGES
 
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
 WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
@@ -58,7 +58,7 @@ def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) ->
     elif q.ndim == 0:
         q = q.item()  # with Python's own numbers a formula takes half the time
     speed = 0.0 if speed is None else speed
-    half, exact = case.half_angle(q, command.remainder) if free is None else (case.path.half_angle(q), NOWHERE)
+    half, exact = case.half_angle(q, command.remainder) if free is None else (case.path.half_angle(q), NO_POSITIONS)
     of_angles = command.bar == 2 and len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
     if of_angles and free is None and command.remainder is None and not case.path.may_stay_parallel:
         return _evaluate_angles(case, half, branch, names)
@@ -114,8 +114,8 @@ def _evaluate_angles(case: Case, half: HalfAngle, branch: Any, names: KeysView[s
     """Evaluate the two angles only: without vectors and the rest of the triangle."""
     theta_3, theta_4, root = case.path.angles(half, branch)
     codes = _compute_codes(root, half, None, 2.0 * case.path.lengths.b * case.path.lengths.c)
-    found = {"theta_3": theta_3, "theta_4": theta_4}
-    return codes, {name: found[name] for name in names}, None
+    angles = {"theta_3": theta_3, "theta_4": theta_4}
+    return codes, {name: angles[name] for name in names}, None
 
 
 def _list_forces(
@@ -125,30 +125,30 @@ def _list_forces(
     branch: NDArray[np.int8] | None,
     codes: Any,
     names: KeysView[str],
-    found: Dynamics,
+    dynamics: Dynamics,
     bars: dict[str, Any],
 ) -> tuple[Any, dict[str, Any]]:
     """List the quantities of the force stage, error bars among them, with the statuses of the effects.
 
     `branch`: of each position; None where no effect counts turns by it.
     """
-    own = case.names
-    values: dict[str, Any] = {**found.pins._asdict(), own.value: found.drive, **bars}
+    drive_names = case.names
+    values: dict[str, Any] = {**dynamics.pins._asdict(), drive_names.value: dynamics.drive, **bars}
     if "power" in names:
-        values["power"] = found.drive * case.drive_speed(state)
+        values["power"] = dynamics.drive * case.drive_speed(state)
     if "drive_condition" in names:
         condition = case.drive_condition(state)
-        values["drive_condition"] = condition if found.from_jamming is None else condition * found.from_jamming
+        values["drive_condition"] = condition if dynamics.from_jamming is None else condition * dynamics.from_jamming
     if "friction_residual" in names:
-        values["friction_residual"] = 0.0 if found.residual is None else found.residual
-    if own.low in names or own.high in names:
-        *ends, held = case.drive_interval(state, acceleration, found.drive)
-        values |= zip(own[2:], ends, strict=True)
-        if held is not None and found.status is not None:
-            found = found._replace(status=np.where(held & (found.status == OK), JAMMED, found.status))
+        values["friction_residual"] = 0.0 if dynamics.residual is None else dynamics.residual
+    if drive_names.low in names or drive_names.high in names:
+        *ends, held = case.drive_interval(state, acceleration, dynamics.drive)
+        values |= zip(drive_names[2:], ends, strict=True)
+        if held is not None and dynamics.status is not None:
+            dynamics = dynamics._replace(status=np.where(held & (dynamics.status == OK), JAMMED, dynamics.status))
     without: list[Any] = [status for term in case.terms if (status := term.status(state, branch)) is not None]
-    if found.status is not None:
-        without.append(found.status)
+    if dynamics.status is not None:
+        without.append(dynamics.status)
     if case.drive is not None and (status := case.drive.status(state, case.sines(state.at))) is not None:
         without.append(status)
     if without:
@@ -169,22 +169,22 @@ def compute_error_bars(
     state: State,
     acceleration: Any,
     sign: Any,
-    found: Dynamics,
+    dynamics: Dynamics,
     exact: NDArray[np.intp],
 ) -> dict[str, Any]:
     """Compute that of the drive (N m or N) and `force_error` (N, worst of the four pin forces), by name, each (n,).
 
     Parameters
     ----------
-    state, acceleration, sign, found : the evaluation that the error bars are for; the sign is that of the path's root.
+    state, acceleration, sign, dynamics : the evaluation that the error bars are for; the sign is that of the root.
     exact : indices of the positions whose half angle is known in many digits.
     """
     longer, angle = case.lengthened(), state.theta_2 if state.q is None else state.q
     lost, remainder = command.lost, command.remainder
     if lost is None:
         lost = np.array([0.0 if remainder is None else float(remainder), 0.0, 0.0])
-    given = enumerate((angle, state.speed, acceleration))
-    q, speed, growth = (lengthen(number) + lost[..., place] for place, number in given)
+    numbers = enumerate((angle, state.speed, acceleration))
+    q, speed, growth = (lengthen(number) + lost[..., place] for place, number in numbers)
     half = longer.path.half_angle(q)
     if exact.size:
         from fourbar.formulas.many_digits import decide_half_angles
@@ -192,11 +192,11 @@ def compute_error_bars(
         left_out = 0.0 if remainder is not None else lost[..., 0]
         half = decide_half_angles(case.linkage, case.path.unit, half, exact, angle, remainder, case.path.bar, left_out)
     near = longer.assemble(q, half, sign, speed, growth)
-    other = longer.dynamics(near, growth, case.side)
-    pairs = zip((*found.pins, found.drive), (*other.pins, other.drive), strict=True)
+    longer_dynamics = longer.dynamics(near, growth, case.side)
+    pairs = zip((*dynamics.pins, dynamics.drive), (*longer_dynamics.pins, longer_dynamics.drive), strict=True)
     *gaps, drive_gap = (np.abs(shorten(after - before)) for before, after in pairs)
-    drive_error = compute_bar(drive_gap, np.abs(found.drive))
-    force_error = compute_bar(_find_largest(gaps), _find_largest([np.abs(pin) for pin in found.pins]))
+    drive_error = compute_bar(drive_gap, np.abs(dynamics.drive))
+    force_error = compute_bar(_find_largest(gaps), _find_largest([np.abs(pin) for pin in dynamics.pins]))
     return {case.names.error: drive_error, "force_error": force_error}
 
 
@@ -220,9 +220,9 @@ def is_finite(values: Mapping[str, Any]) -> bool:
     return all(cmath.isfinite(square) for square in squares)
 
 
-def withhold_in_place(case: Case, found: Evaluated) -> None:
+def withhold_in_place(case: Case, evaluated: Evaluated) -> None:
     """Write `withhold` in place wherever a result is no number."""
-    codes, values, driven = found
+    codes, values, driven = evaluated
     if not is_finite(values):
         in_line: Any = False
         if driven is not None and case.drive is None:
@@ -238,18 +238,18 @@ def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[n
     """
     gone = np.zeros(code.shape, dtype=bool)
     for stage in STAGES:
-        names = [name for name in values if STAGE_OF.get(name, OF_POINTS.get(name[:2], "position")) == stage]
+        names = [name for name in values if STAGE_OF.get(name, POINT_STAGES.get(name[:2], "position")) == stage]
         of_forces = stage in STAGES[3:]
         promised = np.isin(code, (OK, SEVERAL)) if of_forces else ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
-        found = np.zeros_like(gone)
+        infinite = np.zeros_like(gone)
         for name in names:
-            found |= ~np.isfinite(values[name])
+            infinite |= ~np.isfinite(values[name])
             values[name] = np.where(np.isfinite(values[name]), values[name], make_no_value(values[name]))
-        found &= promised & ~gone
-        code[found] = OVERFLOW
+        infinite &= promised & ~gone
+        code[infinite] = OVERFLOW
         if of_forces:
-            code[found & in_line] = NO_TORQUE
-        gone |= found
+            code[infinite & in_line] = NO_TORQUE
+        gone |= infinite
         for name in names:
             if name != "drive_condition":
                 values[name] = np.where(gone, make_no_value(values[name]), values[name])
@@ -260,7 +260,7 @@ def make_no_value(quantity: Any) -> complex:
     return complex(np.nan, np.nan) if np.iscomplexobj(quantity) else np.nan
 
 
-OF_BARS: dict[str, Callable[[State], Any]] = {
+SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
     "theta_2": lambda state: state.theta(2),
     "theta_3": lambda state: state.theta(3),
     "theta_4": lambda state: state.theta(4),
@@ -274,17 +274,17 @@ OF_BARS: dict[str, Callable[[State], Any]] = {
     "alpha_4": lambda state: state.moving.alpha_4,
 }
 """The scalars before the forces."""
-PLACES = frozenset(start + name for start in OF_POINTS for name in ("A", "B", "G2", "G3", "G4"))
+PLACES = frozenset(start + name for start in POINT_STAGES for name in ("A", "B", "G2", "G3", "G4"))
 """The vectors before the forces, of the linkage's own points."""
 
 
 def list_kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
     """List the wanted quantities that come before the forces, the scene's own points included."""
-    values = {name: evaluate(state) for name, evaluate in OF_BARS.items() if name in wanted}
-    if case.drive is not None and not wanted.isdisjoint(OF_LINE):
+    values = {name: evaluate(state) for name, evaluate in SCALAR_FORMULAS.items() if name in wanted}
+    if case.drive is not None and not wanted.isdisjoint(LINE_QUANTITIES):
         stroke, unit = case.drive.line(state)
-        own = {"stroke": stroke, "drive_line": unit, "stroke_speed": case.drive_speed(state)}
-        values |= {name: value for name, value in own.items() if name in wanted}
+        of_line = {"stroke": stroke, "drive_line": unit, "stroke_speed": case.drive_speed(state)}
+        values |= {name: value for name, value in of_line.items() if name in wanted}
     if not case.points and wanted.isdisjoint(PLACES):
         return values
     lengths, (two, three, four) = case.lengths, case.bodies

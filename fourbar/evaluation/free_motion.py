@@ -107,12 +107,12 @@ def release(scene: Scene) -> Released:
         bar=start.bar,
     )
     if scene.counts_turns:
-        at = released.command
+        motion = released.command
         with np.errstate(all="ignore"):
-            begun = Case.of(scene).with_start(at.part(slice(0, 1)))
-            state = begun.at(at)
+            begun = Case.of(scene).with_start(motion.part(slice(0, 1)))
+            state = begun.at(motion)
             for term in begun.terms:
-                codes = term.status(state, at.branch) if term.counts_turns else None
+                codes = term.status(state, motion.branch) if term.counts_turns else None
                 if codes is not None and codes.any():
                     raise LimitError(
                         f"effects.{term.key}: at {released.time[np.argmax(codes)]:.6g} s the free motion has turned a "
@@ -130,9 +130,9 @@ class _Reading:
     """The linkage read in the angle of bar 2 or of bar 4, with the sign of its path."""
 
     def __init__(self, linkage: FourBar, bar: int) -> None:
-        found = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
-        lengths = _make_plain(meet_change_points(found.lengths))
-        self.path = found._replace(lengths=lengths, u1=complex(found.u1), unit=float(found.unit))
+        path = prepare_path(loop(*linkage.lengths), linkage.ground_angle, bar)
+        lengths = _make_plain(meet_change_points(path.lengths))
+        self.path = path._replace(lengths=lengths, u1=complex(path.u1), unit=float(path.unit))
         self.bar, self.sign = bar, 1.0
         self.changes = 0.0 in (self.path.lengths.E1, self.path.lengths.E2)
         self.last: tuple[tuple[float, float], tuple[Position, Coefficients]] | None = None
@@ -279,7 +279,7 @@ class _Run:
         at, k = self._at()
         sines, bar = _compute_sines(at), 6 - self.reading.bar
         if self.reading.bar == 3:  # of the start alone
-            bar = max((2, 4), key=lambda each: abs(sines[each]))
+            bar = max((2, 4), key=lambda number: abs(sines[number]))
         elif abs(sines[self.reading.bar]) >= CHANGE_OVER * abs(sines[bar]):
             return False
         q, reading = self.theta[bar], self.readings[bar]
@@ -320,9 +320,9 @@ class _Run:
         t, end, steps, stopped = 0.0, float(times[-1]), 0, None
         worst, largest = 0.0, self.start_energy
 
-        def report(upto: float, at: Callable[[float], Array]) -> None:
+        def report(upto: float, dense: Callable[[float], Array]) -> None:
             while len(rows) < len(times) and times[len(rows)] <= upto:
-                rows.append(self._make_row(at(float(times[len(rows)]))))
+                rows.append(self._make_row(dense(float(times[len(rows)]))))
 
         moves = self._starts()
         report(0.0, lambda _: self.y)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from fourbar import effects as kinds
 from fourbar.effects.effect import PinRows
-from fourbar.effects.spring import AT, GAS
+from fourbar.effects.spring import END_POSITION, GAS
 from fourbar.errors import InputError
 from fourbar.files.fields import Reader, write_declared, write_numbers, write_polar
 from fourbar.linkage import PINS
@@ -86,11 +86,11 @@ def read_ends(read: Reader, key: str, given: dict[str, Any]) -> "tuple[SpringEnd
         own = f"{key}.{name}"
         entry = read.table(own, given.get(name), ("bar", "at"))
         bar = read.whole(f"{own}.bar", entry.get("bar"), 1, 4)
-        ends.append(kinds.SpringEnd(bar, *read.declared(f"{own}.at", entry.get("at"), AT)))
+        ends.append(kinds.SpringEnd(bar, *read.declared(f"{own}.at", entry.get("at"), END_POSITION)))
     return ends[0], ends[1]
 
 
 def write_ends(line: Any) -> dict[str, Any]:
     """Write them back."""
     ends = {"from": line.start, "to": line.end}
-    return {name: {"bar": end.bar, "at": write_declared(end[1:], AT)} for name, end in ends.items()}
+    return {name: {"bar": end.bar, "at": write_declared(end[1:], END_POSITION)} for name, end in ends.items()}

@@ -14,7 +14,7 @@ NUMPY = (np.ndarray, np.generic)
 DOUBLES = {float, np.float64}
 PI_LOW = 1.2246467991473532e-16
 """pi less its double: a constant in longer numbers is no double."""
-_OF_TYPE: dict[type, Any] = {float: np, int: np, complex: np, np.ndarray: np}
+_LIBRARY_OF: dict[type, Any] = {float: np, int: np, complex: np, np.ndarray: np}
 
 
 def namespace(*numbers: Number) -> Any:
@@ -22,35 +22,35 @@ def namespace(*numbers: Number) -> Any:
 
     Raises TypeError where they are of two other libraries.
     """
-    found: Any = np
+    library: Any = np
     for number in numbers:
-        own = _OF_TYPE.get(type(number)) or _find_namespace(number)
-        if own is not np and found not in (np, own):
+        functions = _LIBRARY_OF.get(type(number)) or _find_namespace(number)
+        if functions is not np and library not in (np, functions):
             raise TypeError("arrays of two libraries")
-        found = found if own is np else own
-    return found
+        library = library if functions is np else functions
+    return library
 
 
 def _find_namespace(number: Number) -> Any:
     """Find the functions for a type seen for the first time: NumPy's for its own operands and for what is no array."""
-    found: Any = np
+    functions: Any = np
     array = hasattr(number, "__array_namespace__") or hasattr(number, "__dlpack__")
     if array and not isinstance(number, np.generic) and not hasattr(number, "__array_ufunc__"):
         from array_api_compat import array_namespace
 
-        found = array_namespace(number)
-    _OF_TYPE[type(number)] = found
-    return found
+        functions = array_namespace(number)
+    _LIBRARY_OF[type(number)] = functions
+    return functions
 
 
-def make_like(values: Number, other: Number) -> Number:
+def make_like(values: Number, model: Number) -> Number:
     """Make plain numbers an array of another's library, kind and device."""
-    if (xp := namespace(other)) is np:  # Python's own numbers and those with derivatives have no dtype
-        return other.like(values) if hasattr(other, "like") else np.asarray(values, getattr(other, "dtype", float))
+    if (xp := namespace(model)) is np:  # Python's own numbers and those with derivatives have no dtype
+        return model.like(values) if hasattr(model, "like") else np.asarray(values, getattr(model, "dtype", float))
     from array_api_compat import is_jax_array
 
-    where = {} if is_jax_array(other) else {"device": other.device}  # JAX brings plain numbers to the others
-    return xp.asarray(values, dtype=other.dtype, **where)
+    device = {} if is_jax_array(model) else {"device": model.device}  # JAX brings plain numbers to the others
+    return xp.asarray(values, dtype=model.dtype, **device)
 
 
 def is_any(mask: Number) -> bool:
@@ -81,12 +81,12 @@ def select(mask: Number, x: Number, y: Number) -> Number:
     return mask.of_one(x, y) if hasattr(mask, "of_one") else namespace(mask).where(mask, x, y)
 
 
-def divisor(x: Number, where: Number) -> Number:
+def divisor(x: Number, mask: Number) -> Number:
     """Return what divides where a mask holds; elsewhere 0 would leave no number in the derivatives of what it divides.
 
     Numbers of NumPy stay as they are: their derivatives are taken of what is selected alone.
     """
-    return x if (xp := namespace(x, where)) is np else xp.where(where, x, 1.0)
+    return x if (xp := namespace(x, mask)) is np else xp.where(mask, x, 1.0)
 
 
 def split_sum(x: Number, y: Number) -> tuple[Number, Number]:
@@ -101,9 +101,9 @@ def split_sum(x: Number, y: Number) -> tuple[Number, Number]:
 
 def exact_difference(p: Number, q: Number, r: Number, s: Number) -> Number:
     """(p + q) - (r + s), zero only where it is zero."""
-    one, lost_1 = split_sum(p, q)
-    other, lost_2 = split_sum(r, s)
-    gap, lost = split_sum(one, -other)
+    added, lost_1 = split_sum(p, q)
+    subtracted, lost_2 = split_sum(r, s)
+    gap, lost = split_sum(added, -subtracted)
     both, rest = split_sum(lost_1, -lost_2)
     return (gap + (lost + both)) + rest
 
@@ -126,10 +126,10 @@ def polar(r: Number, phi: Number) -> Number:
     """Compute r e^{i phi} with the cosine and the sine of the library, exact where phi = 0."""
     if type(r) is type(phi) is float:
         return cmath.rect(r, phi)
-    of = namespace(r, phi)
-    if of is not np and type(phi) is float:
-        of = math
-    return r * of.cos(phi) + 1j * (r * of.sin(phi))
+    functions = namespace(r, phi)
+    if functions is not np and type(phi) is float:
+        functions = math
+    return r * functions.cos(phi) + 1j * (r * functions.sin(phi))
 
 
 def sine_of(x: Number) -> Number:

@@ -57,9 +57,13 @@ def change_numbers(value: Any, change: Callable[[Any], Any]) -> Any:
 
 
 @cache
-def _list_fields(of: type) -> tuple[str, ...]:
+def _list_fields(kind: type) -> tuple[str, ...]:
     """List the fields of a dataclass whose numbers may be changed."""
-    return tuple(field.name for field in fields(of)) if is_dataclass(of) and not getattr(of, "as_given", False) else ()
+    return (
+        tuple(field.name for field in fields(kind))
+        if is_dataclass(kind) and not getattr(kind, "as_given", False)
+        else ()
+    )
 
 
 class Pair(NDArrayOperatorsMixin):
@@ -113,8 +117,8 @@ def _choose(mask: Any, x: Any, y: Any) -> Any:
 
 def _renew(high: Any, low: Any) -> Pair:
     """Return the pair of a double and a smaller one."""
-    whole = high + low
-    return Pair(whole, low - (whole - high))
+    total = high + low
+    return Pair(total, low - (total - high))
 
 
 def _add(x: Any, y: Any) -> Any:

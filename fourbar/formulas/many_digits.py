@@ -81,7 +81,7 @@ def decide_half_angles(
             high[row, i] = float(value)
             low[row, i] = float(value - high[row, i])
     mask, rows = mask.reshape(shape), zip(half, high.reshape(5, *shape), low.reshape(5, *shape), strict=True)
-    return HalfAngle(*(np.where(mask, make_like(own, number) + rest, number)[()] for number, own, rest in rows))
+    return HalfAngle(*(np.where(mask, make_like(rounded, number) + rest, number)[()] for number, rounded, rest in rows))
 
 
 def limit_remainder(linkage: FourBar, limit: float, theta_2: float, offset: float, bar: int = 2) -> Any:

@@ -80,9 +80,9 @@ class Reach(NamedTuple):
         """
         x, y = (1, 1) if stretched else (1, -1) if self.x >= self.y else (-1, 1)
         short_d, short_l = self.sum(-1, 1, x, y), self.sum(1, -1, x, y)
-        short_e, whole = self.sum(1, 1, -x, -y), self.sum(1, 1, x, y)
-        at_near = math.atan2(math.sqrt(short_d) * math.sqrt(short_l), math.sqrt(short_e) * math.sqrt(whole))
-        at_far = math.atan2(math.sqrt(short_d) * math.sqrt(short_e), math.sqrt(short_l) * math.sqrt(whole))
+        short_e, perimeter = self.sum(1, 1, -x, -y), self.sum(1, 1, x, y)
+        at_near = math.atan2(math.sqrt(short_d) * math.sqrt(short_l), math.sqrt(short_e) * math.sqrt(perimeter))
+        at_far = math.atan2(math.sqrt(short_d) * math.sqrt(short_e), math.sqrt(short_l) * math.sqrt(perimeter))
         return 2.0 * at_near, 2.0 * at_far
 
 
@@ -97,8 +97,8 @@ def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
     bar = require_bar("bar", bar)
     unit = choose_unit(linkage)  # exact, and no product of lengths leaves the range of doubles
     d, *moving = (length / unit for length in linkage.lengths)
-    own = moving.pop(bar - 2)
-    return Reach(d, own, *moving)
+    driven = moving.pop(bar - 2)
+    return Reach(d, driven, *moving)
 
 
 def _wrap(angle: float) -> float:
@@ -124,7 +124,7 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
     reach = reach_of(linkage, bar)
     theta_1 = linkage.ground_angle
     others = [k for k in MOVING_BARS if k != bar]
-    found: list[LimitPosition] = []
+    limits: list[LimitPosition] = []
     for stretched, beyond in ((False, reach.beyond_folded), (True, reach.beyond_stretched)):
         if beyond <= 0.0:
             continue
@@ -138,8 +138,8 @@ def limit_positions(linkage: FourBar, bar: int = 2) -> tuple[LimitPosition, ...]
             psi_2, theta_3 = vectors[2] % TURN, theta_1 + vectors[3]
             theta_4 = theta_1 + vectors[4] + math.pi
             branch = 0 if bar == 2 or straight else int(math.copysign(1.0, math.sin(theta_4 - theta_3)))
-            found.append(LimitPosition(theta_1 + psi_2, _wrap(theta_3), _wrap(theta_4), branch, stretched))
-    return tuple(sorted(found))
+            limits.append(LimitPosition(theta_1 + psi_2, _wrap(theta_3), _wrap(theta_4), branch, stretched))
+    return tuple(sorted(limits))
 
 
 def find_intervals(linkage: FourBar, bar: int = 2) -> tuple[tuple[float, float], ...]:
@@ -175,7 +175,11 @@ def choose_range(linkage: FourBar, bar: int = 2, holding: float | None = None) -
     if turns_fully(linkage, bar):
         return 0.0, TURN
     every = find_intervals(linkage, bar)
-    held = (own for own in every if holding is not None and (holding - own[0]) % TURN <= own[1] - own[0])
+    held = (
+        interval
+        for interval in every
+        if holding is not None and (holding - interval[0]) % TURN <= interval[1] - interval[0]
+    )
     start, stop = next(held, every[0])
     margin = min(MARGIN, (stop - start) / NARROW)
     return start + margin, stop - margin
@@ -249,10 +253,10 @@ def follow_smooth_path(linkage: FourBar, theta_2: Array, branch: int, bar: int =
         heading = heading[latest]
     rounding = AT_CHANGE_POINT * (np.abs(theta_2) + abs(linkage.ground_angle))
     for point in change_points(linkage, bar):
-        at = 0.0 if point == linkage.ground_angle else math.pi
-        turns = (psi - at) / TURN
+        psi_of_point = 0.0 if point == linkage.ground_angle else math.pi
+        turns = (psi - psi_of_point) / TURN
         nearest = np.rint(turns)
-        on = np.abs(psi - at - nearest * TURN) <= rounding
+        on = np.abs(psi - psi_of_point - nearest * TURN) <= rounding
         cell = np.where(on, nearest - (heading > 0), np.floor(turns)).astype(np.int64)
         crossed += cell - cell[:1]
     return np.where(crossed % 2 == 0, branch, -branch).astype(np.int8)
@@ -291,11 +295,11 @@ def find_circuit(linkage: FourBar, theta_2: Array, branch: int | NDArray[np.int8
     `theta_2`: (n,), rad. `branch`: +1 or -1, or one of them for each position (n,).
     """
     theta_2 = np.asarray(theta_2, dtype=float)
-    found = circuits(linkage)
-    if len(found) == 1:
+    every = circuits(linkage)
+    if len(every) == 1:
         number = np.zeros(theta_2.shape, dtype=np.int8)
-    elif len(found[0].branches) == 1:
-        number = np.where(np.broadcast_to(branch, theta_2.shape) == found[0].branches[0], 0, 1)
+    elif len(every[0].branches) == 1:
+        number = np.where(np.broadcast_to(branch, theta_2.shape) == every[0].branches[0], 0, 1)
     else:  # the two ranges are mirror images in the ground's line
         number = np.where((theta_2 - linkage.ground_angle) % TURN < 0.5 * TURN, 0, 1)
     half = prepare_path(loop(*linkage.lengths), linkage.ground_angle).half_angle(theta_2)
@@ -345,12 +349,12 @@ def classify(linkage: FourBar) -> LinkageType:
     unit = choose_unit(linkage)
     lengths = dict(zip(BAR_NAMES, (length / unit for length in linkage.lengths), strict=True))
     shortest, longest = min(lengths, key=lengths.__getitem__), max(lengths, key=lengths.__getitem__)
-    whole = math.fsum(lengths.values())
+    perimeter = math.fsum(lengths.values())
 
-    def balance(bar: int, other: int) -> float:
+    def balance(bar: int, partner: int) -> float:
         """Compute the two bars minus the other two; 0 within the rounding of the lengths."""
-        total = math.fsum(length if k in (bar, other) else -length for k, length in lengths.items())
-        return 0.0 if abs(total) <= TOUCHING * whole else total
+        total = math.fsum(length if k in (bar, partner) else -length for k, length in lengths.items())
+        return 0.0 if abs(total) <= TOUCHING * perimeter else total
 
     # all bars equal: every bar is both, and any other one is its partner
     surplus = -balance(shortest, longest if longest != shortest else 4) * unit
@@ -359,7 +363,7 @@ def classify(linkage: FourBar) -> LinkageType:
     def found(barker: int | None, code: str, name: str) -> LinkageType:
         return LinkageType(surplus, barker, code, name, shortest, longest, turning)
 
-    if math.fsum((*lengths.values(), -2.0 * lengths[longest])) <= TOUCHING * whole:
+    if math.fsum((*lengths.values(), -2.0 * lengths[longest])) <= TOUCHING * perimeter:
         return found(None, "structure", f"structure (the {BAR_NAMES[longest]} is as long as the other three)")
     if surplus > 0.0:
         return found(shortest, *GRASHOF[shortest])

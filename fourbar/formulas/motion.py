@@ -209,8 +209,8 @@ class State(NamedTuple):
 
     def point_coefficient(self, bar: int, z: Number) -> Number:
         """Compute the derivative of the position of a bar's point z by the independent angle, m/rad."""
-        own = (1j * self.coefficient(bar)) * (z * self.direction(bar))
-        return own + (1j * self.k.h2) * self.foot(3) if bar == 3 else own
+        turned = (1j * self.coefficient(bar)) * (z * self.direction(bar))
+        return turned + (1j * self.k.h2) * self.foot(3) if bar == 3 else turned
 
     def velocity(self, bar: int, z: Number) -> Number:
         """Compute the velocity of a bar's point z, m/s."""

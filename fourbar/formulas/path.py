@@ -109,8 +109,8 @@ class Path(NamedTuple):
         at = take_sines_of_rates(self.lengths, at, k)
         if self.may_stay_parallel:
             first, second = find_parallel_pairs(self.lengths, at.half, branch)
-            known = ~namespace(at.root).isnan(at.root)
-            k = parallel_motion(k, first & known, second & known)
+            regular = ~namespace(at.root).isnan(at.root)
+            k = parallel_motion(k, first & regular, second & regular)
         return (at, k) if self.bar == 2 else (self.in_order(at), read_from(self.bar, k))
 
     def in_order(self, at: Position) -> Position:
@@ -124,8 +124,8 @@ class Path(NamedTuple):
             u1, u2, u3, u4, a = -at.u1, at.u4, -at.u3, at.u2, c
         diagonal = (d * self.unit) * u1 - (a * self.unit) * u2
         # a root that is withheld, for speeds that are 0/0, is that of the sine
-        known = at._replace(root=at.sin_mu * (2.0 * self.lengths.b * self.lengths.c))
-        return Position(u1, u2, u3, u4, self.drive_sine(known, 2), diagonal, at.e2, at.root, at.half)
+        closed = at._replace(root=at.sin_mu * (2.0 * self.lengths.b * self.lengths.c))
+        return Position(u1, u2, u3, u4, self.drive_sine(closed, 2), diagonal, at.e2, at.root, at.half)
 
     def drive_sine(self, at: Position, drive_bar: int) -> Number:
         """Sine between the two bars that are not driven; positions as `motion` returns them, or without a triangle."""
@@ -134,21 +134,21 @@ class Path(NamedTuple):
         role = ROLES[self.bar][drive_bar - 2]
         if role == 2:
             return at.sin_mu if self.bar == 2 else at.root * (0.5 / (self.lengths.b * self.lengths.c))
-        found = drive_sine_of_triangle(self.lengths, at, role)
+        sine = drive_sine_of_triangle(self.lengths, at, role)
         if self.may_stay_parallel:  # with the sine of the angle that all of them make
             first, second = find_parallel_pairs(self.lengths, at.half, sign(at.root))
             with_first, with_second = (0.0, 2.0 * at.half.sk) if role == 3 else (-2.0 * at.half.sk, 0.0)
-            found = select(first, with_first, select(second, with_second, found))
-        return -found if self.bar + drive_bar == 7 else found  # there the two bars have changed places
+            sine = select(first, with_first, select(second, with_second, sine))
+        return -sine if self.bar + drive_bar == 7 else sine  # there the two bars have changed places
 
 
 def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:
     """Prepare the path in the angle of bar 2, 3 or 4."""
     d, a, b, c, _, _ = lengths
     unit = power_of_two(0.25 * (d + a + b + c))
-    own, u1 = loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit))), polar(1.0, theta_1)
-    meets = is_any(is_zero(own.E1) & is_zero(own.E2))
-    return Path(bar, own, theta_1, -u1 if bar == 4 else u1, unit, meets)
+    reordered, u1 = loop(*reorder_lengths(bar, (d / unit, a / unit, b / unit, c / unit))), polar(1.0, theta_1)
+    meets = is_any(is_zero(reordered.E1) & is_zero(reordered.E2))
+    return Path(bar, reordered, theta_1, -u1 if bar == 4 else u1, unit, meets)
 
 
 def meet_change_points(lengths: Loop) -> Loop:

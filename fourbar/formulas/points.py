@@ -113,12 +113,12 @@ def coupler_curve(
     steps : number of intervals, a multiple of 4 (InputError otherwise): limits and change points,
         at which directions are undetermined or lose digits, then fall between positions.
     """
-    found = circuits(linkage)
+    every = circuits(linkage)
     point = complex(require("r_along", r_along), require("r_across", r_across))
-    circuit = require_whole("circuit", circuit, range(len(found)), f"must be from 0 to {len(found) - 1}")
+    circuit = require_whole("circuit", circuit, range(len(every)), f"must be from 0 to {len(every) - 1}")
     branch = require_whole("branch", branch, (1, -1), A_BRANCH)
     steps = require_whole("steps", steps, range(4, MOST_STEPS + 1, 4), f"must be a multiple of 4 up to {MOST_STEPS}")
-    (start, stop), branches = found[circuit]
+    (start, stop), branches = every[circuit]
     branch = branch if branch in branches else branches[0]
     half = np.arange(0.5, steps, dtype=np.float64)
     turns = 0
@@ -129,8 +129,8 @@ def coupler_curve(
         signs = follow_smooth_path(linkage, theta_2, branch)
     else:
         out = 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(half[: steps // 2] * (TURN / steps))
-        there = follow_smooth_path(linkage, out, branch)
-        theta_2, signs = np.concatenate((out, out[::-1])), np.concatenate((there, -there[::-1]))
+        ahead = follow_smooth_path(linkage, out, branch)
+        theta_2, signs = np.concatenate((out, out[::-1])), np.concatenate((ahead, -ahead[::-1]))
     curve = compute_state(linkage, theta_2, signs).point(3, point)
     x, y = curve.real, curve.imag
     theta_2 = np.append(theta_2, theta_2[0] + turns * TURN)

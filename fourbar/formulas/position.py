@@ -30,7 +30,7 @@ from fourbar.formulas.arithmetic import (
     vector,
 )
 
-HAIR = 1e-100
+TINY_TANGENT = 1e-100
 """Added to the size of tan h: with A on O4 bars 3, 4 get the directions to which they tend from theta_2 > theta_1."""
 
 
@@ -111,12 +111,12 @@ def half_angle(lengths: Loop, psi: Number, *, opposite: bool = False) -> HalfAng
         xp = namespace(psi)
         s, k = xp.sin(0.5 * psi), xp.cos(0.5 * psi)
         if xp is not np:
-            s = select(E == 0.0, s + hair(s), s)
+            s = select(E == 0.0, s + tiny_tangent(s), s)
         ss, kk, sk = s * s, k * k, s * k
     else:
         t, meets = tangent(0.5 * psi), E == 0.0
         if is_any(meets):
-            t = select(meets, t + hair(t), t)
+            t = select(meets, t + tiny_tangent(t), t)
         kk = 1.0 / (1.0 + t * t)
         sk = t * kk
         ss = t * sk
@@ -136,10 +136,10 @@ def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAn
     return HalfAngle(ss, kk, sk, outer, inner)
 
 
-def hair(t: Number) -> Number:
-    """HAIR with the sign of a tangent."""
+def tiny_tangent(t: Number) -> Number:
+    """TINY_TANGENT with the sign of a tangent."""
     xp = namespace(t)
-    return np.copysign(HAIR, t) if xp is np else xp.copysign(0.0 * t + HAIR, t)
+    return np.copysign(TINY_TANGENT, t) if xp is np else xp.copysign(0.0 * t + TINY_TANGENT, t)
 
 
 def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: Number, unit: Number = 1.0) -> Position:

@@ -56,10 +56,10 @@ def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
     return TransmissionExtremes(least, greatest, at_least, at_greatest)
 
 
-def _angle_at_B(reach: Reach, d: int, own: int) -> float:
+def _angle_at_B(reach: Reach, d: int, a: int) -> float:
     """Compute the angle between the sides b, c of the triangle b, c, e with e = d (ground) + own (input), signed."""
-    opposite = max(reach.sum(d, own, 1, -1), 0.0) ** 0.5 * max(reach.sum(d, own, -1, 1), 0.0) ** 0.5
-    return 2.0 * math.atan2(opposite, max(reach.sum(-d, -own, 1, 1), 0.0) ** 0.5 * reach.sum(d, own, 1, 1) ** 0.5)
+    opposite = max(reach.sum(d, a, 1, -1), 0.0) ** 0.5 * max(reach.sum(d, a, -1, 1), 0.0) ** 0.5
+    return 2.0 * math.atan2(opposite, max(reach.sum(-d, -a, 1, 1), 0.0) ** 0.5 * reach.sum(d, a, 1, 1) ** 0.5)
 
 
 def speed_ratio(state: State) -> Array:

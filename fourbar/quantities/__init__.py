@@ -90,7 +90,7 @@ class Quantities:
     time: Array | None = _scalar("s", None, "of a motion law or a free motion, which ends at a limit position")
 
 
-QUANTITIES = tuple(Quantity(each.name, *each.metadata["line"]) for each in fields(Quantities))
+QUANTITIES = tuple(Quantity(declared.name, *declared.metadata["line"]) for declared in fields(Quantities))
 UNITS = {q.name: q.unit for q in QUANTITIES}
 STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None}
 """Every evaluated quantity and the stage that computes it."""
@@ -117,11 +117,11 @@ COUPLE = DriveNames("torque", "torque_error", "torque_low", "torque_high")
 """Names for a drive that turns a bar."""
 LINE = DriveNames("drive_force", "drive_force_error", "drive_force_low", "drive_force_high")
 """Names for a drive that pushes along a line."""
-OF_LINE = (*dict.fromkeys((*(q.name for q in QUANTITIES if q.group == "linear drive"), *LINE)),)
+LINE_QUANTITIES = (*dict.fromkeys((*(q.name for q in QUANTITIES if q.group == "linear drive"), *LINE)),)
 """Every quantity that exists only where the drive is linear."""
 FORCES = (*PIN_FORCES, COUPLE.value, LINE.value, "power")
-OF_DRY_FRICTION = tuple(q.name for q in QUANTITIES if q.group == "dry friction")
-OF_PIN_LOADS = tuple(q.name for q in QUANTITIES if q.group == "pin loads")
+DRY_FRICTION_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "dry friction")
+PIN_LOAD_QUANTITIES = tuple(q.name for q in QUANTITIES if q.group == "pin loads")
 STATUS_NAMES = (
     *("ok", "not_assembled", "singular", "jammed", "several", "no_direction", "wound"),
     *("no_torque", "overflow", "invalid", "no_lever"),

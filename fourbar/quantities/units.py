@@ -54,12 +54,14 @@ def to_si(text: str, unit: str) -> float:
     text = text.strip()
     feet = FEET.match(text)
     text = text[feet.end() :] if feet else text
-    found = FRACTION.match(text) or NUMBER.match(text)
-    if found is None:
+    number_text = FRACTION.match(text) or NUMBER.match(text)
+    if number_text is None:
         raise UnitError("there is no finite number")
-    name = RAISED.sub(lambda power: f"^{power[0].translate(DIGITS)}", text[found.end() :].translate(SIGNS)).strip()
+    name = RAISED.sub(
+        lambda power: f"^{power[0].translate(DIGITS)}", text[number_text.end() :].translate(SIGNS)
+    ).strip()
     if name.startswith(","):
-        hint = f'; did you mean "{found[0]}.{name[1:]}"?' if not re.match(r",[0-9]{3}(?![0-9])", name) else ""
+        hint = f'; did you mean "{number_text[0]}.{name[1:]}"?' if not re.match(r",[0-9]{3}(?![0-9])", name) else ""
         raise UnitError(f"a comma is no part of a number{hint}")
     if not name:
         raise UnitError("the unit is missing")
@@ -67,11 +69,15 @@ def to_si(text: str, unit: str) -> float:
     try:
         factor, dimension = _find_factor(name)
     except UnitError as error:
-        raise UnitError(f"{error}{_suggest(found[0], name, unit)}") from None
+        raise UnitError(f"{error}{_suggest(number_text[0], name, unit)}") from None
     if dimension != wanted_dimension:
-        raise UnitError(f'"{name}" does not convert to {unit}{_suggest(found[0], name, unit)}')
+        raise UnitError(f'"{name}" does not convert to {unit}{_suggest(number_text[0], name, unit)}')
     try:
-        number = Fraction(found[0]) if found.re is NUMBER else int(found[1] or 0) + Fraction(f"{found[2]}/{found[3]}")
+        number = (
+            Fraction(number_text[0])
+            if number_text.re is NUMBER
+            else int(number_text[1] or 0) + Fraction(f"{number_text[2]}/{number_text[3]}")
+        )
         number += 12 * int(feet[1]) if feet else 0
         value = float(number * factor / wanted)
     except OverflowError:
@@ -79,14 +85,14 @@ def to_si(text: str, unit: str) -> float:
     if not math.isfinite(value):
         raise UnitError("the number is too large")
     # Fraction has no -0.0
-    return -0.0 if value == 0.0 and found[0].startswith("-") else value
+    return -0.0 if value == 0.0 and number_text[0].startswith("-") else value
 
 
 def find_unit(text: object, otherwise: str) -> str:
     """Return the unit that a text has; another one where it has none."""
     last = FEET.sub("", str(text).strip())  # the inches of 1'6"
-    found = FRACTION.match(last) or NUMBER.match(last)
-    unit = last[found.end() :].strip() if found else ""
+    number_text = FRACTION.match(last) or NUMBER.match(last)
+    unit = last[number_text.end() :].strip() if number_text else ""
     unit = re.sub('[″”"]', "in", re.sub("[′’']", "ft", unit))
     return unit or otherwise
 
@@ -106,11 +112,11 @@ def _suggest(number: str, name: str, unit: str) -> str:
     """Suggest what may have been meant by a unit that is unknown or of another dimension than `unit`."""
     if len(name) > LONGEST_UNIT:
         return ""
-    known = {word.casefold(): word for line in DEFINITIONS.split("\n") for word in re.split(r" = |-? = ", line) if word}
+    names = {word.casefold(): word for line in DEFINITIONS.split("\n") for word in re.split(r" = |-? = ", line) if word}
 
     def nearest(word: str) -> str:
-        close = difflib.get_close_matches(word.casefold(), known, 1, 0.7)
-        return known[close[0]] if close else word
+        close = difflib.get_close_matches(word.casefold(), names, 1, 0.7)
+        return names[close[0]] if close else word
 
     words = re.compile(r"[A-Za-zµμ°_]+")
     swapped = [{word: swap.get(word.removesuffix("s"), word) for word in words.findall(name)} for swap in SWAPS]

@@ -342,8 +342,8 @@ def _require_command(names: tuple[str, str, str], angle: Any, speed: Any, accele
     return angle, speed, require(f"motion.{alpha}", acceleration, growth)
 
 
-def require_steps(motion: Motion, most: int, where: str, file: str) -> None:
+def require_steps(motion: Motion, most: int, place: str, file: str) -> None:
     """Raise InputError for as many steps or more: of a sweep, a law or a release each is a position in the memory."""
     for name, stated in ((motion.commanded, motion.angle), ("law", motion.law), ("free", motion.free)):
         if isinstance(stated, (Sweep, Law, Free)) and stated.steps >= most:
-            raise InputError(f"motion.{name}.steps", stated.steps, f"must be below {most} {where}", file)
+            raise InputError(f"motion.{name}.steps", stated.steps, f"must be below {most} {place}", file)

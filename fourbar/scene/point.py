@@ -8,7 +8,7 @@ from fourbar.linkage import BAR_NAMES, Declared, check_numbers, require_whole
 from fourbar.quantities import UNITS
 
 LONGEST_NAME = 40
-OF_POINTS = {"": "position", "v_": "velocity", "a_": "acceleration"}
+POINT_STAGES = {"": "position", "v_": "velocity", "a_": "acceleration"}
 """Quantities evaluated for a point: the prefix of the name and the stage."""
 
 

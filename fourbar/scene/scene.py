@@ -73,8 +73,8 @@ class Scene:
         for name, each_kind in many.items():
             expect(name, getattr(self, name), tuple, list)
             object.__setattr__(self, name, tuple(getattr(self, name)))
-            for each in getattr(self, name):
-                expect(name, each, each_kind)
+            for entry in getattr(self, name):
+                expect(name, entry, each_kind)
         for picture in self.pictures:
             if not hasattr(picture, "data_uri"):
                 raise InputError("pictures", picture, "must be a Picture, as fourbar.load makes it of a file")
@@ -112,8 +112,8 @@ class Scene:
         DependencyError : matplotlib is missing.
         """
         figures = import_module("fourbar.show.plot.figures")  # a layer above, loaded when something is drawn
-        given = {} if units is None else {"units": units}
-        return figures.draw_figure(self, figure, position=position, branches=branches, dimensions=dimensions, **given)
+        options = {} if units is None else {"units": units}
+        return figures.draw_figure(self, figure, position=position, branches=branches, dimensions=dimensions, **options)
 
     def _repr_html_(self) -> Any:
         return import_module("fourbar.show.notebook").show_scene(self)
@@ -189,16 +189,16 @@ class Command(NamedTuple):
     @property
     def places(self) -> Array:
         """Commanded angles or strokes at each position; the times if a law commands them."""
-        own = self.angle if self.stroke is None else self.stroke
-        return own if self.time is None else self.time
+        places = self.angle if self.stroke is None else self.stroke
+        return places if self.time is None else self.time
 
-    def part(self, where: Any) -> "Command":
+    def part(self, index: Any) -> "Command":
         """Take some of the positions."""
-        rows: Any = (value[where] if isinstance(value, np.ndarray) and value.ndim else value for value in self)
+        rows: Any = (value[index] if isinstance(value, np.ndarray) and value.ndim else value for value in self)
         part = Command(*rows)
         if self.independent is None:
             return part
-        return part._replace(independent=Independent(*(value[where] for value in self.independent)))
+        return part._replace(independent=Independent(*(value[index] for value in self.independent)))
 
     @property
     def theta_2(self) -> Array:
@@ -276,16 +276,18 @@ def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = No
         from fourbar.scene.stroke import find_triangle
 
         find_triangle(scene.linkage, scene.drive).require(places)
-        at = command_stroke(scene, places, motion.speed, motion.acceleration)
+        commanded = command_stroke(scene, places, motion.speed, motion.acceleration)
     else:
-        at = Command(places, np.full(places.shape, motion.branch, dtype=np.int8), motion.speed, motion.acceleration)
+        commanded = Command(
+            places, np.full(places.shape, motion.branch, dtype=np.int8), motion.speed, motion.acceleration
+        )
         if motion.law is not None:
             angle, speed, acceleration = motion.law.at(places)
-            at = at._replace(angle=angle, speed=speed, acceleration=acceleration, time=places)
-        at = at._replace(bar=bar)
+            commanded = commanded._replace(angle=angle, speed=speed, acceleration=acceleration, time=places)
+        commanded = commanded._replace(bar=bar)
     if branch is None and motion.through == "follow":
-        branch = follow_smooth_path(scene.linkage, at.angle, motion.branch, bar)
-    return at if branch is None else at._replace(branch=branch)
+        branch = follow_smooth_path(scene.linkage, commanded.angle, motion.branch, bar)
+    return commanded if branch is None else commanded._replace(branch=branch)
 
 
 def command(scene: Scene) -> Command:
@@ -312,5 +314,5 @@ def command(scene: Scene) -> Command:
         remainder = limit_remainder(linkage, limit, float(places[0]), stated.offset, bar)
     else:
         places = np.array(stated, dtype=float, ndmin=1)
-    found = command_at(scene, places)
-    return found if remainder is None else found._replace(remainder=remainder)
+    commanded = command_at(scene, places)
+    return commanded if remainder is None else commanded._replace(remainder=remainder)

@@ -78,14 +78,14 @@ def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
     if drive is None or {drive.start.bar, drive.end.bar} not in ({1, 2}, {1, 4}):
         drives = "no cylinder" if drive is None else f"one from bar {drive.start.bar} to bar {drive.end.bar}"
         raise InputError("motion.stroke", drives, "is of a cylinder ([drive]) between the ground and bar 2 or 4")
-    own, other = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
-    if own.bar == 2:  # the ground's points are polar about its pin
-        reach, towards = abs(other.distance), other.angle + linkage.ground_angle + _reverse(other)
+    moving, fixed = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
+    if moving.bar == 2:  # the ground's points are polar about its pin
+        reach, towards = abs(fixed.distance), fixed.angle + linkage.ground_angle + _reverse(fixed)
     else:
-        end = polar(other.distance, other.angle + linkage.ground_angle)
+        end = polar(fixed.distance, fixed.angle + linkage.ground_angle)
         across = end - polar(linkage.ground, linkage.ground_angle)
         reach, towards = abs(across), angle(across)
-    return Triangle(own.bar, abs(own.distance), reach, towards - own.angle - _reverse(own))
+    return Triangle(moving.bar, abs(moving.distance), reach, towards - moving.angle - _reverse(moving))
 
 
 def find_round_off(

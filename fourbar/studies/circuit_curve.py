@@ -52,8 +52,8 @@ def compute_generalised_force(scene: Scene, terms: tuple[Any, ...], state: State
 class _Sizes(Actions):
     """Sums of the absolute terms of Q, each with the speed of the fastest bar: one that rests has rounding alone."""
 
-    def __init__(self, state: State, of: Any) -> None:
-        super().__init__(state, of)
+    def __init__(self, state: State, bodies: Any) -> None:
+        super().__init__(state, bodies)
         self.size: Any = 0.0
         self.fastest = np.max(np.abs([state.k.h2, state.k.h3, state.k.h4]), axis=0)
 
@@ -73,11 +73,11 @@ class _Sizes(Actions):
 
 def of_input(scene: Scene) -> Command:
     """Command the input where the scene's motion has it, which may be one of another bar or of a stroke."""
-    at = command(scene)
-    if at.commanded == "theta_2":
-        return at
-    found = solve(scene, "position", at=at)
-    return Command(found.theta_2[found.assembled], found.branch[found.assembled], None, 0.0)
+    commanded = command(scene)
+    if commanded.commanded == "theta_2":
+        return commanded
+    solution = solve(scene, "position", at=commanded)
+    return Command(solution.theta_2[solution.assembled], solution.branch[solution.assembled], None, 0.0)
 
 
 class CircuitCurve:
@@ -89,12 +89,12 @@ class CircuitCurve:
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.case = scene, Case.of(scene)
-        at, linkage = of_input(scene), scene.linkage
-        self.case = self.case.with_start(at) if scene.counts_turns else self.case
+        commanded, linkage = of_input(scene), scene.linkage
+        self.case = self.case.with_start(commanded) if scene.counts_turns else self.case
         self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
         self.ratios = self.case.path.lengths
         """The lengths by a unit near them, of which no product leaves the range of doubles."""
-        number = find_circuit(linkage, at.theta_2, at.branch)
+        number = find_circuit(linkage, commanded.theta_2, commanded.branch)
         if (number < 0).all():
             raise NotAssembledError(
                 f"motion.{scene.motion.commanded}: the linkage assembles at none of the positions requested"
@@ -103,11 +103,11 @@ class CircuitCurve:
         self.full = turns_fully(linkage)
         self.low, self.high = (end - self.theta_1 for end in self.circuit.theta_2)
         stated = isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None
-        self.sweep = (float(at.theta_2.min()), float(at.theta_2.max())) if stated else None
+        self.sweep = (float(commanded.theta_2.min()), float(commanded.theta_2.max())) if stated else None
         self.singular = [
             (point - self.theta_1, 0.0 if point == self.theta_1 else math.pi) for point in change_points(linkage)
         ]
-        self.singular = [each for each in self.singular if self.inside(np.array([each[0]]), np.zeros(1))[0]]
+        self.singular = [place for place in self.singular if self.inside(np.array([place[0]]), np.zeros(1))[0]]
 
     def inside(self, psi: Array, radius: Array) -> NDArray[np.bool_]:
         """Mark where psi, within a radius, lies in the sweep, if one is stated."""
@@ -132,7 +132,7 @@ class CircuitCurve:
         psi = self.low + np.remainder(points[:, 0] - self.low, TURN)
         sign = np.where(np.sin(points[:, 1]) >= 0.0, 1, -1)
         if self.full:
-            return psi - self.low, np.array([self.rows.index(each) for each in sign], dtype=np.intp)
+            return psi - self.low, np.array([self.rows.index(branch) for branch in sign], dtype=np.intp)
         part = np.clip((0.5 * (self.low + self.high) - psi) / (0.5 * (self.high - self.low)), -1.0, 1.0)
         tau = np.where(sign > 0, np.arccos(part), TURN - np.arccos(part))
         return tau, np.zeros(len(points), dtype=np.intp)
@@ -180,10 +180,10 @@ class CircuitCurve:
 
     def in_rows(self, tau: Array, branch: Array) -> Array:
         """Points of several rows."""
-        found = np.empty((len(tau), 2))
-        for each in self.rows:
-            found[branch == each] = self.point(tau[branch == each], each)
-        return found
+        points = np.empty((len(tau), 2))
+        for row in self.rows:
+            points[branch == row] = self.point(tau[branch == row], row)
+        return points
 
     def place(self, point: Array) -> RestPosition:
         """Describe a point, theta_2 within the sweep, else counted from the circuit's range."""

@@ -17,7 +17,7 @@ from fourbar.formulas.arithmetic import polar
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.point import OF_POINTS
+from fourbar.scene.point import POINT_STAGES
 from fourbar.scene.scene import turn_bar
 from fourbar.solution import Array, Solution, find_values, split_parts
 from fourbar.solve import solve
@@ -68,23 +68,23 @@ class Sensitivity:
 
         Raises InputError for a quantity or a key that is not known here.
         """
-        whole = self._find_whole(quantity)
+        name = self._find_whole(quantity)
         if not isinstance(key, str) or key not in self.keys:
             raise InputError("sensitivity", key, "is not known here; known: " + ", ".join(self.keys))
-        found: Array = self.by[whole][list(self.keys).index(key)]
-        if quantity == whole:
-            return found
+        slopes: Array = self.by[name][list(self.keys).index(key)]
+        if quantity == name:
+            return slopes
         if quantity.startswith("|"):
-            value = self.value(whole)
+            value = self.value(name)
             with np.errstate(all="ignore"):
-                return np.asarray((found * value).sum(axis=-1) / np.hypot(*value.T))
-        return found[:, "xy".index(quantity[-1])]
+                return np.asarray((slopes * value).sum(axis=-1) / np.hypot(*value.T))
+        return slopes[:, "xy".index(quantity[-1])]
 
     def value(self, quantity: str) -> Array:
         """Return the quantity itself, or a component or magnitude of it; InputError as `of`."""
-        whole = self._find_whole(quantity)
-        found: Array = find_values(self.solution, whole)
-        return found if quantity == whole else split_parts(whole, found)[quantity]
+        name = self._find_whole(quantity)
+        values: Array = find_values(self.solution, name)
+        return values if quantity == name else split_parts(name, values)[quantity]
 
     def to_pandas(self) -> "DataFrame":
         """One row for each number and position: its key, theta_2, status, and d(quantity)/d(key), SI and rad.
@@ -167,13 +167,13 @@ def sensitivity(scene: Scene) -> Sensitivity:
     theta = command_key(scene)
     if isinstance(scene.motion.angle, FromLimit):
         raise InputError(theta, scene.motion.angle, "has no sensitivities: the limit moves with the lengths")
-    at, solution, known = command(scene), solve(scene), list_entries(scene)
-    moving = at.speed is not None
+    commanded, solution, entries = command(scene), solve(scene), list_entries(scene)
+    moving = commanded.speed is not None
     if not moving:  # positions depend on these alone
         of_positions = ("lengths", "points", "drive")
-        known = {key: own for key, own in known.items() if key.startswith(of_positions) or ".centre." in key}
-    keys = {theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)} | known
-    most = np.nan if at.stroke is None else float(at.stroke.max())
+        entries = {key: n for key, n in entries.items() if key.startswith(of_positions) or ".centre." in key}
+    keys = {theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)} | entries
+    most = np.nan if commanded.stroke is None else float(commanded.stroke.max())
     numbers = [most if key == theta else read_place(scene, entry.place) for key, entry in keys.items()]
     forces = FORCES if any(effect.loaded_pins for effect in scene.effects) else (*FORCES, "drive_condition")
     names = [
@@ -181,27 +181,27 @@ def sensitivity(scene: Scene) -> Sensitivity:
         for name in solution.evaluated()
         if STAGE_OF.get(name, "force") in STAGES[:3]
         or (moving and name in forces)
-        or (name == "theta_2" and at.commanded != name)
+        or (name == "theta_2" and scene.motion.commanded != name)
     ]
-    names += [f"{start}{p.name}" for p in scene.points for start in (OF_POINTS if moving else ("",))]
+    names += [f"{start}{p.name}" for p in scene.points for start in (POINT_STAGES if moving else ("",))]
     p = len(keys)
     by = {name: np.full((p, *find_values(solution, name).shape), np.nan) for name in names}
     status = np.array(STATUS_NAMES, dtype="<U16")[solution.status_code]
     with np.errstate(all="ignore"):
-        _, decided = Case.of(scene, at.bar).half_angle(at.angle, None)
+        _, decided = Case.of(scene, commanded.bar).half_angle(commanded.angle, None)
         status[decided] = STATUS_NAMES[SINGULAR]  # on a limit: so near that doubles cannot tell the factors from zero
         regular = np.flatnonzero(~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)]))
         seeded = _seed(scene, keys)
         for start in range(0, len(regular), AT_ONCE):
             index = regular[start : start + AT_ONCE]
-            found, held = _compute_derivatives(seeded, keys, at, index, by.keys(), moving)
+            derived, held = _compute_derivatives(seeded, keys, commanded, index, by.keys(), moving)
             status[index[held & (solution.status_code[index] == OK)]] = AT_REST
-            for name, number in found.items():
-                own = np.broadcast_to(take_slopes(number), (p, len(index)))
+            for name, number in derived.items():
+                slopes = np.broadcast_to(take_slopes(number), (p, len(index)))
                 if by[name].ndim == 3:
-                    by[name][:, index, 0], by[name][:, index, 1] = own.real, own.imag
+                    by[name][:, index, 0], by[name][:, index, 1] = slopes.real, slopes.imag
                 else:
-                    by[name][:, index] = own.real
+                    by[name][:, index] = slopes.real
     for name in set(forces) & set(names):
         by[name][:, status != STATUS_NAMES[OK]] = np.nan
     return Sensitivity(scene, solution, keys, np.array(numbers, dtype=float), status.tolist(), by)
@@ -223,7 +223,8 @@ def make_differentiable(scene: Scene) -> Scene:
     return replace(
         scene,
         effects=tuple(
-            _Directed(own.magnitude, own.angle) if isinstance(own, Gravity) else own for own in scene.effects
+            _Directed(effect.magnitude, effect.angle) if isinstance(effect, Gravity) else effect
+            for effect in scene.effects
         ),
     )
 
@@ -245,37 +246,44 @@ def make_unit_slope(index: int, count: int) -> Sloped:
 
 
 def _compute_derivatives(
-    scene: Scene, keys: dict[str, SceneNumber], at: Command, index: NDArray[np.intp], names: KeysView[str], moving: bool
+    scene: Scene,
+    keys: dict[str, SceneNumber],
+    stated: Command,
+    index: NDArray[np.intp],
+    names: KeysView[str],
+    moving: bool,
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
     """Compute the quantities at some positions, with their slopes; and where dry friction holds a pin at rest."""
     place = {key: number for number, key in enumerate(keys)}
 
     def seeded(key: str, number: Any) -> Any:
-        number = np.broadcast_to(np.asarray(0.0 if number is None else number, dtype=float), at.angle.shape)[index]
+        number = np.broadcast_to(np.asarray(0.0 if number is None else number, dtype=float), stated.angle.shape)[index]
         if key in place:
             return number + make_unit_slope(place[key], len(keys))
         return Sloped(number, np.zeros((len(keys), 1)))
 
     rates = (
-        (at.speed, at.acceleration) if scene.motion.law is not None else (scene.motion.speed, scene.motion.acceleration)
+        (stated.speed, stated.acceleration)
+        if scene.motion.law is not None
+        else (scene.motion.speed, scene.motion.acceleration)
     )
-    numbers = (at.angle if at.stroke is None else at.stroke, *rates)
+    numbers = (stated.angle if stated.stroke is None else stated.stroke, *rates)
     commanded = {
         name: seeded(f"motion.{name}", number) for name, number in zip(scene.motion.names, numbers, strict=True)
     }
     q, speed, acceleration, condition = turn_bar(scene, *commanded.values())
-    case, branch = Case.of(scene, at.bar), at.branch[index].astype(float)
+    case, branch = Case.of(scene, stated.bar), stated.branch[index].astype(float)
     state = case.assemble(q, case.path.half_angle(q), branch, speed, acceleration, moving=moving)
-    found = {**list_kinematics(case, state, names), **commanded}
+    quantities = {**list_kinematics(case, state, names), **commanded}
     if condition is not None:
-        found["condition"] = found["condition"] * condition
+        quantities["condition"] = quantities["condition"] * condition
     held = np.zeros(len(index), dtype=bool)
     if moving:
         actions = Actions(state, case.bodies)
         for pin in {pin for term in case.terms for pin in term.dry_pins}:
             held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (take_values(speed) == 0.0)
         dynamics = case.dynamics(state, acceleration)
-        found |= {**dynamics.pins._asdict(), case.names.value: dynamics.drive}
-        found["power"] = dynamics.work * speed
-        found["drive_condition"] = case.drive_condition(state)
-    return {name: found[name] for name in names}, held
+        quantities |= {**dynamics.pins._asdict(), case.names.value: dynamics.drive}
+        quantities["power"] = dynamics.work * speed
+        quantities["drive_condition"] = case.drive_condition(state)
+    return {name: quantities[name] for name in names}, held

@@ -89,10 +89,10 @@ class Extremes(NamedTuple):
         """
         if self.nominal is None:
             return None
-        own, before = ((x.greatest if sign > 0 else x.least)[name] for x in (self, self.nominal))
-        proven, found = (own.high, own.low) if sign > 0 else (own.low, own.high)
+        extreme, before = ((x.greatest if sign > 0 else x.least)[name] for x in (self, self.nominal))
+        proven, reached = (extreme.high, extreme.low) if sign > 0 else (extreme.low, extreme.high)
         middle = 0.5 * (before.low + before.high)
-        return (proven - middle) / (found - middle) if sign * (found - middle) > PROVEN * abs(middle) else None
+        return (proven - middle) / (reached - middle) if sign * (reached - middle) > PROVEN * abs(middle) else None
 
 
 def extremes(scene: Scene, quantities: Sequence[str] = ()) -> Extremes:
@@ -123,11 +123,11 @@ def extremes(scene: Scene, quantities: Sequence[str] = ()) -> Extremes:
     expect("quantities", quantities, list, tuple)
     for name in quantities:
         expect("quantities", name, str)
-    known = [name for name in NAMES if name not in DRIVES or name == DRIVES[scene.drive is not None]]
-    names = [name for name in known if not quantities or name in quantities or name.strip("|") in quantities]
+    possible = [name for name in NAMES if name not in DRIVES or name == DRIVES[scene.drive is not None]]
+    names = [name for name in possible if not quantities or name in quantities or name.strip("|") in quantities]
     for name in quantities:
-        if name not in known and f"|{name}|" not in known:
-            raise InputError("quantity", name, "must be one of " + ", ".join(known).replace("|", ""))
+        if name not in possible and f"|{name}|" not in possible:
+            raise InputError("quantity", name, "must be one of " + ", ".join(possible).replace("|", ""))
     require_provable(scene)
     before, flint.ctx.prec = flint.ctx.prec, BITS
     try:
@@ -147,12 +147,12 @@ class _Search:
         from flint import arb
 
         self.arb, self.scene, self.boxes = arb, scene, 0
-        known = list_entries(scene)
+        entries = list_entries(scene)
         self.reach = {tolerance.key: tolerance.reach for tolerance in scene.tolerances}
         for key in self.reach:
-            if key not in known or is_left_out(scene, known[key]):
+            if key not in entries or is_left_out(scene, entries[key]):
                 raise InputError(f"tolerances.{key}", self.reach[key], "is no number that the scene states")
-        self.keys = [key for key in known if key in self.reach]
+        self.keys = [key for key in entries if key in self.reach]
         self.parts, self.distance = _find_interval(scene)
         self.branch = float(command(scene).branch[0])
         _require_assembly(scene, self.parts)
@@ -162,14 +162,14 @@ class _Search:
 
     def number(self, key: str, value: float, moved: Any) -> Sloped:
         """Return a number of the scene at all boxes: as a ball over its tolerance, or moved by a part of that."""
-        slopes, own = np.zeros((1 + len(self.keys), 1), dtype=object), self.arb(value)
+        slopes, ball = np.zeros((1 + len(self.keys), 1), dtype=object), self.arb(value)
         if key not in self.reach:
-            return Sloped(np.array([own], dtype=object), slopes)
+            return Sloped(np.array([ball], dtype=object), slopes)
         row = 1 + self.keys.index(key)
         slopes[row] = 1
         if moved is None:
             return Sloped(np.array([self.arb(value, self.reach[key])], dtype=object), slopes)
-        return Sloped(np.array([own + float(part) * self.reach[key] for part in moved[row - 1]], dtype=object), slopes)
+        return Sloped(np.array([ball + float(part) * self.reach[key] for part in moved[row - 1]], dtype=object), slopes)
 
     def evaluate(self, theta_2: Balls, moved: Any) -> dict[str, Sloped]:
         """Compute the quantities, the pin forces and the sine of the transmission angle squared, with their slopes.
@@ -194,11 +194,11 @@ class _Search:
         case = Case(link, lengths, list_bodies(link, terms), terms, scene.drive_bar, path, drive=scene.drive)
         acceleration = numbers["motion.alpha_2"]
         state = case.assemble(q, path.half_angle(q), self.branch, numbers["motion.omega_2"], acceleration)
-        found = case.dynamics(state, acceleration)
-        forces = {f"|{name}|": dot(force, force) for name, force in found.pins._asdict().items()}
+        dynamics = case.dynamics(state, acceleration)
+        forces = {f"|{name}|": dot(force, force) for name, force in dynamics.pins._asdict().items()}
         at = state.at
         cosine = dot(at.u3, at.u4)
-        return {case.names.value: found.drive, **forces, "sine": at.sin_mu * at.sin_mu, "cosine": cosine * cosine}
+        return {case.names.value: dynamics.drive, **forces, "sine": at.sin_mu * at.sin_mu, "cosine": cosine * cosine}
 
     def over(self, boxes: NDArray[np.float64]) -> tuple[dict[str, Sloped], dict[str, Sloped]]:
         """Evaluate the quantities over the boxes and all tolerances, and at the centres without any."""
@@ -207,24 +207,24 @@ class _Search:
         centre, radius = _centre(boxes)
         wide = np.array([self.arb(x, r) for x, r in zip(centre, radius, strict=True)], dtype=object)
         points, off = np.array([self.arb(x) for x in centre], dtype=object), np.zeros((len(self.keys), len(boxes)))
-        found = self.evaluate(wide, None), self.evaluate(points, off)
+        bounds = self.evaluate(wide, None), self.evaluate(points, off)
         if boxes is self.start:
-            self.at_start = found
-        return found
+            self.at_start = bounds
+        return bounds
 
     def extreme(self, name: str, sign: int) -> Extreme:
         """Find the greatest (+1) or least (-1) value, enclosed and rounded outwards."""
-        arb, of = self.arb, "sine" if name == "transmission" else name
-        if of == "sine" and _bound_below(sign, self.over(self.start)[1][of]).max() * sign > 0.5:
-            of, sign = "cosine", -sign  # near a right angle it has the digits
-        low, high, where = self.enclosed(of, sign)
+        arb, quantity = self.arb, "sine" if name == "transmission" else name
+        if quantity == "sine" and _bound_below(sign, self.over(self.start)[1][quantity]).max() * sign > 0.5:
+            quantity, sign = "cosine", -sign  # near a right angle it has the digits
+        low, high, theta_2 = self.enclosed(quantity, sign)
         if name not in DRIVES:
             low, high = (end.max(arb(0)).sqrt() for end in (low, high))
-        if of == "sine":
+        if quantity == "sine":
             low, high = (end.min(arb(1)).asin() for end in (low, high))
-        elif of == "cosine":
+        elif quantity == "cosine":
             low, high = (end.min(arb(1)).acos() for end in (high, low))
-        return Extreme(_below(low), _above(high), where)
+        return Extreme(_below(low), _above(high), theta_2)
 
     def enclosed(self, name: str, sign: int) -> tuple[Any, Any, float]:
         """Enclose the greatest (+1) or least (-1) value of what is evaluated between two numbers, and where it is."""
@@ -234,33 +234,33 @@ class _Search:
         sizes = [abs(value).upper() for value in self.over(boxes)[1][name].values if value.is_finite()]
         unit = max([x for x in sizes if x > 0], default=self.arb(1))
         scale = sign / unit
-        best, where, closed, size = -math.inf, math.nan, -math.inf, 0.0
+        best, theta_2, closed, size = -math.inf, math.nan, -math.inf, 0.0
         while len(boxes):
             centre, radius = _centre(boxes)
-            over, nominal = (found[name] for found in self.over(boxes))
-            found = _bound_below(scale, nominal)
-            size = max([size, *np.abs(found[np.isfinite(found)])])
+            over, nominal = (values[name] for values in self.over(boxes))
+            values = _bound_below(scale, nominal)
+            size = max([size, *np.abs(values[np.isfinite(values)])])
             bounds = [self._bound(scale, over, nominal, i, r) for i, r in enumerate(radius)]
             top, settled = np.array([bound[0] for bound in bounds]), np.array([bound[1] for bound in bounds])
-            if self.keys and (tried := np.flatnonzero(top > max(best, found.max()))).size:
+            if self.keys and (tried := np.flatnonzero(top > max(best, values.max()))).size:
                 slopes = np.broadcast_to(nominal.slopes, (1 + len(self.keys), len(boxes)))[1:, tried]
                 corner = np.array([[sign * math.copysign(1.0, _find_middle(s)) for s in row] for row in slopes])
                 points = np.array([self.arb(x) for x in centre[tried]], dtype=object)
-                found[tried] = np.fmax(found[tried], _bound_below(scale, self.evaluate(points, corner)[name]))
-            if found.max() > best:
-                best, where = float(found.max()), float(centre[int(found.argmax())])
+                values[tried] = np.fmax(values[tried], _bound_below(scale, self.evaluate(points, corner)[name]))
+            if values.max() > best:
+                best, theta_2 = float(values.max()), float(centre[int(values.argmax())])
                 size = max(size, abs(best))
             allowed = PROVEN * (math.sqrt(abs(best) * size) + PROVEN * size if name not in DRIVES else size)
             done = (top <= best + allowed) | ((settled | (radius < finest) | (len(boxes) > MANY)) & np.isfinite(top))
             closed = max([closed, *top[done & (top > best)].tolist()])
             done |= top <= closed
             if ((radius < finest) & ~np.isfinite(top)).any():
-                at = math.degrees(float(centre[~np.isfinite(top)][0]))
+                pole = math.degrees(float(centre[~np.isfinite(top)][0]))
                 why = "it has a pole there, or within the tolerances, or linkages that do not assemble"
-                raise LimitError(f"{name} has no bound at theta_2 = {at:.6g} deg: {why}")
+                raise LimitError(f"{name} has no bound at theta_2 = {pole:.6g} deg: {why}")
             boxes = np.array([half for box in boxes[~done] for half in _halve(np.linspace(box[0], box[1], 3))])
         reached, proven = unit * best, unit * max(closed, best)
-        return (reached, proven, where) if sign > 0 else (-proven, -reached, where)
+        return (reached, proven, theta_2) if sign > 0 else (-proven, -reached, theta_2)
 
     def _bound(self, scale: Any, over: Sloped, nominal: Sloped, index: int, radius: float) -> tuple[float, bool]:
         """Above everything that a box holds, inf where it has no bound; and whether halving it would gain nothing."""
@@ -273,10 +273,10 @@ class _Search:
         return top, by_angle < NEGLIGIBLE * sum(by_tolerance)
 
 
-def _bound_below(scale: Any, of: Sloped) -> NDArray[np.float64]:
+def _bound_below(scale: Any, number: Sloped) -> NDArray[np.float64]:
     """Bound the values, scaled, from below; -inf where no bound is certain."""
-    found = np.array([_below(scale * value) for value in of.values])
-    return np.where(np.isfinite(found), found, -math.inf)
+    bounds = np.array([_below(scale * value) for value in number.values])
+    return np.where(np.isfinite(bounds), bounds, -math.inf)
 
 
 def _below(ball: Any) -> float:
@@ -344,9 +344,9 @@ def _find_interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float
     if scene.drive_bar in (3, 4):  # T3 has poles where bar 3 stands still against the ground, T4 where bar 4 does
         for limit in limit_positions(linkage, scene.drive_bar):
             for turn in range(-2, 3):
-                at = limit.theta_2 + TURN * turn
-                cut = [(low, min(high, at - DISTANCE)) for low, high in parts]
-                cut += [(max(low, at + DISTANCE), high) for low, high in parts]
+                pole = limit.theta_2 + TURN * turn
+                cut = [(low, min(high, pole - DISTANCE)) for low, high in parts]
+                cut += [(max(low, pole + DISTANCE), high) for low, high in parts]
                 kept = [(low, high) for low, high in cut if low < high]
                 if kept != parts:
                     gaps = True
@@ -363,18 +363,18 @@ def _require_assembly(scene: Scene, parts: tuple[tuple[float, float], ...]) -> N
 
     The diagonal from A to O4 is shortest and longest at the ends, and where the input lies along the ground's line.
     """
-    given = [tolerance for tolerance in scene.tolerances if tolerance.key.startswith("lengths.")]
-    if not given:
+    of_lengths = [tolerance for tolerance in scene.tolerances if tolerance.key.startswith("lengths.")]
+    if not of_lengths:
         return
-    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=len(given))))
-    off = np.concatenate([corners, np.random.default_rng(0).uniform(-1.0, 1.0, (TRIED, len(given)))]).T
-    known, first = list_entries(scene), scene.linkage.ground_angle
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=len(of_lengths))))
+    off = np.concatenate([corners, np.random.default_rng(0).uniform(-1.0, 1.0, (TRIED, len(of_lengths)))]).T
+    entries, first = list_entries(scene), scene.linkage.ground_angle
     values: dict[str, Any] = {
-        tolerance.key: read_place(scene, known[tolerance.key].place) + tolerance.reach * part
-        for tolerance, part in zip(given, off, strict=True)
+        tolerance.key: read_place(scene, entries[tolerance.key].place) + tolerance.reach * part
+        for tolerance, part in zip(of_lengths, off, strict=True)
     }
     along = [first + 0.5 * TURN * turn for turn in range(-4, 5)]
-    inside = [at for at in along if any(low <= at <= high for low, high in parts)]
+    inside = [angle for angle in along if any(low <= angle <= high for low, high in parts)]
     values["motion.theta_2"] = np.array([*itertools.chain(*parts), *inside])
     apart = (solve(vary(scene, values), "position").status_code == NOT_ASSEMBLED).any(axis=1)
     if apart.any():

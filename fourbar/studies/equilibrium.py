@@ -118,40 +118,40 @@ def equilibrium(scene: Scene) -> Equilibria:
     expect("scene", scene, Scene)
     with np.errstate(all="ignore"):
         curve = CircuitCurve(scene)
-        level = [each for each in _list_ranges(curve, curve.level, np.empty((0, 2))) if each.samples > A_RANGE]
+        level = [part for part in _list_ranges(curve, curve.level, np.empty((0, 2))) if part.samples > A_RANGE]
         samples = curve.samples()
         idle = curve.level(samples)
-        result = Zeros(np.empty((0, 2)), np.empty((0, 2)), True)
+        zeros = Zeros(np.empty((0, 2)), np.empty((0, 2)), True)
         if not idle.all():
             proof = _prove_zeros(curve, samples[idle])
-            result = proof if proof is not None and proof.complete else _find_sign_changes(curve, samples)
-        points = curve.sorted(np.concatenate([result.found, result.undecided]))
+            zeros = proof if proof is not None and proof.complete else _find_sign_changes(curve, samples)
+        points = curve.sorted(np.concatenate([zeros.found, zeros.undecided]))
         held: list[_CircuitRange] = []
         if any(term.dry_pins for term in curve.case.terms):
             held = _list_ranges(curve, partial(_holds, curve), points)
-        found = []
+        equilibria = []
         for point in points:
-            undecided = any(np.array_equal(point, each) for each in result.undecided)
-            around = next((each.ends for each in held if _is_inside(curve, point, each)), None)
-            found.append(_describe(curve, point, around, undecided=undecided))
+            undecided = any(np.array_equal(point, part) for part in zeros.undecided)
+            around = next((part.ends for part in held if _is_inside(curve, point, part)), None)
+            equilibria.append(_describe(curve, point, around, undecided=undecided))
         singular = tuple(curve.place(np.array(point)) for point in curve.singular)
         positions = _solve_at_rest(scene, curve.circuit)
         psi = positions.theta_2 - curve.theta_1
         sense = _moves(curve, np.stack([psi, positions.branch * transmission(curve.ratios, psi)], axis=1))
         sense[np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))] = 0
-        flat, ends = (tuple(each.ends for each in of) for of in (level, held))
-        return Equilibria(tuple(found), flat, result.complete, singular, ends, positions, sense)
+        flat, ends = (tuple(part.ends for part in ranges) for ranges in (level, held))
+        return Equilibria(tuple(equilibria), flat, zeros.complete, singular, ends, positions, sense)
 
 
 def _solve_at_rest(scene: Scene, circuit: Circuit) -> Solution:
     """Solve the scene's positions at rest; of a single one, or a released linkage, those of the circuit."""
-    at = of_input(scene)
-    if len(at.theta_2) == 1:
+    commanded = of_input(scene)
+    if len(commanded.theta_2) == 1:
         low, high = choose_range(scene.linkage) if turns_fully(scene.linkage) else circuit.theta_2
         margin = 0.0 if turns_fully(scene.linkage) else min(MARGIN, 0.25 * (high - low))
         theta_2 = np.linspace(low + margin, high - margin, DEFAULT_STEPS + 1)
-        at = Command(theta_2, np.full(theta_2.shape, at.branch[0], dtype=np.int8), 0.0, 0.0)
-    return solve(scene, "force", at=Command(at.theta_2, at.branch, 0.0, 0.0, at.remainder))
+        commanded = Command(theta_2, np.full(theta_2.shape, commanded.branch[0], dtype=np.int8), 0.0, 0.0)
+    return solve(scene, "force", at=Command(commanded.theta_2, commanded.branch, 0.0, 0.0, commanded.remainder))
 
 
 def _describe(
@@ -174,22 +174,22 @@ def _find_sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
     points = points[~idle | np.roll(idle, 1) | np.roll(idle, -1)]  # but for a zero that falls on a sample
     tau, row = curve.tau(points)
     Q, size, one, idle = curve.force(points), curve.size(points), np.arange(len(points)), curve.level(points)
-    other = np.concatenate([np.roll(one[row == each], -1) for each in range(len(curve.rows))])
-    gap = np.remainder(tau[other] - tau, TURN)
-    between = np.flatnonzero((Q * Q[other] < 0.0) & (gap < 2.5 * TURN / SAMPLES) & ~idle & ~idle[other])
+    following = np.concatenate([np.roll(one[row == number], -1) for number in range(len(curve.rows))])
+    gap = np.remainder(tau[following] - tau, TURN)
+    between = np.flatnonzero((Q * Q[following] < 0.0) & (gap < 2.5 * TURN / SAMPLES) & ~idle & ~idle[following])
     low, high, start = tau[between], tau[between] + gap[between], Q[between]
     branch = np.array(curve.rows)[row[between]]
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         before = curve.force(curve.in_rows(middle, branch)) * start > 0.0
         low, high = np.where(before, middle, low), np.where(before, high, middle)
-    found = curve.in_rows(high, branch)
-    real = np.abs(curve.force(found)) <= A_JUMP * size[between]
+    zeros = curve.in_rows(high, branch)
+    real = np.abs(curve.force(zeros)) <= A_JUMP * size[between]
     for point in curve.singular:  # where Q vanishes because nothing moves
-        real &= ~(np.abs(np.sin(0.5 * (found - point))) < AT_CHANGE_POINT).all(axis=1)
-    found = found[real]
-    level = np.abs(curve.slope(found)) <= A_JUMP * curve.size(found)
-    return Zeros(found[~level], found[level], False)
+        real &= ~(np.abs(np.sin(0.5 * (zeros - point))) < AT_CHANGE_POINT).all(axis=1)
+    zeros = zeros[real]
+    level = np.abs(curve.slope(zeros)) <= A_JUMP * curve.size(zeros)
+    return Zeros(zeros[~level], zeros[level], False)
 
 
 def _prove_zeros(curve: CircuitCurve, idle: Array) -> Zeros | None:
@@ -272,16 +272,16 @@ def _choose_boxes(curve: CircuitCurve, idle: Array) -> Callable[[Array, Array], 
 
 def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
     """Q with what friction does against a motion that begins to one side; -inf or inf where it jams that motion."""
-    state, result = curve.state(points), np.empty(len(points))
+    state, force = curve.state(points), np.empty(len(points))
     along = np.abs(state.k.h2) >= np.abs(state.k.h4)  # the torque that balances Q, on the bar that turns faster
     for bar, chosen in ((2, along), (4, ~along)):
         if chosen.any():
             part = curve.state(points[chosen])
             case = curve.case._replace(drive_bar=bar, drive=None)
-            found = case.dynamics(part, 0.0, side)
-            Q = -found.drive * part.k[bar - 2]
-            result[chosen] = Q if found.status is None else np.where(found.status == JAMMED, -side * np.inf, Q)
-    return result
+            dynamics = case.dynamics(part, 0.0, side)
+            Q = -dynamics.drive * part.k[bar - 2]
+            force[chosen] = Q if dynamics.status is None else np.where(dynamics.status == JAMMED, -side * np.inf, Q)
+    return force
 
 
 def _holds(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
@@ -298,10 +298,12 @@ def _moves(curve: CircuitCurve, points: Array) -> NDArray[np.int8]:
     return np.asarray(sense * np.sign(state.k.h2), dtype=np.int8)
 
 
-def _list_ranges(curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]], known: Array) -> list[_CircuitRange]:
+def _list_ranges(
+    curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]], points_held: Array
+) -> list[_CircuitRange]:
     """List the ranges within the sweep in which something holds, row by row; it holds at the points known."""
-    result = []
-    own_tau, own_row = curve.tau(known)
+    ranges = []
+    own_tau, own_row = curve.tau(points_held)
     for row, branch in enumerate(curve.rows):
 
         def there(tau: Array, branch: int = branch) -> NDArray[np.bool_]:
@@ -313,7 +315,7 @@ def _list_ranges(curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]
         tau, inside = tau[order], (there(tau) | (np.arange(len(tau)) >= SAMPLES))[order]
         if inside.all():
             first, last = curve.point(np.array([0.0, math.nextafter(TURN, 0.0)]), branch)
-            result.append(_CircuitRange((curve.place(first), curve.place(last)), row, 0.0, TURN, SAMPLES))
+            ranges.append(_CircuitRange((curve.place(first), curve.place(last)), row, 0.0, TURN, SAMPLES))
             continue
         starts, stops = (np.flatnonzero(inside & ~np.roll(inside, by)) for by in (1, -1))
         if len(starts) and stops[0] < starts[0]:
@@ -322,19 +324,19 @@ def _list_ranges(curve: CircuitCurve, holds: Callable[[Array], NDArray[np.bool_]
         begin = _find_edge(there, tau[starts], np.remainder(tau[starts] - tau[starts - 1], TURN), -1.0)
         end = _find_edge(there, tau[stops], np.remainder(following - tau[stops], TURN), 1.0)
         for low, high, count in zip(begin, end, (stops - starts) % len(tau) + 1, strict=True):
-            one, other = (curve.place(point) for point in curve.point(np.array([low, high]), branch))
-            if curve.full and other.theta_2 < one.theta_2:
-                other = other._replace(theta_2=other.theta_2 + TURN)
-            ends = (other, one) if not curve.full and one.branch == other.branch == -1 else (one, other)
+            one, stop = (curve.place(point) for point in curve.point(np.array([low, high]), branch))
+            if curve.full and stop.theta_2 < one.theta_2:
+                stop = stop._replace(theta_2=stop.theta_2 + TURN)
+            ends = (stop, one) if not curve.full and one.branch == stop.branch == -1 else (one, stop)
             width = float(np.remainder(high - low, TURN))
-            result.append(_CircuitRange(ends, row, low, width, int(count)))
-    return result
+            ranges.append(_CircuitRange(ends, row, low, width, int(count)))
+    return ranges
 
 
-def _is_inside(curve: CircuitCurve, point: Array, of: _CircuitRange) -> bool:
+def _is_inside(curve: CircuitCurve, point: Array, part: _CircuitRange) -> bool:
     """Return True if a point lies in a range."""
     tau, row = curve.tau(point[None])
-    return bool(row[0] == of.row and np.remainder(tau[0] - of.low, TURN) <= of.width)
+    return bool(row[0] == part.row and np.remainder(tau[0] - part.low, TURN) <= part.width)
 
 
 def _find_edge(held: Callable[[Array], NDArray[np.bool_]], tau: Array, gap: Array, sense: float) -> Array:

@@ -11,17 +11,29 @@ from fourbar.evaluation.case import Case, find_undecided
 from fourbar.evaluation.evaluate import list_kinematics
 from fourbar.formulas.arithmetic import make_like, namespace
 from fourbar.formulas.mobility import change_points
-from fourbar.quantities import COUPLE, OF_DRY_FRICTION, OF_LINE, OF_PIN_LOADS, OK, SCALARS, STAGE_OF
+from fourbar.quantities import (
+    COUPLE,
+    DRY_FRICTION_QUANTITIES,
+    LINE_QUANTITIES,
+    OK,
+    PIN_LOAD_QUANTITIES,
+    SCALARS,
+    STAGE_OF,
+)
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.point import OF_POINTS
+from fourbar.scene.point import POINT_STAGES
 from fourbar.scene.scene import turn_bar
 from fourbar.studies.keys import SceneNumber, command_key, list_entries, read_place, refuse_key, replace_numbers
 
 NO_DIGIT_LEFT, UNDECIDED = 8.0, 16.0
 """Times the spacing of the numbers at 1: of |sin mu|, and of what decides whether the loop closes, as `solve` has them
 for doubles."""
-NEVER = {*OF_DRY_FRICTION, *OF_PIN_LOADS, *(name for name, stage in STAGE_OF.items() if stage == "error")}
+NEVER = {
+    *DRY_FRICTION_QUANTITIES,
+    *PIN_LOAD_QUANTITIES,
+    *(name for name, stage in STAGE_OF.items() if stage == "error"),
+}
 """Quantities of searches and of many digits."""
 
 
@@ -65,29 +77,29 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     """
     expect("scene", scene, Scene)
     _expect_names(keys=keys, quantities=quantities)
-    known, theta, motion = list_entries(scene), command_key(scene), scene.motion
+    entries, theta, motion = list_entries(scene), command_key(scene), scene.motion
     for key in keys:
-        if key not in (*known, theta):
-            raise refuse_key(key, "a key", [*known, theta])
+        if key not in (*entries, theta):
+            raise refuse_key(key, "a key", [*entries, theta])
     _refuse_untraceable(scene, keys)
     wanted = _list_stages(scene, quantities, keys)
     stated = None if theta in keys else command(scene)
     shape = () if stated is None or isinstance(motion.angle, float) else stated.angle.shape
 
     def solve_for(*values: Any) -> dict[str, Any]:
-        given = _check_given(keys, values, shape)
-        alone = given.xp is np and given.zero.shape == ()
+        numbers = _check_given(keys, values, shape)
+        alone = numbers.xp is np and numbers.zero.shape == ()
         if alone:  # as arrays, for a number of Python's own is not divided by 0
-            given = _check_given(keys, [np.atleast_1d(value) for value in given.values.values()], shape)
+            numbers = _check_given(keys, [np.atleast_1d(value) for value in numbers.values.values()], shape)
         with np.errstate(all="ignore"):
-            changed, q, holds = _replace_given(scene, known, given)
-            result = _evaluate(changed, _command_given(changed, q, stated, given), holds, given, wanted)
-        return {name: value[0] for name, value in result.items()} if alone else result
+            changed, q, holds = _replace_given(scene, entries, numbers)
+            results = _evaluate(changed, _command_given(changed, q, stated, numbers), holds, numbers, wanted)
+        return {name: value[0] for name, value in results.items()} if alone else results
 
     return solve_for
 
 
-def _replace_given(scene: Scene, known: Mapping[str, SceneNumber], given: Given) -> tuple[Scene, Any, Any]:
+def _replace_given(scene: Scene, entries: Mapping[str, SceneNumber], given: Given) -> tuple[Scene, Any, Any]:
     """Replace the numbers of the scene that are given; return what is commanded too, if it is, and where all hold.
 
     A number that a scene would refuse is replaced by the scene's own: what is finite has finite derivatives.
@@ -95,10 +107,10 @@ def _replace_given(scene: Scene, known: Mapping[str, SceneNumber], given: Given)
     numbers: dict[str, Any] = {}
     holds: Any = True
     for key, value in given.values.items():
-        entry = known.get(key)
+        entry = entries.get(key)
         inside = given.xp.isfinite(value) if entry is None else entry.holds(value)
-        own = None if entry is None else read_place(scene, entry.place)
-        holds, numbers[key] = holds & inside, given.xp.where(inside, value, 1.0 if own is None else own)
+        stated = None if entry is None else read_place(scene, entry.place)
+        holds, numbers[key] = holds & inside, given.xp.where(inside, value, 1.0 if stated is None else stated)
     q = numbers.pop(command_key(scene), None)
     return replace_numbers(scene, numbers), q, holds
 
@@ -119,8 +131,8 @@ def _expect_names(**lists: Sequence[str]) -> None:
     """Raise an InputError for a list that is none of words, each once."""
     for name, names in lists.items():
         expect(name, names, tuple, list)
-        for each in names:
-            expect(name, each, str)
+        for name_of_one in names:
+            expect(name, name_of_one, str)
         if len(set(names)) < len(names) or not names:
             raise InputError(name, names, "must be one or more, each once")
 
@@ -148,28 +160,32 @@ def _evaluate(
     half = half._replace(outer=xp.where(ok, half.outer, square), inner=xp.where(ok, half.inner, square))
     stages = set(wanted.values())
     state = case.assemble(q, half, branch, speed, acceleration, moving=stages != {"position"})
-    found = list_kinematics(case, state, wanted.keys()) | dict(zip(scene.motion.names[:2], commanded[:2], strict=True))
+    quantities = list_kinematics(case, state, wanted.keys()) | dict(
+        zip(scene.motion.names[:2], commanded[:2], strict=True)
+    )
     if condition is not None and "condition" in wanted:
-        found["condition"] = found["condition"] * condition
+        quantities["condition"] = quantities["condition"] * condition
     if "force" in stages:
         done = case.dynamics(state, acceleration)
         power = xp.where(xp.isfinite(done.drive), done.work * speed, xp.nan)
         forces = {**done.pins._asdict(), case.names.value: done.drive, "power": power}
         lever = case.drive_condition(state)
         held = lever > NO_DIGIT_LEFT * given.eps  # what is 0 for `solve` compilers and other libraries round
-        found |= {name: xp.where(held, of, xp.nan) for name, of in forces.items()} | {"drive_condition": lever}
+        quantities |= {name: xp.where(held, force, xp.nan) for name, force in forces.items()} | {
+            "drive_condition": lever
+        }
         for term in case.terms:
             if (status := term.status(state, None)) is not None:
                 ok = ok & (status == OK)
         if case.drive is not None and (status := case.drive.status(state, case.sines(state.at))) is not None:
             ok = ok & (status == OK)
-    result, zero = {}, given.zero
+    results, zero = {}, given.zero
     for name in wanted:
-        value = found[name]
+        value = quantities[name]
         parts = (value + zero,) if name in SCALARS else (value.real + zero, value.imag + zero)
         kept = [xp.where(ok & holds & xp.isfinite(sum(parts)), part, xp.nan) for part in parts]
-        result[name] = kept[0] if name in SCALARS else xp.stack(kept, axis=-1)
-    return result
+        results[name] = kept[0] if name in SCALARS else xp.stack(kept, axis=-1)
+    return results
 
 
 def _check_given(keys: Sequence[str], values: Sequence[Any], positions: tuple[int, ...]) -> Given:
@@ -177,12 +193,14 @@ def _check_given(keys: Sequence[str], values: Sequence[Any], positions: tuple[in
     if len(values) != len(keys):
         raise InputError("values", f"{len(values)} of them", f"must be {len(keys)}, one for each of {', '.join(keys)}")
     arrays = {key: value for key, value in zip(keys, values, strict=True) if not _is_plain(value)}
-    found: dict[Any, str] = {}
+    libraries: dict[Any, str] = {}
     for key, value in arrays.items():
-        found.setdefault(_find_library(key, value), key)
-    if len(found) > 1:
-        raise InputError("values", [f"{key} of {xp.__name__}" for xp, key in found.items()], "must be of one library")
-    xp: Any = next(iter(found), np)
+        libraries.setdefault(_find_library(key, value), key)
+    if len(libraries) > 1:
+        raise InputError(
+            "values", [f"{key} of {xp.__name__}" for xp, key in libraries.items()], "must be of one library"
+        )
+    xp: Any = next(iter(libraries), np)
     first = next(iter(arrays.values()), np.float64(0.0))
     try:
         shape = np.broadcast_shapes(positions, *(tuple(value.shape) for value in arrays.values()))
@@ -223,9 +241,9 @@ def _find_library(key: str, value: Any) -> Any:
 
 def _list_stages(scene: Scene, quantities: Iterable[str], keys: Sequence[str]) -> dict[str, str]:
     """Return the stages of the quantities asked for."""
-    others = OF_LINE if scene.drive is None else (COUPLE.value,)
+    others = LINE_QUANTITIES if scene.drive is None else (COUPLE.value,)
     stages = {name: stage for name, stage in STAGE_OF.items() if name not in {*NEVER, *others}}
-    stages |= {start + point.name: stage for point in scene.points for start, stage in OF_POINTS.items()}
+    stages |= {start + point.name: stage for point in scene.points for start, stage in POINT_STAGES.items()}
     stages["theta_2"] = "position"
     for name in quantities:
         if name not in stages:

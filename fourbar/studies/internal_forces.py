@@ -135,8 +135,8 @@ class _Beam(NamedTuple):
                 moments.append(np.where(inside, self.at(places[-1])[2], 0.0))
         x, M = np.concatenate(places, axis=1), np.concatenate(moments, axis=1)
         worst = np.argmax(np.nan_to_num(np.abs(M), nan=-1.0), axis=1)[:, None]
-        known = np.isfinite(M).all(axis=1)
-        return Bending(*(np.where(known, np.take_along_axis(of, worst, axis=1)[:, 0], np.nan) for of in (M, x)))
+        finite = np.isfinite(M).all(axis=1)
+        return Bending(*(np.where(finite, np.take_along_axis(rows, worst, axis=1)[:, 0], np.nan) for rows in (M, x)))
 
 
 def _solve_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
@@ -203,7 +203,7 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
         back = np.conj(state.direction(bar))
         a_A = solution.a_A
         assert a_A is not None
-        own = (a_A[:, 0] + 1j * a_A[:, 1] if bar == 3 else np.zeros(n)) - gravity
+        pin_acceleration = (a_A[:, 0] + 1j * a_A[:, 1] if bar == 3 else np.zeros(n)) - gravity
         omega, alpha = (np.zeros(n) + getattr(solution, f"{letter}_{bar}") for letter in ("omega", "alpha"))
         if not uniform:
             a_G = getattr(solution, f"a_G{bar}")
@@ -213,7 +213,7 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
             recorder.items += [(0.0j, 0.0j, -inertia * alpha) for on, inertia in term.carried.items() if on == bar]
         foot, force, couple = _sum_by_foot(recorder.items, np.zeros(n), SAME * described.length)
         density = described.mass / described.length if uniform else 0.0
-        return _Beam(described.length, foot, force, couple, uniform, density, own * back, omega, alpha)
+        return _Beam(described.length, foot, force, couple, uniform, density, pin_acceleration * back, omega, alpha)
 
 
 def _sum_by_foot(items: list[tuple[Any, Any, Any]], zero: Array, same: float) -> tuple[Array, Complex, Array]:

@@ -11,7 +11,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from fourbar.effects import Gravity, Springs
 from fourbar.effects.effect import PinRows
-from fourbar.effects.spring import AT
+from fourbar.effects.spring import END_POSITION
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import namespace, polar
 from fourbar.linkage import ANY, AT_LEAST_ZERO, BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar
@@ -43,13 +43,13 @@ class SceneNumber(NamedTuple):
 
 def _list_numbers(description: Any, key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of the numbers that a description states, a magnitude and its angle as two."""
-    found = dict[str, SceneNumber]()
+    entries = dict[str, SceneNumber]()
     for name, stated in description.numbers.items():
         if stated.pair:
-            found |= _make_pair(f"{key}.{name}", (*place, name), stated.unit)
+            entries |= _make_pair(f"{key}.{name}", (*place, name), stated.unit)
         else:
-            found[f"{key}.{name}"] = SceneNumber((*place, name), *stated[:2])
-    return found
+            entries[f"{key}.{name}"] = SceneNumber((*place, name), *stated[:2])
+    return entries
 
 
 def _make_pair(
@@ -65,26 +65,28 @@ def _list_effect(effect: Any, key: str, place: Place) -> dict[str, SceneNumber]:
         return _make_pair(key, place, effect.numbers["magnitude"].unit, ("magnitude", "angle"))
     if isinstance(effect, PinRows):
         return {
-            f"{key}.{row[0]}.{name}".removesuffix("."): SceneNumber((*place, effect.field, index, column), *of[:2])
+            f"{key}.{row[0]}.{name}".removesuffix("."): SceneNumber(
+                (*place, effect.field, index, column), *declared[:2]
+            )
             for index, row in enumerate(effect.rows)
-            for column, (name, of) in enumerate(effect.numbers.items(), 1)
+            for column, (name, declared) in enumerate(effect.numbers.items(), 1)
         }
     if not isinstance(effect, Springs):
         return _list_numbers(effect, key, place)
-    found = dict[str, SceneNumber]()
+    entries = dict[str, SceneNumber]()
     for index, spring in enumerate(effect.springs):
-        own = (*place, "springs", index)
-        found |= _list_numbers(spring, f"{key}.{index}", own) | _list_ends(f"{key}.{index}", own)
-    return found
+        spring_place = (*place, "springs", index)
+        entries |= _list_numbers(spring, f"{key}.{index}", spring_place) | _list_ends(f"{key}.{index}", spring_place)
+    return entries
 
 
 def _list_ends(key: str, place: Place) -> dict[str, SceneNumber]:
     """List the entries of both ends of a line between two bars."""
-    one, other = (
-        _make_pair(f"{key}.{name}.at", (*place, end), AT.unit, ("distance", "angle"))
+    of_start, of_end = (
+        _make_pair(f"{key}.{name}.at", (*place, end), END_POSITION.unit, ("distance", "angle"))
         for name, end in (("from", "start"), ("to", "end"))
     )
-    return one | other
+    return of_start | of_end
 
 
 def list_entries(scene: Scene) -> dict[str, SceneNumber]:
@@ -92,21 +94,23 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     of_ground = _list_numbers(FourBar, "lengths", ("linkage",))
     bars = {BAR_NAMES[bar]: _list_numbers(Bar, "", ("linkage", BAR_NAMES[bar])) for bar in MOVING_BARS}
     lengths = {f"lengths.{name}": numbers.pop(".length") for name, numbers in bars.items()}
-    found = {"lengths.ground": of_ground["lengths.ground"], **lengths, **of_ground}
-    found |= {f"bars.{name}{key}": number for name, numbers in bars.items() for key, number in numbers.items()}
+    entries = {"lengths.ground": of_ground["lengths.ground"], **lengths, **of_ground}
+    entries |= {f"bars.{name}{key}": number for name, numbers in bars.items() for key, number in numbers.items()}
     if scene.motion.law is None:
         for field, name in zip(("speed", "acceleration"), scene.motion.names[1:], strict=True):
-            found[f"motion.{name}"] = SceneNumber(("motion", field), scene.motion.numbers[name].unit)
+            entries[f"motion.{name}"] = SceneNumber(("motion", field), scene.motion.numbers[name].unit)
     if scene.drive is not None:
-        found |= _list_ends("drive", ("drive",))
+        entries |= _list_ends("drive", ("drive",))
     for index, load in enumerate(scene.loads):
         numbers = _list_numbers(load, f"loads.{index}", ("loads", index))
-        found |= {key: of for key, of in numbers.items() if load.force is not None or of.place[2] == "moment"}
+        entries |= {
+            key: entry for key, entry in numbers.items() if load.force is not None or entry.place[2] == "moment"
+        }
     for index, point in enumerate(scene.points):
-        found |= _list_numbers(point, point.key, ("points", index))
+        entries |= _list_numbers(point, point.key, ("points", index))
     for index, effect in enumerate(scene.effects):
-        found |= _list_effect(effect, f"effects.{effect.key}", ("effects", index))
-    return found
+        entries |= _list_effect(effect, f"effects.{effect.key}", ("effects", index))
+    return entries
 
 
 def command_key(scene: Scene) -> str:
@@ -114,15 +118,15 @@ def command_key(scene: Scene) -> str:
     return f"motion.{scene.motion.commanded}"
 
 
-def refuse_key(key: str, value: object, known: list[str]) -> InputError:
+def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
     """Make the error for a key that a study cannot vary."""
     expect("key", key, str)
-    inner = [name for name in known if name.startswith(f"{key}.")]
+    inner = [name for name in keys if name.startswith(f"{key}.")]
     if inner:
         return InputError(key, value, "is more than one number; vary " + ", ".join(inner))
     if any(part in SAME_FOR_ALL for part in key.split(".")):
         return InputError(key, value, "is the same for every member of a study: only numbers vary, theta_2 as angles")
-    close = get_close_matches(key, known, 1, 0.0)
+    close = get_close_matches(key, keys, 1, 0.0)
     return InputError(key, value, f'unknown key; did you mean "{close[0]}"?')
 
 
@@ -157,42 +161,42 @@ def is_left_out(scene: Scene, entry: SceneNumber) -> bool:
     return getattr(bar, str(entry.place[2])) is None
 
 
-def read_place(whole: Any, place: Place) -> Any:
+def read_place(value: Any, place: Place) -> Any:
     """Read the number at a place; what a bar leaves out is that of a uniform one."""
     for name in place:
         if isinstance(name, int):
-            whole = whole[name]
-        elif isinstance(whole, Bar) and getattr(whole, name) is None:
-            whole = {"inertia": whole.moment_of_inertia, "centre": whole.mass_centre}[name]
+            value = value[name]
+        elif isinstance(value, Bar) and getattr(value, name) is None:
+            value = {"inertia": value.moment_of_inertia, "centre": value.mass_centre}[name]
         else:
-            whole = getattr(whole, name)
-    return whole
+            value = getattr(value, name)
+    return value
 
 
 def replace_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
     """Copy the scene with some of its numbers replaced, by key."""
-    known, changed = list_entries(scene), scene
+    entries, changed = list_entries(scene), scene
     for key, number in numbers.items():
-        changed = replace_place(changed, known[key].place, number)
+        changed = replace_place(changed, entries[key].place, number)
     return changed
 
 
-def replace_place(whole: Any, place: Place, values: Any) -> Any:
+def replace_place(holder: Any, place: Place, values: Any) -> Any:
     """Copy with one number replaced; what a constructor checks is not checked again."""
     if not place:
         return values
     name, *rest = place
     if isinstance(name, int):
-        parts = [replace_place(part, tuple(rest), values) if i == name else part for i, part in enumerate(whole)]
+        parts = [replace_place(part, tuple(rest), values) if i == name else part for i, part in enumerate(holder)]
         return tuple(parts)
-    if isinstance(whole, tuple):  # a named one
-        named: Any = whole
-        return named._replace(**{name: replace_place(getattr(named, name), tuple(rest), values)})
-    old = getattr(whole, name)
-    if isinstance(whole, Bar) and name == "centre" and old is None:
-        old = whole.mass_centre
-    new = object.__new__(ManyBars if isinstance(whole, Bar) else type(whole))
-    for field in fields(whole):
-        value = replace_place(old, tuple(rest), values) if field.name == name else getattr(whole, field.name)
+    if isinstance(holder, tuple):  # a named one
+        tuple_of_names: Any = holder
+        return tuple_of_names._replace(**{name: replace_place(getattr(tuple_of_names, name), tuple(rest), values)})
+    old = getattr(holder, name)
+    if isinstance(holder, Bar) and name == "centre" and old is None:
+        old = holder.mass_centre
+    new = object.__new__(ManyBars if isinstance(holder, Bar) else type(holder))
+    for field in fields(holder):
+        value = replace_place(old, tuple(rest), values) if field.name == name else getattr(holder, field.name)
         object.__setattr__(new, field.name, value)
     return new

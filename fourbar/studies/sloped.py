@@ -130,13 +130,13 @@ class Sloped(NDArrayOperatorsMixin):
     def __array_ufunc__(self, function: Any, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or options:
             return NotImplemented
-        given = [x.item() if isinstance(x, np.ndarray) and x.dtype == object and not x.ndim else x for x in inputs]
+        operands = [x.item() if isinstance(x, np.ndarray) and x.dtype == object and not x.ndim else x for x in inputs]
         if function in (np.equal, np.not_equal):
-            sloped, other = given if isinstance(given[0], Sloped) else given[::-1]
-            return sloped._compared(other, function)
+            sloped, constant = operands if isinstance(operands[0], Sloped) else operands[::-1]
+            return sloped._compared(constant, function)
         if function is np.conjugate:
             return self.conjugate()
-        plain = [take_values(x) for x in given]
+        plain = [take_values(x) for x in operands]
         if self.values.dtype == object and any(isinstance(x, complex) for x in plain):
             from flint import acb  # balls accept no complex number of Python's
 
@@ -149,16 +149,16 @@ class Sloped(NDArrayOperatorsMixin):
             return decided(function(*plain), COMPLEMENT[function](*plain))
         if function not in RULES and (function not in PIECEWISE or self.values.dtype == object):
             return NotImplemented
-        found = function(*plain)
+        values = function(*plain)
         if function in PIECEWISE:
-            return found
-        partial = RULES[function](found, *plain)
+            return values
+        partial = RULES[function](values, *plain)
         slopes = None
-        for by, x in zip(partial, given, strict=True):
+        for by, x in zip(partial, operands, strict=True):
             if isinstance(x, Sloped):
                 term = x.slopes if isinstance(by, float) and by == 1.0 else by * x.slopes
                 slopes = term if slopes is None else slopes + term
-        return Sloped(found, slopes)
+        return Sloped(values, slopes)
 
     def __array_function__(self, function: Any, types: Any, args: Sequence[Any], options: Any) -> Any:
         return _find_by_name(function, args, options)
@@ -180,8 +180,8 @@ def take_slopes(number: Any) -> Any:
 
 def _apply_by_entry(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Make a function that applies to a whole array, or entry by entry to an array of objects."""
-    each = np.frompyfunc(function, 1, 1)
-    return lambda z: each(z) if z.dtype == object else function(z)
+    by_entry = np.frompyfunc(function, 1, 1)
+    return lambda z: by_entry(z) if z.dtype == object else function(z)
 
 
 real, imag = _apply_by_entry(lambda z: z.real), _apply_by_entry(lambda z: z.imag)

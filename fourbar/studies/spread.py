@@ -150,18 +150,18 @@ def tolerances(
         raise InputError("tolerances", None, 'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"')
     if progress is not None:
         progress(0.0)
-    found, study = sensitivity(scene), _make_members(scene, samples, seed)
-    n = len(found.solution)
-    names = list(found.by)
-    values = {name: split_parts(name, found.value(name)) for name in names}
-    spreads = {part: _compute_first_order(found, part) for name, own in values.items() for part in own}
+    slopes, study = sensitivity(scene), _make_members(scene, samples, seed)
+    n = len(slopes.solution)
+    names = list(slopes.by)
+    values = {name: split_parts(name, slopes.value(name)) for name in names}
+    spreads = {part: _compute_first_order(slopes, part) for name, parts in values.items() for part in parts}
     without, gone = np.zeros(n, dtype=np.intp), np.zeros(len(study), dtype=bool)
-    nominal_closes = found.solution.status_code != NOT_ASSEMBLED
+    nominal_closes = slopes.solution.status_code != NOT_ASSEMBLED
     for columns, extra in _list_blocks(study, scene, samples, nominal_closes):
         pieces: Any = (x[:, extra] if isinstance(x, np.ndarray) and x.size > len(x) else x for x in study.at)
-        own = replace(study, at=Command(*pieces))
+        parts = replace(study, at=Command(*pieces))
         width = columns.stop - columns.start
-        solution = solve(own)
+        solution = solve(parts)
         code = solution.status_code[:, -width:]
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)
@@ -175,7 +175,7 @@ def tolerances(
         if progress is not None:
             progress(columns.stop / n)
     invalid = int(np.count_nonzero(study.invalid))
-    return Tolerances(scene, samples, seed, found.solution.theta_2, spreads, without, int(gone.sum()), invalid)
+    return Tolerances(scene, samples, seed, slopes.solution.theta_2, spreads, without, int(gone.sum()), invalid)
 
 
 def _make_members(scene: Scene, samples: int, seed: int) -> Study:
@@ -184,12 +184,12 @@ def _make_members(scene: Scene, samples: int, seed: int) -> Study:
         from scipy.stats import norm, qmc
     except ImportError:
         raise DependencyError(f"SciPy is needed for tolerances: {say_install('studies')}") from None
-    known, numbers = list_entries(scene), dict[str, Any]()
+    entries, numbers = list_entries(scene), dict[str, Any]()
     drawn = qmc.Sobol(len(scene.tolerances), seed=seed).random_base2(max(1, (samples - 1).bit_length()))[:samples]
     for tolerance, column in zip(scene.tolerances, drawn.T, strict=True):
-        if tolerance.key not in known:
-            raise refuse_key(tolerance.key, tolerance.width, list(known))
-        entry = known[tolerance.key]
+        if tolerance.key not in entries:
+            raise refuse_key(tolerance.key, tolerance.width, list(entries))
+        entry = entries[tolerance.key]
         if is_left_out(scene, entry):
             raise InputError(tolerance.key, tolerance.width, LEFT_OUT)
         inside = np.clip(column, 0.5 / samples, 1.0 - 0.5 / samples)
@@ -212,12 +212,13 @@ def _list_blocks(
         yield columns, np.array([*begins, *range(columns.start, columns.stop)])
 
 
-def _compute_first_order(found: Sensitivity, part: str) -> Spread:
+def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
     """Compute the nominal and the first-order figures of a part of a quantity; the samples' are still to come."""
-    scene, nominal = found.scene, found.value(part)
-    slopes = np.array([found.of(part, tolerance.key) for tolerance in scene.tolerances])
+    scene, nominal = slopes_of.scene, slopes_of.value(part)
+    slopes = np.array([slopes_of.of(part, tolerance.key) for tolerance in scene.tolerances])
     deviations, reaches = (
-        np.array([getattr(tolerance, of) for tolerance in scene.tolerances])[:, None] for of in ("deviation", "reach")
+        np.array([getattr(tolerance, width) for tolerance in scene.tolerances])[:, None]
+        for width in ("deviation", "reach")
     )
     deviation, low, high, least, greatest = (np.full(nominal.shape, np.nan) for _ in range(5))
     worst = np.asarray(np.abs(slopes * reaches).sum(axis=0))
@@ -233,6 +234,6 @@ def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
         spread.least[columns], spread.greatest[columns] = sampled.min(axis=0), sampled.max(axis=0)
         return
     for column, values in zip(range(columns.start, columns.stop), sampled.T, strict=True):
-        known = values[np.isfinite(values)]
-        if known.size > 1:
-            _fill(spread, slice(column, column + 1), known[:, None])
+        finite = values[np.isfinite(values)]
+        if finite.size > 1:
+            _fill(spread, slice(column, column + 1), finite[:, None])

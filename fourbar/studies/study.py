@@ -63,34 +63,34 @@ class Study:
 
     def begin(self, rows: slice) -> Scene:
         """Make the scene with effects that begin where each member's motion does: where it first assembles."""
-        scene, at = self.scene, self.at
+        scene, commanded = self.scene, self.at
         if not scene.counts_turns:
             return scene
-        count, n = rows.stop - rows.start, at.angle.shape[1]
-        flat = take_members(at, rows, slice(0, n)).angle
-        half, _ = Case.of(self.members(rows, n), at.bar).half_angle(flat, None)
+        count, n = rows.stop - rows.start, commanded.angle.shape[1]
+        flat = take_members(commanded, rows, slice(0, n)).angle
+        half, _ = Case.of(self.members(rows, n), commanded.bar).half_angle(flat, None)
         assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(count, n)
         first = np.argmax(assembled, axis=1)
-        begins = assembled.any(axis=1) & (np.ptp(at.branch[rows], axis=1) == 0)
-        angle = np.where(begins, at.angle[rows][np.arange(count), first], np.nan)
-        start = Command(angle, at.branch[rows, 0], 0.0, 0.0, bar=at.bar)
-        counted = Case.of(self.members(rows, 1), at.bar).started(start).terms[len(scene.loads) :]
+        begins = assembled.any(axis=1) & (np.ptp(commanded.branch[rows], axis=1) == 0)
+        angle = np.where(begins, commanded.angle[rows][np.arange(count), first], np.nan)
+        start = Command(angle, commanded.branch[rows, 0], 0.0, 0.0, bar=commanded.bar)
+        counted = Case.of(self.members(rows, 1), commanded.bar).started(start).terms[len(scene.loads) :]
         for index, turns in _find_turns(counted).items():
             scene = replace_place(scene, ("effects", index, "turns"), turns)
         return scene
 
-    def refuse(self, result: Mapping[str, Array], code: NDArray[np.uint8]) -> None:
+    def refuse(self, arrays: Mapping[str, Array], code: NDArray[np.uint8]) -> None:
         """Mark the members that a scene would refuse, and the strokes that a cylinder cannot have."""
         code[np.isnan(self.at.angle)] = NOT_ASSEMBLED
         code[self.invalid] = INVALID
-        for array in result.values():
+        for array in arrays.values():
             array[self.invalid] = np.nan
 
 
 def _find_turns(effects: Iterable[Effect]) -> dict[int, Any]:
     """Find the whole turns of each pin for the effects that depend on where the motion begins, by their index."""
-    found = {index: getattr(effect, "turns", None) for index, effect in enumerate(effects)}
-    return {index: turns for index, turns in found.items() if turns is not None}
+    turns_of = {index: getattr(effect, "turns", None) for index, effect in enumerate(effects)}
+    return {index: turns for index, turns in turns_of.items() if turns is not None}
 
 
 def _repeat(values: Array, count: int) -> Array:
@@ -123,10 +123,10 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     expect("values", values, Mapping)
     if scene.motion.free is not None:
         raise InputError("motion.free", "a free motion", "is integrated for one linkage; a study prescribes theta_2")
-    known, theta = list_entries(scene), command_key(scene)
-    given = {key: _read_numbers(key, value, [*known, theta]) for key, value in values.items()}
-    angles = _read_angles(scene, given, theta)
-    sizes = {key: array.size for key, array in given.items() if key != theta and array.size != 1}
+    entries, theta = list_entries(scene), command_key(scene)
+    arrays = {key: _read_numbers(key, value, [*entries, theta]) for key, value in values.items()}
+    angles = _read_angles(scene, arrays, theta)
+    sizes = {key: array.size for key, array in arrays.items() if key != theta and array.size != 1}
     if angles.shape[0] != 1:
         sizes[theta] = angles.shape[0]
     m = next(iter(sizes.values()), 1)
@@ -134,14 +134,14 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         if size != m:
             first = next(iter(sizes))
             raise InputError(key, f"{size} members", f"must have one length: {first} has {m}")
-    numbers = {key: np.broadcast_to(given[key].ravel(), (m,)) for key in known if key in given}
+    numbers = {key: np.broadcast_to(arrays[key].ravel(), (m,)) for key in entries if key in arrays}
     invalid = ~np.broadcast_to(np.isfinite(angles).all(axis=1), (m,))
     for key, array in numbers.items():
-        invalid = invalid | ~known[key].holds(array)
+        invalid = invalid | ~entries[key].holds(array)
     numbers = {key: np.where(invalid, np.nan, array) for key, array in numbers.items()}
-    at = _list_commands(scene, numbers, angles, m)
+    commanded = _list_commands(scene, numbers, angles, m)
     rates = {f"motion.{name}" for name in scene.motion.names[1:]}
-    return Study(scene, {key: array for key, array in numbers.items() if key not in rates}, invalid, at)
+    return Study(scene, {key: array for key, array in numbers.items() if key not in rates}, invalid, commanded)
 
 
 def _list_commands(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> Command:
@@ -158,31 +158,33 @@ def _list_commands(scene: Scene, numbers: Mapping[str, Array], angles: Array, m:
         branch = _find_branches(scene, numbers, angles, m)
         return Command(angle, branch, speed, acceleration, bar=scene.motion.bar)
     varied = replace_numbers(scene, {key: array[:, None] for key, array in numbers.items()})
-    at = command_stroke(varied, angle, speed, acceleration)
-    return at._replace(branch=_find_branches(scene, numbers, at.angle, m))
+    commanded = command_stroke(varied, angle, speed, acceleration)
+    return commanded._replace(branch=_find_branches(scene, numbers, commanded.angle, m))
 
 
 def _find_branches(scene: Scene, numbers: Mapping[str, Array], angles: Array, m: int) -> NDArray[np.int8]:
     """Return the branch of each position, (m, n); only a member with a change point can follow a path through it."""
     motion, shape = scene.motion, (m, angles.shape[1])
-    own = {key: array for key, array in numbers.items() if key in LENGTHS}
-    if motion.through == "follow" and not own and len(angles) == 1:
+    lengths_given = {key: array for key, array in numbers.items() if key in LENGTHS}
+    if motion.through == "follow" and not lengths_given and len(angles) == 1:
         return np.broadcast_to(follow_smooth_path(scene.linkage, angles[0], motion.branch, motion.bar), shape)
     branch = np.full(shape, motion.branch, dtype=np.int8)
     if motion.through == "follow":
-        lengths = replace_numbers(scene, own).linkage.lengths
+        lengths = replace_numbers(scene, lengths_given).linkage.lengths
         _, _, _, _, E1, E2 = loop(*reorder_lengths(motion.bar, lengths))
         size = NEAR_A_CHANGE_POINT * sum(lengths) ** 2
         for member in np.flatnonzero(np.broadcast_to((np.abs(E1) <= size) | (np.abs(E2) <= size), (m,))):
-            linkage = replace_numbers(scene, {key: float(array[member]) for key, array in own.items()}).linkage
+            linkage = replace_numbers(
+                scene, {key: float(array[member]) for key, array in lengths_given.items()}
+            ).linkage
             branch[member] = follow_smooth_path(linkage, angles[member % len(angles)], motion.branch, motion.bar)
     return branch
 
 
-def _read_numbers(key: str, value: Any, known: list[str]) -> Array:
+def _read_numbers(key: str, value: Any, keys: list[str]) -> Array:
     """Return the array given for a key, (m,) or (1,); the angles as they are."""
-    if key not in known:
-        raise refuse_key(key, _shorten(value), known)
+    if key not in keys:
+        raise refuse_key(key, _shorten(value), keys)
     try:
         array = np.asarray(convert_to_unit(key, value, find_unit(key) or "1"))
     except ValueError:  # rows of different lengths
@@ -201,14 +203,14 @@ def _shorten(value: Any) -> object:
     return f"{type(value).__name__} of shape {value.shape}" if isinstance(value, np.ndarray) else value
 
 
-def _read_angles(scene: Scene, given: Mapping[str, Array], key: str) -> Array:
+def _read_angles(scene: Scene, arrays: Mapping[str, Array], key: str) -> Array:
     """Commanded angles of all members, (1, n) or (m, n)."""
     motion = scene.motion
-    if key in given:
+    if key in arrays:
         if motion.law is not None:
             raise InputError(key, "angles", "are those of the scene's motion law")
-        return np.atleast_2d(given[key])
+        return np.atleast_2d(arrays[key])
     if motion.law is None and (motion.angle is None or isinstance(motion.angle, FromLimit)):
         raise InputError(key, motion.angle, "depends on the linkage; a study states it: (n,) or (m, n) angles")
-    at = command(scene)
-    return (at.angle if at.stroke is None else at.stroke)[None, :]
+    commanded = command(scene)
+    return (commanded.angle if commanded.stroke is None else commanded.stroke)[None, :]

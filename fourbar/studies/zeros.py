@@ -70,7 +70,7 @@ def find_zeros(
     from flint import arb
 
     d, a, b, c = lengths[:4]
-    own = Loop(arb(d), arb(a), arb(b), arb(c), 0.0, 0.0)
+    exact = Loop(arb(d), arb(a), arb(b), arb(c), 0.0, 0.0)
     ends = [np.linspace(low - SLACK, high + SLACK, FIRST + 1) for low, high in domain]
     grid = np.meshgrid(*(0.5 * (x[1:] + x[:-1]) for x in ends), indexing="ij")
     centres = np.stack([x.ravel() for x in grid], axis=1)
@@ -85,31 +85,31 @@ def find_zeros(
         centres, radii = centres[kept], radii[kept]
         evaluated += len(centres)
         if evaluated > MANY:
-            return Zeros(np.array([each[0] for each in solved]).reshape(-1, 2), np.empty((0, 2)), False)
+            return Zeros(np.array([proven[0] for proven in solved]).reshape(-1, 2), np.empty((0, 2)), False)
         split = np.zeros(len(centres), dtype=bool)
-        newton = _Newton(own, function, centres, 2.0 * radii)
-        for i, (at, r) in enumerate(zip(centres, radii, strict=True)):
-            if newton.without_zero(i, r) or any(_is_inside(at, r, *each[1:]) for each in solved):
+        newton = _Newton(exact, function, centres, 2.0 * radii)
+        for i, (box, r) in enumerate(zip(centres, radii, strict=True)):
+            if newton.without_zero(i, r) or any(_is_inside(box, r, *proven[1:]) for proven in solved):
                 continue
             step = newton.step(i)
             if step is not None and any(
-                abs(float(z.mid()) - x) > w + z.rad() for z, x, w in zip(step, at, r, strict=True)
+                abs(float(z.mid()) - x) > w + z.rad() for z, x, w in zip(step, box, r, strict=True)
             ):
                 continue
-            if step is not None and all(_holds(x, 2.0 * w, z) for z, x, w in zip(step, at, r, strict=True)):
-                zero = _polish(own, function, step)
-                if not any(_is_inside(zero, np.zeros(2), *each[1:]) for each in solved):
-                    solved.append((zero, at, 2.0 * r))
+            if step is not None and all(_holds(x, 2.0 * w, z) for z, x, w in zip(step, box, r, strict=True)):
+                zero = _polish(exact, function, step)
+                if not any(_is_inside(zero, np.zeros(2), *proven[1:]) for proven in solved):
+                    solved.append((zero, box, 2.0 * r))
             elif r.max() < FINEST:
-                undecided.append(at)
+                undecided.append(box)
             else:
                 split[i] = True
         offsets = np.array([[-0.5, -0.5], [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5]])
         halves = radii[split][:, None] * offsets
         centres = (centres[split][:, None] + halves).reshape(-1, 2)
         radii = np.repeat(0.5 * radii[split] * (1.0 + MARGIN), 4, axis=0)
-    found = np.array([each[0] for each in solved]).reshape(-1, 2)
-    return Zeros(found, _separate(np.array(undecided).reshape(-1, 2)), True)
+    zeros = np.array([proven[0] for proven in solved]).reshape(-1, 2)
+    return Zeros(zeros, _separate(np.array(undecided).reshape(-1, 2)), True)
 
 
 def _may_close(lengths: Loop, centres: Array, radii: Array) -> NDArray[np.bool_]:
@@ -159,12 +159,12 @@ class _Newton:
 
 def _polish(lengths: Loop, function: Callable[[Any, Any], Sloped], step: tuple[Any, Any]) -> Array:
     """Return the zero in a step that holds it."""
-    at = np.array([[float(z.mid()) for z in step]])
+    zero = np.array([[float(z.mid()) for z in step]])
     for _ in range(STEPS):
-        again = _Newton(lengths, function, at, np.zeros((1, 2))).step(0)
+        again = _Newton(lengths, function, zero, np.zeros((1, 2))).step(0)
         assert again is not None  # the determinant has one sign over the whole box
-        at = np.array([[float(z.mid()) for z in again]])
-    return np.asarray(at[0])
+        zero = np.array([[float(z.mid()) for z in again]])
+    return np.asarray(zero[0])
 
 
 def _holds(centre: float, radius: float, ball: Any) -> bool:
@@ -172,9 +172,9 @@ def _holds(centre: float, radius: float, ball: Any) -> bool:
     return abs(float(ball.mid()) - centre) + float(ball.rad()) < radius * (1.0 - MARGIN)
 
 
-def _is_inside(at: Array, r: Array, centre: Array, radius: Array) -> bool:
+def _is_inside(point: Array, r: Array, centre: Array, radius: Array) -> bool:
     """Return True if a box lies inside another, whole turns apart or not."""
-    return bool((np.abs(_wrap(at - centre)) + r <= radius * (1.0 - MARGIN)).all())
+    return bool((np.abs(_wrap(point - centre)) + r <= radius * (1.0 - MARGIN)).all())
 
 
 def _wrap(angle: Any) -> Any:
@@ -186,6 +186,6 @@ def _separate(points: Array) -> Array:
     """One of each group of neighbouring points: its middle."""
     groups: list[list[Array]] = []
     for point in points:
-        near = [g for g in groups if any((np.abs(_wrap(point - each)) < 8.0 * FINEST).all() for each in g)]
+        near = [g for g in groups if any((np.abs(_wrap(point - member)) < 8.0 * FINEST).all() for member in g)]
         groups = [g for g in groups if all(g is not one for one in near)] + [[point, *(p for g in near for p in g)]]
     return np.array([np.mean(group, axis=0) for group in groups]).reshape(-1, 2)

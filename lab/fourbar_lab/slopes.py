@@ -18,7 +18,7 @@ from flint import arb
 from fourbar.effects import Friction, Gravity, Load, Table, Viscous
 from fourbar.errors import DependencyError, say_install
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import OF_LINE, STAGE_OF
+from fourbar.quantities import LINE_QUANTITIES, STAGE_OF
 from fourbar.scene import Scene
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.function import NEVER, function
@@ -117,7 +117,7 @@ def _make_program(scene: Scene, library: str, derivatives: bool) -> Callable[...
 
     Derivatives go forwards in JAX, backwards in PyTorch.
     """
-    of_others = {"torque"} if scene.drive else OF_LINE
+    of_others = {"torque"} if scene.drive else LINE_QUANTITIES
     f = function(scene, list(list_numbers(scene)), [name for name in QUANTITIES if name not in of_others])
 
     def of_row(x: Any) -> Any:

@@ -220,6 +220,6 @@ def test_the_places_that_the_guide_to_a_quantity_names_are_there() -> None:
     texts = {
         name: (root / ("validation" if name.startswith("fourbar_v") else ".") / name).read_text() for name in files
     }
-    for name, word in (("__init__", "_scalar("), ("evaluate", "OF_BARS"), ("loop", "NOT_ANSWERED"), ("scales", "v_A"),
+    for name, word in (("__init__", "_scalar("), ("evaluate", "SCALAR_F"), ("loop", "NOT_ANSWERED"), ("scales", "v_A"),
                        ("balls", "omega[k]"), ("results", "`v_A`")):  # fmt: skip
         assert any(file.rpartition("/")[2].startswith(name) and word in text for file, text in texts.items()), name

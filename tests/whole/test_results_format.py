@@ -10,7 +10,7 @@ import pytest
 from fourbar import Motion, Scene, Sweep, command, solve, uniform
 from fourbar.effects import PinFriction
 from fourbar.formulas.pin_forces import PinForces
-from fourbar.quantities import FORCES, OF_LINE, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
+from fourbar.quantities import FORCES, LINE_QUANTITIES, PIN_FORCES, QUANTITIES, STAGES, UNKNOWNS
 from fourbar.solution import Solution
 from fourbar_validation.cli import status
 from fourbar_validation.compare.columns import read_columns
@@ -105,7 +105,7 @@ def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity() -> None:
     solution = solve(crank_rocker(effects=(PinFriction.at(A=(0.1, 0.01)),)), "error")
     for q in QUANTITIES:
         values = getattr(solution, q.name)
-        assert (values is None) == (q.name == "time" or q.name in OF_LINE)
+        assert (values is None) == (q.name == "time" or q.name in LINE_QUANTITIES)
         assert values is None or values.shape == ((len(solution), 2) if q.kind == "vector" else (len(solution),))
 
 

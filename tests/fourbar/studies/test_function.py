@@ -24,7 +24,7 @@ from fourbar.effects import (
     Viscous,
 )
 from fourbar.formulas.arithmetic import namespace
-from fourbar.quantities import OF_LINE, STAGE_OF
+from fourbar.quantities import LINE_QUANTITIES, STAGE_OF
 from fourbar.scene.motion import Free
 from fourbar.studies.function import NEVER, function
 from fourbar.studies.keys import command_key, is_left_out, list_entries, read_place
@@ -92,7 +92,7 @@ LOADED = Scene(
     points=(Point("P", 3, (0.1, 0.4)),),
 )
 CYLINDER = replace(LOADED, drive_bar=None, drive=LinearDrive(SpringEnd(1, 0.1, 1.0), SpringEnd(4, 0.1, -1.0)))
-EVERY = [*(name for name in STAGE_OF if name not in {*NEVER, *OF_LINE}), "P", "v_P", "a_P"]
+EVERY = [*(name for name in STAGE_OF if name not in {*NEVER, *LINE_QUANTITIES}), "P", "v_P", "a_P"]
 ANGLES = np.linspace(0.0, 6.0, 13)
 
 
@@ -136,7 +136,7 @@ def test_a_drive_along_a_line(library: Library, ends: tuple[int, int]) -> None:
     """Its force, with the derivative by where it is pinned, which `sensitivity` has by another route."""
     line = LinearDrive(*(SpringEnd(bar, 0.1, side) for bar, side in zip(ends, (1.0, -1.0), strict=True)))
     scene = replace(CYLINDER, drive=line)
-    names = [*OF_LINE[:4], "power", "drive_condition", "F12", "F43"]
+    names = [*LINE_QUANTITIES[:4], "power", "drive_condition", "F12", "F43"]
     keys = ["drive.from.at.0", "lengths.coupler"]
     solution, slopes = fourbar.solve(scene), fourbar.sensitivity(scene)
     f, values = function(scene, keys, names), library.array([0.1, 0.25])

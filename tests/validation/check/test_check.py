@@ -14,7 +14,7 @@ import pytest
 
 import fourbar
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS
-from fourbar.quantities import OF_LINE, OK, UNITS, VECTORS
+from fourbar.quantities import LINE_QUANTITIES, OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Law
 from fourbar.solve import solve
@@ -335,7 +335,7 @@ def test_two_mistakes_in_two_columns_are_both_named(tmp_path: Path) -> None:
     assert not any(explanation.complete for explanation in found.explanations)
 
 
-EVERY_QUANTITY = [name for name in UNITS if name not in (*NOT_JUDGED, *OF_LINE, "theta_2")]
+EVERY_QUANTITY = [name for name in UNITS if name not in (*NOT_JUDGED, *LINE_QUANTITIES, "theta_2")]
 
 
 @pytest.mark.parametrize("quantity", [name for name in EVERY_QUANTITY if not name.startswith("torque_")])

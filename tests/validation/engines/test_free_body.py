@@ -13,7 +13,7 @@ import pytest
 import fourbar
 from fourbar.effects import Flywheel, Friction, Gravity, Load, PinFriction, Spring, SpringEnd, Springs, Viscous
 from fourbar.linkage import PINS
-from fourbar.quantities import OF_LINE, STAGE_OF
+from fourbar.quantities import LINE_QUANTITIES, STAGE_OF
 from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
 from fourbar_validation.engines.free_body import FreeBody, grow_couples
@@ -224,7 +224,7 @@ def test_positions_alone_are_judged_with_what_is_stated_of_the_linkage() -> None
     rows = judge("scene", crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))), ONE).rows
     found = {row.quantity for row in rows if row.engine == "free-body"}
     of_the_linkage = {"assembled", "undecided", "closure", "range", "limit_positions", "transmission"}
-    of_positions = {name for name, stage in STAGE_OF.items() if stage == "position" and name not in OF_LINE}
+    of_positions = {name for name, stage in STAGE_OF.items() if stage == "position" and name not in LINE_QUANTITIES}
     assert found == of_the_linkage | of_positions
     assert all(row.passed for row in rows)
 

@@ -14,9 +14,9 @@ from fourbar.quantities import (
     FORCES,
     JAMMED,
     LINE,
-    OF_DRY_FRICTION,
-    OF_LINE,
-    OF_PIN_LOADS,
+    DRY_FRICTION_QUANTITIES,
+    LINE_QUANTITIES,
+    PIN_LOAD_QUANTITIES,
     OK,
     OVERFLOW,
     SINGULAR,
@@ -54,13 +54,13 @@ Nearby = Callable[[Mask], dict[str, Array]]
 Scales = dict[str, tuple[Array, Array]]
 """Size and condition of each quantity at each position."""
 
-OF_THE_FORMULAS = (*OF_DRY_FRICTION, *OF_PIN_LOADS, COUPLE.error, LINE.error, "force_error", "power")
+OF_THE_FORMULAS = (*DRY_FRICTION_QUANTITIES, *PIN_LOAD_QUANTITIES, COUPLE.error, LINE.error, "force_error", "power")
 """Quantities with checks of their own: the range in which dry friction holds, its residual, error bars, a product."""
-COMPARED = tuple(name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *OF_LINE))
+COMPARED = tuple(name for name in STAGE_OF if name not in (*OF_THE_FORMULAS, *LINE_QUANTITIES))
 """Quantities that are compared with an exact engine: all that is printed of a position."""
 OF_THE_LINE = {"stroke": "sin_mu", "drive_line": "sin_mu", "stroke_speed": "v_B", LINE.value: COUPLE.value}
 """Quantities of a linear drive; each is compared if the quantity it maps to is compared or the engine answers it."""
-OF_FORCES = (*FORCES, *OF_DRY_FRICTION)
+OF_FORCES = (*FORCES, *DRY_FRICTION_QUANTITIES)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
 SLOW_DRIVE = 0.1

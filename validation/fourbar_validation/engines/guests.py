@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from fourbar.errors import FourBarError, InputError
-from fourbar.quantities import ANGLES, OF_DRY_FRICTION
+from fourbar.quantities import ANGLES, DRY_FRICTION_QUANTITIES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
 from fourbar_validation.compare.compare import COMPARED
@@ -48,7 +48,7 @@ MOST_ERRORS = 10**8
 """Bytes that a program may write to its standard error for one answer."""
 KILLED = (-9, 137)
 """Exit status of a program that was killed: its own, or its shell's."""
-QUANTITIES = (*COMPARED, *OF_DRY_FRICTION)
+QUANTITIES = (*COMPARED, *DRY_FRICTION_QUANTITIES)
 """Names of what an engine can answer."""
 COMMANDS = tuple(names[0] for names in protocol.KINDS_OF_COMMAND)
 HELLO = {"ask": "hello", "protocol": protocol.PROTOCOL}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
-from fourbar.quantities import ANGLES, OF_LINE, PIN_FORCES, STAGE_OF, STAGES, VECTORS
+from fourbar.quantities import ANGLES, LINE_QUANTITIES, PIN_FORCES, STAGE_OF, STAGES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.description import SHARED, list_speeds, list_unknowns, name_driving, reduce_angle
@@ -23,7 +23,7 @@ SHORTEST_STEP = 2.0**-40
 NOT_ANSWERED = frozenset(
     (
         *("theta_2", "omega_2", "alpha_2", "condition", "drive_condition"),
-        *("torque_error", "force_error", "torque_low", "torque_high", "friction_residual", "power", *OF_LINE),
+        *("torque_error", "force_error", "torque_low", "torque_high", "friction_residual", "power", *LINE_QUANTITIES),
         *("v_A", "v_B", "v_G2", "v_G3", "v_G4"),
     )
 )

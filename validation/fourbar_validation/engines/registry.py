@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fourbar.errors import say_install
-from fourbar.quantities import OF_DRY_FRICTION, STAGE_OF, UNKNOWNS
+from fourbar.quantities import DRY_FRICTION_QUANTITIES, STAGE_OF, UNKNOWNS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Adapter, Answer
@@ -165,7 +165,7 @@ ENGINES = (
         "free-body",
         FreeBody,
         EQUIVALENCE,
-        (*COMPARED, *OF_DRY_FRICTION),
+        (*COMPARED, *DRY_FRICTION_QUANTITIES),
         positions=OF_A_POSITION,
         predictor=predict_from_data,
     ),
