@@ -244,6 +244,11 @@ class _Run:
         ahead, back = self._try_both_senses()
         self.dry = ahead != back
         self.start_energy = self._compute_kinetic_energy()
+        self.times = np.empty(0)
+        self.t, self.steps = 0.0, 0
+        self.stopped_at: float | None = None
+        self.drift = self.largest = 0.0
+        self.rows: list[tuple[float, ...]] = []
 
     def _compute_inertia(self, at: Position, k: Coefficients) -> Any:
         return sum(inertia(self.lengths.a, self.bodies, at, k))
@@ -313,63 +318,59 @@ class _Run:
         """Integrate over the times and report."""
         try:
             from scipy.integrate import DOP853
-            from scipy.optimize import brentq
         except ModuleNotFoundError:
             raise DependencyError(f"SciPy is needed for free motion: {say_install('studies')}") from None
-        rows: list[tuple[float, ...]] = []
-        t, end, steps, stopped = 0.0, float(times[-1]), 0, None
-        worst, largest = 0.0, self.start_energy
-
-        def report(upto: float, dense: Callable[[float], Array]) -> None:
-            while len(rows) < len(times) and times[len(rows)] <= upto:
-                rows.append(self._make_row(dense(float(times[len(rows)]))))
-
+        end = float(times[-1])
+        self.times, self.largest = times, self.start_energy
         moves = self._starts()
-        report(0.0, lambda _: self.y)
-        while t < end and stopped is None:
+        self._report(0.0, lambda _: self.y)
+        while self.t < end and self.stopped_at is None:
             if not moves:
-                report(end, lambda _: self.y)
+                self._report(end, lambda _: self.y)
                 break
-            solver = DOP853(self._compute_rates, t, self.y, end, rtol=SCIPY_LEAST, atol=ABSOLUTE)
+            solver = DOP853(self._compute_rates, self.t, self.y, end, rtol=SCIPY_LEAST, atol=ABSOLUTE)
             solver.rtol = RELATIVE
-            while solver.status == "running" and stopped is None:
-                steps += 1
-                message = solver.step()
-                if solver.status == "failed":
-                    raise FourBarError(f"the free motion cannot be continued beyond {t!r} s: {message}")
-                if steps > STEPS:
-                    allowed = f"this motion is followed for {STEPS} steps, here to {t:.6g} s; make it shorter"
-                    raise InputError("motion.free.duration", end, allowed)
-                dense, t_new, new = _Within(solver), solver.t, solver.y
-                rested = bool(self.side and self.side * new[1] < 0.0)
-                if rested:
-                    t_new = self._find_root(brentq, dense, lambda y: float(y[1]), solver.t_old, t_new)
-                    new = np.array([dense(t_new)[0], 0.0, dense(t_new)[2]])
-                if not self.follow and self.branch * self._compute_sine(new) < 0.0:  # through their common line
-                    stopped = t_new = self._find_root(brentq, dense, self._compute_sine, solver.t_old, t_new)
-                    new = dense(t_new)
-                report(t_new, dense)
-                t, self.y = t_new, np.array(new)
-                self._turn(self._at()[0])
-                energy = self._compute_kinetic_energy() - self.start_energy
-                worst = max(worst, abs(energy - float(self.y[2])))
-                largest = max(largest, abs(energy + self.start_energy), abs(float(self.y[2])))
-                if rested or self._change_over():
-                    moves = self._starts()
-                    break
-        theta_2, omega_2, alpha_2, branch, bar, *independent = np.array(rows).reshape(-1, 10).T
-        at = Command(theta_2, branch.astype(np.int8), omega_2, alpha_2, None, np.asarray(times[: len(rows)]))
-        at = at._replace(independent=Independent(bar.astype(np.int8), *independent))
-        return Released(at, worst / largest if largest else 0.0, stopped)
+            moves = self._follow_solver(solver)
+        theta_2, omega_2, alpha_2, branch, bar, *independent = np.array(self.rows).reshape(-1, 10).T
+        time = np.asarray(times[: len(self.rows)])
+        motion = Command(theta_2, branch.astype(np.int8), omega_2, alpha_2, None, time)
+        motion = motion._replace(independent=Independent(bar.astype(np.int8), *independent))
+        return Released(motion, self.drift / self.largest if self.largest else 0.0, self.stopped_at)
 
-    @staticmethod
-    def _find_root(
-        brentq: Any, dense: Callable[[float], Array], f: Callable[[Array], float], low: float, high: float
-    ) -> float:
-        """Find the time at which f of the state is zero; the start of the step where it is zero there already."""
-        if f(dense(low)) * f(dense(high)) >= 0.0:
-            return low
-        return float(brentq(lambda t: f(dense(t)), low, high, xtol=1e-15, rtol=1e-15))
+    def _follow_solver(self, solver: Any) -> bool:
+        """Take steps until the motion ends, or another solver is needed; return True if the linkage moves then."""
+        while solver.status == "running":
+            self.steps += 1
+            message = solver.step()
+            if solver.status == "failed":
+                raise FourBarError(f"the free motion cannot be continued beyond {self.t!r} s: {message}")
+            if self.steps > STEPS:
+                allowed = f"this motion is followed for {STEPS} steps, here to {self.t:.6g} s; make it shorter"
+                raise InputError("motion.free.duration", float(self.times[-1]), allowed)
+            dense, t, new = _Within(solver), solver.t, solver.y
+            rested = bool(self.side and self.side * new[1] < 0.0)
+            if rested:
+                t = _find_root(dense, lambda y: float(y[1]), solver.t_old, t)
+                new = np.array([dense(t)[0], 0.0, dense(t)[2]])
+            if not self.follow and self.branch * self._compute_sine(new) < 0.0:  # through their common line
+                self.stopped_at = t = _find_root(dense, self._compute_sine, solver.t_old, t)
+                new = dense(t)
+            self._report(t, dense)
+            self.t, self.y = t, np.array(new)
+            self._turn(self._at()[0])
+            energy = self._compute_kinetic_energy() - self.start_energy
+            self.drift = max(self.drift, abs(energy - float(self.y[2])))
+            self.largest = max(self.largest, abs(energy + self.start_energy), abs(float(self.y[2])))
+            if rested or self._change_over():
+                return self._starts()
+            if self.stopped_at is not None:
+                break
+        return True
+
+    def _report(self, until: float, dense: Callable[[float], Array]) -> None:
+        """Report the instants up to a time, from the motion as a function of time."""
+        while len(self.rows) < len(self.times) and self.times[len(self.rows)] <= until:
+            self.rows.append(self._make_row(dense(float(self.times[len(self.rows)]))))
 
     def _compute_sine(self, y: Array) -> float:
         """sin(theta_4 - theta_3), or that of the bar that was released: zero at its limits."""
@@ -391,6 +392,15 @@ class _Run:
         side = (self.side or self.holding) if self.dry and rate == 0.0 else 0.0
         independent = (float(self.reading.bar), q, rate, growth, self.reading.branch(q), side)
         return theta_2, float(moving.omega_2), float(moving.alpha_2), branch, *independent
+
+
+def _find_root(dense: Callable[[float], Array], f: Callable[[Array], float], low: float, high: float) -> float:
+    """Find the time at which f of the motion is zero; the start of the step where it is zero there already."""
+    from scipy.optimize import brentq
+
+    if f(dense(low)) * f(dense(high)) >= 0.0:
+        return low
+    return float(brentq(lambda t: f(dense(t)), low, high, xtol=1e-15, rtol=1e-15))
 
 
 class _Within:
