@@ -46,7 +46,7 @@ WINDOW = 1.3
 Points = NDArray[np.float64]
 FINE = 401
 """Stations along a bar."""
-NO_POSITIONS = "they have a value at none of the positions"
+NOWHERE = "they have a value at none of the positions"
 SHOWN = 0.02
 """Forces below this share of the largest would be shorter than their head: named in the caption only."""
 
@@ -175,7 +175,7 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
     panels = figure.subplots(3, 3, sharex="col")
     bending = locate_bending(view.scene, locate_between(view.scene, view.sweep))
     if not bending:
-        raise InputError("figure", "bars", f"needs forces, and {NO_POSITIONS}")
+        raise InputError("figure", "bars", f"needs forces, and {NOWHERE}")
     for column, (bar, worst) in zip(panels.T, bending.items(), strict=True):
         x = np.linspace(0.0, view.scene.linkage.bar(bar).length, FINE)
         forces = internal_forces(view.scene, worst.solution, bar, x)

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from fourbar.quantities import (
     COUPLE,
+    DRY_FRICTION_QUANTITIES,
     FORCES,
     JAMMED,
     LINE,
-    DRY_FRICTION_QUANTITIES,
     LINE_QUANTITIES,
-    PIN_LOAD_QUANTITIES,
     OK,
     OVERFLOW,
+    PIN_LOAD_QUANTITIES,
     SINGULAR,
     STAGE_OF,
     STATUS_NAMES,

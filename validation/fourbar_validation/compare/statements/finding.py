@@ -19,7 +19,7 @@ Place = tuple[float, int]
 """theta_2 (rad) and branch."""
 Seen = Mapping[Place, Mapping[str, float]]
 """Values that an engine finds at some places."""
-SCALAR_FORMULAS = [name for name in UNKNOWNS if name not in FORCES]
+OF_BARS = [name for name in UNKNOWNS if name not in FORCES]
 
 
 class Finding(NamedTuple):
@@ -50,7 +50,7 @@ def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
     scene = Scene(FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0))
     theta_2, branch = (np.array(column) for column in zip(*each, strict=True))
     answer = require_answer(engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)).quantities
-    names = [name for name in SCALAR_FORMULAS if name in answer]
+    names = [name for name in OF_BARS if name in answer]
     return {place: {name: float(answer[name][i]) for name in names} for i, place in enumerate(each)}
 
 
