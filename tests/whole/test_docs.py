@@ -281,6 +281,13 @@ def test_the_page_of_the_commands_lists_each_and_its_reference_describes_every_o
     assert "None |" not in reference
 
 
+@pytest.mark.parametrize("package", ["fourbar", "fourbar_validation"])
+def test_the_architecture_names_every_layer_and_no_other(package: str) -> None:
+    table = read("docs/architecture.md").partition(f"\n## {package}\n\n")[2].partition("\n\n")[0]
+    listed = [name for row in table.splitlines()[2:] for name in re.findall(r"`(\w+)/?`", row.split("|")[1])]
+    assert sorted(listed) == sorted(runpy.run_path(str(DOCS / "architecture.py"))["uses"](package))
+
+
 def test_the_figure_of_the_theory_is_the_one_that_is_drawn() -> None:
     assert read("docs/theory.svg") == runpy.run_path(str(DOCS / "theory.py"))["text"]()
 

@@ -214,6 +214,16 @@ def test_the_guide_names_every_file_that_names_every_effect() -> None:
     assert not [name for name in files if name not in NEED_NO_LINE and name.removeprefix("validation/") not in PAGE]
 
 
+def test_each_name_that_the_guide_places_in_a_file_is_there() -> None:
+    root = Path(__file__).parents[2]
+    places = re.findall(r"`(\w+)`(?: \w+)? (?:in|of) `([\w/]+\.\w+)`", PAGE + QUANTITY)
+    assert len(places) > 9
+    for name, file in places:
+        folder = root / ("validation" if file.startswith("fourbar_v") else "")
+        path = root / "validation" / "fourbar_validation" / file if file.startswith("run/") else folder / file
+        assert re.search(rf"\b{name}\b", path.read_text(encoding="utf-8")), (name, file)
+
+
 def test_the_places_that_the_guide_to_a_quantity_names_are_there() -> None:
     root = Path(__file__).parents[2]
     files = set(re.findall(r"`((?:fourbar|fourbar_validation|docs|tests)/[\w/-]+\.\w+)`", QUANTITY))
