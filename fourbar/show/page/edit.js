@@ -117,7 +117,7 @@ function show(about, own) {
   if (about.data.summary) byId("summary").replaceChildren(...about.data.summary.map(line => {
     const shown = document.createElement("div");
     shown.textContent = line || "\u00a0";
-    if (line.includes("  ")) shown.className = "columns";
+    if (/\S {2,}\S.* {2,}\S/.test(line)) shown.className = "columns";   // a table; other lines break
     return shown;
   }));
   if (about.saved !== undefined) say(about.saved ? `${fileName} is saved` : `${fileName}: not saved yet; kept in ${fileName}.edit`);
