@@ -14,8 +14,8 @@ from fourbar.effects import Load, list_kinds
 from fourbar.errors import InputError
 from fourbar.files.scene_file import THROUGH
 from fourbar.files.scene_text import BRANCHES
-from fourbar.linkage import PINS, Bar
-from fourbar.scene.motion import SPLINES
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, REQUIRED, Bar
+from fourbar.scene.motion import COMMANDS, SPLINES, STROKE_COMMAND, Motion
 from fourbar.scene.point import Point
 from fourbar.scene.stroke import SIDES
 
@@ -25,26 +25,60 @@ WORDS = {
     "frame": ["world", "bar"],
 }
 """Entries that are one of a few words."""
+EXAMPLES = {"m": "50 mm", "kg": "0.2 kg", "kg m^2": "2 kg cm^2"}
+"""Examples of the numbers of a bar by their SI unit."""
+MOVING = {
+    **{"rad": "60 deg", "rad/s": "10 rad/s", "rad/s^2": "0 rad/s^2"},
+    **{"m": "500 mm", "m/s": "100 mm/s", "m/s^2": "0 mm/s^2"},
+}
+"""Examples of what is commanded, likewise."""
 LONGEST_TEXT = 10_000
 """Characters of one entry."""
 
 
 @cache
 def list_offers() -> dict[str, Any]:
-    """List empty fields, parts that can be added, words to choose from, and the names of what pairs consist of."""
-    declared = {name: number for kind in (Bar, Point, Load) for name, number in kind.numbers.items() if number.pair}
-    pairs = {name: ["distance" if number.unit == "m" else "size", "angle"] for name, number in declared.items()}
-    found = tomllib.loads(files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8"))
+    """List what the declarations of a scene's numbers and effects let a page offer.
+
+    `fields`: empty fields with an example; `commands`: what can be commanded, with its fields; `parts`: what a button
+    adds; `words`: what an entry is one of; `bars`: their names; `pairs`: the names of what pairs consist of.
+    """
+    offers = tomllib.loads(files("fourbar.edit").joinpath("offers.toml").read_text(encoding="utf-8"))
+    parts, pairs = offers["parts"], dict[str, list[str]]()
+    for kind in (Bar, Point, Load):
+        for name, number in kind.numbers.items():
+            if number.pair:
+                pairs[name] = ["distance" if number.unit == "m" else "size", "angle"]
+    for bar in (BAR_NAMES[number] for number in MOVING_BARS):
+        for name, number in Bar.numbers.items():
+            if number.pair:
+                parts.append({"at": ["bars", bar, name], "value": [EXAMPLES[number.unit], "0 deg"]})
+            elif number.left_out is not REQUIRED:
+                offers["fields"].setdefault("bars", {}).setdefault(bar, {})[name] = EXAMPLES[number.unit]
     for key, effect in list_kinds().items():
         value = tomllib.loads(effect.example)[key]
-        found["parts"].append({"at": ["effects", key], "value": value})
+        parts.append({"at": ["effects", key], "value": value})
         if isinstance(value, dict) and set(value) <= set(PINS):
-            found["parts"] += [{"at": ["effects", key, pin], "value": next(iter(value.values()))} for pin in PINS]
+            parts += [{"at": ["effects", key, pin], "value": next(iter(value.values()))} for pin in PINS]
         elif isinstance(value, list) and isinstance(value[0], str):
             pairs[key] = [*effect.numbers]
         elif isinstance(value, list):
-            found["parts"].append({"at": ["effects", key, -1], "label": "another", "value": value[0]})
-    return found | {"words": WORDS, "pairs": pairs}
+            parts.append({"at": ["effects", key, -1], "label": "another", "value": value[0]})
+    bars = {number: f"{number} {name}" for number, name in BAR_NAMES.items()}
+    return offers | {"commands": _offer_commands(), "words": WORDS, "pairs": pairs, "bars": bars}
+
+
+def _offer_commands() -> dict[str, Any]:
+    """List what can be commanded by its name: label, and the fields that apply to it."""
+    angles = {
+        names: (f"angle \u03b8{chr(0x2080 + bar)} of the {BAR_NAMES[bar]}", {"branch": "open", "through": "sign"})
+        for bar, names in COMMANDS.items()
+    }
+    commands = angles | {STROKE_COMMAND: ("stroke of the cylinder", {"side": "left", "branch": "open"})}
+    return {
+        names[0]: {"label": label, "fields": {name: MOVING[Motion.numbers[name].unit] for name in names} | words}
+        for names, (label, words) in commands.items()
+    }
 
 
 class SceneDocument:

@@ -11,11 +11,10 @@ function labelOf(path) {
   const key = path[path.length - 1], holder = path[path.length - 2];
   return offers.pairs[holder]?.[key] ?? (typeof key === "number" ? `${nameOfKey(holder).replace(/s$/, "")} ${key + 1}` : nameOfKey(key));
 }
-const BARS = { 1: "1 ground", 2: "2 input", 3: "3 coupler", 4: "4 output" };
 // What an entry can be, as rows of value and name; undefined where it is not one of a few.
 function choicesOf(path) {
   const key = path[path.length - 1], moving = path[0] === "loads" || path[1] === "flywheel" || path[0] === "drive" && path.length === 2;
-  if (key === "bar") return Object.entries(BARS).slice(moving ? 1 : 0);
+  if (key === "bar") return Object.entries(offers.bars).slice(moving ? 1 : 0);
   return offers.words[key]?.map(word => [word, word]);
 }
 // What is commanded: theta_2 to theta_4, or the stroke of a cylinder.
