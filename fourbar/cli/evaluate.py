@@ -194,12 +194,12 @@ def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
     from fourbar.studies.derivatives import sensitivity
 
     with given.open_scene(scene) as stated:
-        found = sensitivity(stated)
-    if not found.solution.assembled.any():
+        derivatives = sensitivity(stated)
+    if not derivatives.solution.assembled.any():
         raise NotAssembledError(
             f"{scene}: motion.{stated.motion.commanded}: the linkage assembles at none of the positions"
         )
-    given.print_to((write_sensitivity_json if as_json else write_sensitivity)(found), out)
+    given.print_to((write_sensitivity_json if as_json else write_sensitivity)(derivatives), out)
 
 
 @click.command()
@@ -220,18 +220,21 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units:
     if out is not None:
         format_of(out)
     with given.open_scene(scene) as stated, show_running("samples are solved") as progress:
-        found = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
-    if (found.without == found.samples).all():
+        spreads = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
+    if (spreads.without == spreads.samples).all():
         raise NotAssembledError(
             f"{scene}: motion.{stated.motion.commanded}: the linkage assembles at none of the positions"
         )
     if out is not None:
-        draw_tolerances(found, out, units)
+        draw_tolerances(spreads, out, units)
     if as_json:
-        given.print_to(shown.write_json(found), None)
+        given.print_to(shown.write_json(spreads), None)
     else:
-        own = {**DEGREES, **units}
-        given.print_to(write_table(stated.title, shown.write_heading(found, own), shown.make_table(found, own)), None)
+        conversion = {**DEGREES, **units}
+        given.print_to(
+            write_table(stated.title, shown.write_heading(spreads, conversion), shown.make_table(spreads, conversion)),
+            None,
+        )
 
 
 def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
@@ -259,8 +262,8 @@ def extremes(scene: Path, quantities: tuple[str, ...], as_json: bool, units: Con
 
     _refuse_units_of_json(as_json, units)
     with given.open_scene(scene) as stated, show_running("pieces of the interval are halved"):
-        found = proven(stated, quantities)
-    text = write_extremes_json(stated, found) if as_json else write_extremes(stated, found, {**DEGREES, **units})
+        proof = proven(stated, quantities)
+    text = write_extremes_json(stated, proof) if as_json else write_extremes(stated, proof, {**DEGREES, **units})
     given.print_to(text, out)
 
 
@@ -275,5 +278,5 @@ def equilibrium(scene: Path, as_json: bool, out: Path | None) -> None:
     from fourbar.studies.equilibrium import equilibrium as found
 
     with given.open_scene(scene) as described, show_running("the boxes are halved"):
-        result = found(described)
-    given.print_to((write_equilibria_json if as_json else write_equilibria)(described.title, result), out)
+        rest = found(described)
+    given.print_to((write_equilibria_json if as_json else write_equilibria)(described.title, rest), out)

@@ -46,8 +46,8 @@ def plot(
         unit, likely = ("rad", "deg") if described.motion.stroke is None else ("m", "mm")
         if position is not None and given.is_bare(position):  # it may have been meant in any unit
             raise InputError("--position", position, f'the unit is missing; did you mean "{position} {likely}"?')
-        at = None if position is None else given.read_number("--position", position, unit)
-        draw(described, out, figure, position=at, branches=branches, units=units, dimensions=dimensions)
+        place = None if position is None else given.read_number("--position", position, unit)
+        draw(described, out, figure, position=place, branches=branches, units=units, dimensions=dimensions)
 
 
 @click.command()

@@ -100,13 +100,13 @@ class SceneDocument:
 
     def at(self, path: Path) -> Any:
         """Return the entry at a path of keys and indices; None where there is none."""
-        found: Any = self.tree
+        entry: Any = self.tree
         for step in path:
             try:
-                found = found[step]
+                entry = entry[step]
             except (KeyError, IndexError, TypeError, TOMLKitError):
                 return None
-        return found
+        return entry
 
     def set(self, path: Path, text: str) -> None:
         """State one entry as it is typed: a text, or a number where the file has one; an empty text takes it away."""
@@ -147,9 +147,9 @@ class SceneDocument:
             self.remove(into)
 
     def _find_holder(self, path: Path) -> Any:
-        found = self.at(path)
-        if found is not None:
-            return found
+        holder = self.at(path)
+        if holder is not None:
+            return holder
         if path == ["loads"]:
             made: Item = tomlkit.aot()
         else:

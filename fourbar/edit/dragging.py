@@ -47,30 +47,30 @@ class Handle(NamedTuple):
 
 def list_handles(scene: Scene, document: dict[str, Any]) -> list[Handle]:
     """List everything that can be dragged: mass centres, points, loads, and the ends of what acts on a line."""
-    found = [
+    handles = [
         Handle(f"mass centre of {name}", ("bars", name, "centre"), n, 0j, scene.linkage.bar(n).to_centre)
         for n, name in BAR_NAMES.items()
         if n in MOVING_BARS and scene.linkage.bar(n).mass > 0.0
     ]
     for point in scene.points:
         path = ("points", point.name, "from_pin")
-        found.append(Handle(f"point {point.name}", path, point.bar, 0j, cmath.rect(*point.from_pin)))
+        handles.append(Handle(f"point {point.name}", path, point.bar, 0j, cmath.rect(*point.from_pin)))
     for n, load in enumerate(scene.loads):
         if load.force is not None:
             foot, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
             force = ("loads", n, "force")
-            found.append(
+            handles.append(
                 Handle(f"load {n + 1}", ("loads", n, "at"), load.bar, foot, cmath.rect(*load.at), turns, force)
             )
     lines: list[tuple[tuple[str | int, ...], Any]] = [(("drive",), document.get("drive", {}))]
     lines += [(("effects", "springs", n), s) for n, s in enumerate(document.get("effects", {}).get("springs", []))]
     for path_of, entry in lines:
         for end in ("from", "to"):
-            if isinstance(own := entry.get(end), dict):
-                z = parse_place(own.get("at", ("0 m", "0 rad")))
+            if isinstance(place := entry.get(end), dict):
+                z = parse_place(place.get("at", ("0 m", "0 rad")))
                 name = f"{end} of {path_of[-2:][0]} {path_of[-1] + 1 if isinstance(path_of[-1], int) else ''}".strip()
-                found.append(Handle(name, (*path_of, end, "at"), own["bar"], 0j, z))
-    return found
+                handles.append(Handle(name, (*path_of, end, "at"), place["bar"], 0j, z))
+    return handles
 
 
 class Dragged(NamedTuple):
@@ -89,51 +89,51 @@ class Dragged(NamedTuple):
     """Length of an arrow relative to the length that it is drawn with."""
 
 
-def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], given: Dragged) -> None:
+def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], dragged: Dragged) -> None:
     """Change the numbers of the file for a drag that began in `scene`, whose entries are `plain`.
 
     Raises InputError where nothing of that name can be dragged, or the linkage does not assemble there.
     """
-    where = Command(np.array([given.theta_2]), np.array([given.branch], dtype=np.int8), None, 0.0)
-    at = solve(scene, "position", at=where)
-    pins = {"O2": 0j, "A": complex(*at.A[0]), "B": complex(*at.B[0])}
+    position = Command(np.array([dragged.theta_2]), np.array([dragged.branch], dtype=np.int8), None, 0.0)
+    shown = solve(scene, "position", at=position)
+    pins = {"O2": 0j, "A": complex(*shown.A[0]), "B": complex(*shown.B[0])}
     pins["O4"] = cmath.rect(scene.linkage.ground, scene.linkage.ground_angle)
-    if isinstance(given.what, str):
-        _drag_pin(document, given, pins)
+    if isinstance(dragged.what, str):
+        _drag_pin(document, dragged, pins)
         return
-    turned = {1: scene.linkage.ground_angle, 2: given.theta_2, 3: float(at.theta_3[0]), 4: float(at.theta_4[0])}
+    turned = {1: scene.linkage.ground_angle, 2: dragged.theta_2, 3: float(shown.theta_3[0]), 4: float(shown.theta_4[0])}
     if not all(map(cmath.isfinite, (*pins.values(), *turned.values()))):
-        raise InputError("theta_2", given.theta_2, "is no position of the linkage")
+        raise InputError("theta_2", dragged.theta_2, "is no position of the linkage")
     for handle in list_handles(scene, plain):
         frame = cmath.rect(1.0, turned[handle.bar])
         foot = pins[{1: "O2", 2: "O2", 3: "A", 4: "O4"}[handle.bar]] + frame * handle.at
         own_frame = frame if handle.turns else 1.0 + 0.0j
-        if list(handle.path) == given.what:
-            pair = (given.to - foot) / own_frame
-            put_place(document, handle.path, pair, given.grain)
+        if list(handle.path) == dragged.what:
+            pair = (dragged.to - foot) / own_frame
+            put_place(document, handle.path, pair, dragged.grain)
             return
-        if handle.force is not None and list(handle.force) == given.what:
-            arrow = (given.to - foot - own_frame * handle.beyond) / own_frame
+        if handle.force is not None and list(handle.force) == dragged.what:
+            arrow = (dragged.to - foot - own_frame * handle.beyond) / own_frame
             size = str(plain["loads"][handle.force[1]]["force"][0])
             unit = find_unit(size, "N")
-            force = to_si(size, unit) * given.stretch
+            force = to_si(size, unit) * dragged.stretch
             angle = cmath.phase(arrow) + (0.0 if force >= 0.0 else math.pi)
             document.put((*handle.force, 0), write_rounded(force, abs(force) / 50.0, unit))
             document.put((*handle.force, 1), _write_angle(document.at((*handle.force, 1)), angle, 0.02))
             return
-    raise InputError("drag", given.what, "is nothing that can be dragged")
+    raise InputError("drag", dragged.what, "is nothing that can be dragged")
 
 
-def _drag_pin(document: SceneDocument, given: Dragged, pins: dict[str, complex]) -> None:
-    if given.what not in PINS:
-        raise InputError("drag", given.what, "must be one of " + ", ".join(PINS))
-    of = {"A": {"input": "O2"}, "B": {"coupler": "A", "output": "O4"}, "O4": {"ground": "O2"}}[str(given.what)]
-    for bar, pin in of.items():
+def _drag_pin(document: SceneDocument, dragged: Dragged, pins: dict[str, complex]) -> None:
+    if dragged.what not in PINS:
+        raise InputError("drag", dragged.what, "must be one of " + ", ".join(PINS))
+    lengths = {"A": {"input": "O2"}, "B": {"coupler": "A", "output": "O4"}, "O4": {"ground": "O2"}}[str(dragged.what)]
+    for bar, pin in lengths.items():
         key = ("lengths", bar)
-        document.put(key, _write_like(document.at(key), abs(given.to - pins[pin]), given.grain, "m", "m"))
-    if given.what == "O4":
-        angle, key = cmath.phase(given.to), ("lengths", "ground_angle")
-        document.put(key, _write_angle(document.at(key), angle, given.grain / max(abs(given.to), given.grain)))
+        document.put(key, _write_like(document.at(key), abs(dragged.to - pins[pin]), dragged.grain, "m", "m"))
+    if dragged.what == "O4":
+        angle, key = cmath.phase(dragged.to), ("lengths", "ground_angle")
+        document.put(key, _write_angle(document.at(key), angle, dragged.grain / max(abs(dragged.to), dragged.grain)))
 
 
 def parse_place(stated: Any) -> complex:
@@ -156,14 +156,14 @@ def put_place(document: SceneDocument, path: Path, place: complex, grain: float,
             name: _write_like(document.at((*path, name)) or length, x, grain, "m", "m")
             for name, x in (("x", place.real), ("y", place.imag))
         }
-        whole: Any = parts
+        stated: Any = parts
     else:
         size, old_angle = abs(place), document.at((*path, 1)) if before == "polar" else None
         angle = _write_angle(old_angle, cmath.phase(place), grain / max(size, grain))
         parts = {0: _write_like(length, size, grain, "m", "m"), 1: angle}
-        whole = list(parts.values())
+        stated = list(parts.values())
     if old is None or (by or before) != before:
-        document.put(path, whole)
+        document.put(path, stated)
     else:
         for step, text in parts.items():
             document.put((*path, step), text)

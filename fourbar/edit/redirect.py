@@ -69,9 +69,9 @@ class Redirect:
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             if self.path.exists() and (
-                found := ADDRESS.search(self.path.read_text(encoding="utf-8", errors="replace"))
+                address := ADDRESS.search(self.path.read_text(encoding="utf-8", errors="replace"))
             ):
-                return found[1]
+                return address[1]
             time.sleep(0.05)
         raise InputError("scene file", str(self.scene), f"is open in another workbench, and {self.path} has no address")
 

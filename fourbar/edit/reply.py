@@ -31,8 +31,8 @@ def evaluate_scene(
     Raises NotAssembledError where no position assembles, InputError as `solve` does.
     """
     stage = find_last_stage(scene) if settled else None
-    own = solve(scene, stage)
-    if not own.assembled.any():
+    solution = solve(scene, stage)
+    if not solution.assembled.any():
         raise NotAssembledError("motion.theta_2: the linkage assembles at none of the positions requested")
     data = collect_live_data(scene, units, stage=stage, midway=True) | {
         "tolerances": None,
@@ -41,7 +41,7 @@ def evaluate_scene(
     }
     data["handles"] = [handle.drawn() for handle in list_handles(scene, plain)]
     if settled:  # what `analyze` and `classify` print
-        block = write_block(scene, own, {**COMMON, **units}, pressure=pressure)
+        block = write_block(scene, solution, {**COMMON, **units}, pressure=pressure)
         data["summary"] = [*block, "", *write_type(scene.linkage, everything=True)]
     return data
 
@@ -53,11 +53,11 @@ def pack_frame(about: dict[str, Any]) -> bytes:
     if "data" in about:
         branches: dict[str, dict[str, Any]] = {}
         for sign, table in about["data"]["branches"].items():
-            branches[sign] = {name: each for name, each in table.items() if not isinstance(each, np.ndarray)}
-            for name, each in table.items():
-                if isinstance(each, np.ndarray):
-                    columns.append((sign, name, len(each), each.ndim))
-                    arrays.append(np.ascontiguousarray(each, dtype="<f8").tobytes())
+            branches[sign] = {name: column for name, column in table.items() if not isinstance(column, np.ndarray)}
+            for name, column in table.items():
+                if isinstance(column, np.ndarray):
+                    columns.append((sign, name, len(column), column.ndim))
+                    arrays.append(np.ascontiguousarray(column, dtype="<f8").tobytes())
         about = about | {"data": about["data"] | {"branches": branches}, "columns": columns}
     text = json.dumps(about, allow_nan=False, separators=(",", ":")).encode()
     text += b" " * (-(len(text) + 4) % 8)

@@ -176,9 +176,9 @@ class Workbench:
         if scene.tolerances:
             with suppress(FourBarError):
                 places = data["over"]["values"] or data["theta_2"]
-                found = await self.loop.run_in_executor(self.aside, collect_tolerances, scene, places, give_up)
+                spreads = await self.loop.run_in_executor(self.aside, collect_tolerances, scene, places, give_up)
                 if state is self.session.now:
-                    self.tell({"tolerances": found})
+                    self.tell({"tolerances": spreads})
 
     async def serve(self, port: int, redirect: Redirect | None = None, *, browse: bool = False) -> None:
         """Serve until all pages have gone, or until Ctrl-C; `redirect` leads browsers and other servers here."""
@@ -187,12 +187,12 @@ class Workbench:
         except (OSError, OverflowError) as error:
             raise InputError("--port", port, f"cannot be listened to: {error}") from None
         listening.setblocking(False)
-        own = listening.getsockname()[1]
-        self.entrance = Entrance(make_application(self, own), listening)
+        own_port = listening.getsockname()[1]
+        self.entrance = Entrance(make_application(self, own_port), listening)
         for name in (signal.SIGINT, signal.SIGTERM):
             with suppress(NotImplementedError):  # Windows: KeyboardInterrupt
                 self.loop.add_signal_handler(name, self.ended.set)
-        address = f"http://{LOOPBACK}:{own}/{self.session.token}/"
+        address = f"http://{LOOPBACK}:{own_port}/{self.session.token}/"
         self.one.submit(self._keep)
         self.address.set_result(address)
         if redirect is not None:
@@ -364,10 +364,10 @@ class PageLine(WebSocketHandler, Guarded):
 
 def make_application(bench: Workbench, port: int) -> Application:
     """Make the application of a workbench that listens at a port."""
-    known = {"bench": bench, "hosts": frozenset(f"{name}:{port}" for name in (LOOPBACK, "localhost"))}
+    served = {"bench": bench, "hosts": frozenset(f"{name}:{port}" for name in (LOOPBACK, "localhost"))}
     routes = {"": Page, "report": Report, "live": PageLine}
     return Application(
-        [(rf"/(?P<token>[A-Za-z0-9_-]+)/{place}", handler, known) for place, handler in routes.items()],
+        [(rf"/(?P<token>[A-Za-z0-9_-]+)/{place}", handler, served) for place, handler in routes.items()],
         log_function=lambda handler: None,
         websocket_max_message_size=LARGEST_REQUEST,
         websocket_ping_interval=20.0,

@@ -250,25 +250,25 @@ def _add(session: Session, asked: dict[str, Any]) -> None:
     path = [name if step == "" else step for step in part["at"]]
     value = part["value"]
     if path[0] == "tolerances":
-        known = list_entries(session.now.scene)
-        if name in known:  # a thousandth of the number, until the designer says more
-            size = abs(float(read_place(session.now.scene, known[name].place) or 1.0)) / 1000.0
-            value = f"{size:.1g} {known[name].unit}"
-    session.change(lambda of: of.put(path, value))
+        entries = list_entries(session.now.scene)
+        if name in entries:  # a thousandth of the number, until the designer says more
+            size = abs(float(read_place(session.now.scene, entries[name].place) or 1.0)) / 1000.0
+            value = f"{size:.1g} {entries[name].unit}"
+    session.change(lambda document: document.put(path, value))
     session.document = SceneDocument(session.now.text)
 
 
 def _remove(session: Session, asked: dict[str, Any]) -> None:
-    session.change(lambda of: of.remove(asked["path"]))
+    session.change(lambda document: document.remove(asked["path"]))
     session.document = SceneDocument(session.now.text)
 
 
 def _drag(session: Session, asked: dict[str, Any]) -> None:
     numbers = {name: float(asked[name]) for name in ("grain", "theta_2", "stretch") if name in asked}
-    given = Dragged(asked["what"], complex(*map(float, asked["to"])), branch=int(asked["branch"]), **numbers)
+    dragged = Dragged(asked["what"], complex(*map(float, asked["to"])), branch=int(asked["branch"]), **numbers)
     gesture = str(asked.get("gesture", ""))
     from_state = session.base if gesture and gesture == session.gesture else session.now
-    session.change(lambda of: drag(of, from_state.scene, from_state.plain, given), gesture)
+    session.change(lambda document: drag(document, from_state.scene, from_state.plain, dragged), gesture)
 
 
 def _write_text(session: Session, asked: dict[str, Any]) -> None:
@@ -362,7 +362,7 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
             (float(np.nan_to_num(np.abs(np.exp(1j * pose) - np.exp(1j * wanted)).sum(), nan=np.inf)), document.text())
         )
     text = min(tried)[1]
-    session.change(lambda of: of.become(text))
+    session.change(lambda changed: changed.become(text))
 
 
 def _find_monotone(values: Any) -> tuple[int, int]:
@@ -385,7 +385,7 @@ def _restate(session: Session, asked: dict[str, Any]) -> None:
     if by not in ("xy", "polar") or stated is None:
         raise InputError(name_entry(path), by, 'must be stated by "xy" or "polar"')
     place = parse_place(stated)
-    session.change(lambda of: put_place(of, path, place, 1e-6 * abs(place), by))
+    session.change(lambda document: put_place(document, path, place, 1e-6 * abs(place), by))
     session.document = SceneDocument(session.now.text)
 
 

@@ -19,24 +19,24 @@ MOST_SPRINGS = 1000
 def read_effect(key: str, value: object, read: Reader) -> "Effect":
     """Read an effect from the value under its key."""
     kind: Any = kinds.list_kinds()[key]
-    own = f"effects.{key}"
+    path = f"effects.{key}"
     if kind is kinds.Gravity:
-        return kinds.Gravity(*read.polar(own, value, kind.numbers["magnitude"].unit))
+        return kinds.Gravity(*read.polar(path, value, kind.numbers["magnitude"].unit))
     if kind is kinds.Springs:
-        return _read_springs(own, value, read)
+        return _read_springs(path, value, read)
     if issubclass(kind, PinRows):
         rows = []
-        for pin, entry in read.table(own, value, PINS).items():
-            given = {"": entry} if "" in kind.numbers else read.table(f"{own}.{pin}", entry, kind.numbers)
-            rows.append((pin, *read.numbers(f"{own}.{pin}", given, kind.numbers).values()))
+        for pin, entry in read.table(path, value, PINS).items():
+            stated = {"": entry} if "" in kind.numbers else read.table(f"{path}.{pin}", entry, kind.numbers)
+            rows.append((pin, *read.numbers(f"{path}.{pin}", stated, kind.numbers).values()))
         return kind(tuple(rows))  # type: ignore[no-any-return]
     bars = {field.name: field.default for field in fields(kind) if field.name == "bar"}
-    given = read.table(own, value, (*bars, *kind.numbers))
+    stated = read.table(path, value, (*bars, *kind.numbers))
     bar = {
-        name: read.whole(f"{own}.{name}", given.get(name, None if default is MISSING else default), 2, 4)
+        name: read.whole(f"{path}.{name}", stated.get(name, None if default is MISSING else default), 2, 4)
         for name, default in bars.items()
     }
-    return kind(**bar, **read.numbers(own, given, kind.numbers))  # type: ignore[no-any-return]
+    return kind(**bar, **read.numbers(path, stated, kind.numbers))  # type: ignore[no-any-return]
 
 
 def write_effect(effect: "Effect") -> Any:
@@ -50,7 +50,10 @@ def write_effect(effect: "Effect") -> Any:
     if isinstance(effect, PinRows):
         rows = {}
         for pin, *values in effect.rows:
-            texts = {name: write_declared(x, of) for (name, of), x in zip(effect.numbers.items(), values, strict=True)}
+            texts = {
+                name: write_declared(x, declared)
+                for (name, declared), x in zip(effect.numbers.items(), values, strict=True)
+            }
             rows[pin] = texts.get("", texts)
         return rows
     bar = {"bar": effect.bar} if hasattr(effect, "bar") else {}
@@ -63,30 +66,30 @@ def _read_springs(key: str, value: object, read: Reader) -> "Springs":
         raise read.refuse(key, value, f"must be a list of 1 to {MOST_SPRINGS} springs")
     springs = []
     for index, entry in enumerate(value):
-        own = f"{key}[{index}]"
-        given = read.table(own, entry, ("from", "to", *kinds.Spring.numbers, "gas"))
-        start, end = read_ends(read, own, given)
-        if gas := "gas" in given:
-            read.table(own, entry, ("from", "to", "gas"))
-            words = read.table(f"{own}.gas", given["gas"], GAS)
-            stated = read.numbers(f"{own}.gas", {"compressed_force": words.get("extended_force"), **words}, GAS)
+        path = f"{key}[{index}]"
+        row = read.table(path, entry, ("from", "to", *kinds.Spring.numbers, "gas"))
+        start, end = read_ends(read, path, row)
+        if gas := "gas" in row:
+            read.table(path, entry, ("from", "to", "gas"))
+            words = read.table(f"{path}.gas", row["gas"], GAS)
+            stated = read.numbers(f"{path}.gas", {"compressed_force": words.get("extended_force"), **words}, GAS)
         else:
-            stated = read.numbers(own, given, kinds.Spring.numbers)
+            stated = read.numbers(path, row, kinds.Spring.numbers)
         try:
             springs.append(kinds.Spring.gas(start, end, **stated) if gas else kinds.Spring(start, end, **stated))
         except InputError as error:  # which knows of one spring alone
-            raise read.refuse(error.key.replace(key, own), error.value, error.allowed) from None
+            raise read.refuse(error.key.replace(key, path), error.value, error.allowed) from None
     return kinds.Springs(tuple(springs))
 
 
-def read_ends(read: Reader, key: str, given: dict[str, Any]) -> "tuple[SpringEnd, SpringEnd]":
+def read_ends(read: Reader, key: str, row: dict[str, Any]) -> "tuple[SpringEnd, SpringEnd]":
     """Read the entries `from` and `to` of a line between two bars; an end without `at` is at the bar's first pin."""
     ends = []
     for name in ("from", "to"):
-        own = f"{key}.{name}"
-        entry = read.table(own, given.get(name), ("bar", "at"))
-        bar = read.whole(f"{own}.bar", entry.get("bar"), 1, 4)
-        ends.append(kinds.SpringEnd(bar, *read.declared(f"{own}.at", entry.get("at"), END_POSITION)))
+        path = f"{key}.{name}"
+        entry = read.table(path, row.get(name), ("bar", "at"))
+        bar = read.whole(f"{path}.bar", entry.get("bar"), 1, 4)
+        ends.append(kinds.SpringEnd(bar, *read.declared(f"{path}.at", entry.get("at"), END_POSITION)))
     return ends[0], ends[1]
 
 

@@ -111,15 +111,15 @@ class Reader:
     def polar(self, key: str, value: object, unit: str) -> tuple[float, float]:
         """Read a pair [magnitude, angle], in `unit` and rad; that of a place may be { x, y } instead."""
         if isinstance(value, dict) and unit == "m" and self.COORDINATES:
-            given = self.table(key, value, ("x", "y"))
-            x, y = (self.quantity(f"{key}.{name}", given.get(name), unit) for name in "xy")
+            entry = self.table(key, value, ("x", "y"))
+            x, y = (self.quantity(f"{key}.{name}", entry.get(name), unit) for name in "xy")
             if not math.isfinite(math.hypot(x, y)):
                 raise self.refuse(key, value, "must be a finite distance away")
             self.coordinates[key] = x, y
             return convert_to_polar(x, y)
         if not isinstance(value, list) or len(value) != 2:
-            other = self.COORDINATES.format(unit) if unit == "m" else ""
-            raise self.refuse(key, value, f"must be a pair like {self.POLAR.format(unit)} {other}".strip())
+            form = self.COORDINATES.format(unit) if unit == "m" else ""
+            raise self.refuse(key, value, f"must be a pair like {self.POLAR.format(unit)} {form}".strip())
         return (self.quantity(f"{key}[0]", value[0], unit), self.quantity(f"{key}[1]", value[1], "rad"))
 
 
@@ -161,9 +161,9 @@ def write_polar(magnitude: float, angle: float, unit: str) -> list[str]:
     return [write_quantity(magnitude, unit), write_quantity(angle, "rad")]
 
 
-def _suggest(word: object, known: list[str]) -> str:
+def _suggest(word: object, names: list[str]) -> str:
     """Suggest the valid word that is nearest to one that is not."""
-    close = difflib.get_close_matches(word[:LONGEST_SHOWN], known, 1) if isinstance(word, str) else []
+    close = difflib.get_close_matches(word[:LONGEST_SHOWN], names, 1) if isinstance(word, str) else []
     return f'did you mean "{close[0]}"? ' if close else ""
 
 

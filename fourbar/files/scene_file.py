@@ -81,14 +81,14 @@ PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     """Make the error for what the TOML reader stumbles over, with its line."""
-    found = PLACE.search(reason)
+    place = PLACE.search(reason)
     lines = text.split("\n")
-    if found is None:
+    if place is None:
         return InputError("TOML", text[:LONGEST_LINE], f"cannot be read: {' '.join(reason.split())[:120]}", shown)
-    line, column = int(found[1] or len(lines)), int(found[2] or len(lines[-1]) + 1)
+    line, column = int(place[1] or len(lines)), int(place[2] or len(lines[-1]) + 1)
     start = max(0, column - 1 - LONGEST_LINE // 2)
     value = lines[line - 1][start : start + LONGEST_LINE].strip()
-    why = " ".join(reason[: found.start()].split())[:120]
+    why = " ".join(reason[: place.start()].split())[:120]
     for bare in UNQUOTED.finditer(lines[line - 1]):
         if bare.start(1) < column <= bare.end(1) + 1:
             why = f'a number with a unit stands in quotes, like "{bare[1].strip()[:LONGEST_LINE]}"'
@@ -127,13 +127,13 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
 def _read_points(read: Reader, value: object) -> tuple[Point, ...]:
     if not isinstance(value, dict) or len(value) > MOST_POINTS:
         raise read.refuse("points", value, f"must be a table of points, at most {MOST_POINTS}")
-    found = []
+    points = []
     for name, point in value.items():
         key = f"points.{name}" if BARE_KEY.fullmatch(name) else "points"
         entry = read.table(key, point, ("bar", *Point.numbers))
         bar = read.whole(f"{key}.bar", entry.get("bar"), 1, 4)
-        found.append(Point(name, bar, **read.numbers(key, entry, Point.numbers)))
-    return tuple(found)
+        points.append(Point(name, bar, **read.numbers(key, entry, Point.numbers)))
+    return tuple(points)
 
 
 def _read_pictures(read: Reader, bars: dict[str, Any], folder: str) -> tuple[Picture, ...]:
@@ -155,7 +155,7 @@ def _read_linkage(read: Reader, top: dict[str, Any]) -> FourBar:
 
 
 def _read_bar(read: Reader, key: str, value: object, length: float) -> Bar:
-    stated = {name: of for name, of in Bar.numbers.items() if name != "length"}
+    stated = {name: declared for name, declared in Bar.numbers.items() if name != "length"}
     entry = read.table(key, value, (*stated, "picture"))
     numbers = read.numbers(key, entry, stated)
     if numbers["inertia"] is None and not math.isfinite(numbers["mass"] * length * length):
@@ -254,37 +254,37 @@ def _load(read: Reader, key: str, value: object) -> Load:
 
 def _read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Tolerance, ...]:
     """``"lengths.input" = "0.05 mm"`` (plus or minus) or ``["0.02 mm", "sigma"]``."""
-    known, found = list_entries(scene), []
-    for key, given in _flatten(read, value).items():
+    entries, tolerances = list_entries(scene), []
+    for key, stated in _flatten(read, value).items():
         name = f'tolerances."{key}"'
         if key in COMMAND_KEYS:
-            raise read.refuse(name, given, "is what is commanded, and is held; its speed and acceleration may scatter")
-        if key not in known:
-            raise read.refuse(name, given, refuse_key(key, given, list(known)).allowed)
-        entry, sigma = known[key], isinstance(given, list)
-        if sigma and (len(given) != 2 or given[1] != SIGMA):
-            raise read.refuse(name, given, f'must be like "0.05 {entry.unit}" or ["0.02 {entry.unit}", "{SIGMA}"]')
-        width = given[0] if sigma else given
+            raise read.refuse(name, stated, "is what is commanded, and is held; its speed and acceleration may scatter")
+        if key not in entries:
+            raise read.refuse(name, stated, refuse_key(key, stated, list(entries)).allowed)
+        entry, sigma = entries[key], isinstance(stated, list)
+        if sigma and (len(stated) != 2 or stated[1] != SIGMA):
+            raise read.refuse(name, stated, f'must be like "0.05 {entry.unit}" or ["0.02 {entry.unit}", "{SIGMA}"]')
+        width = stated[0] if sigma else stated
         if is_left_out(scene, entry):
             raise read.refuse(name, width, LEFT_OUT)
-        own = read.quantity(name, width, entry.unit, POSITIVE)
-        if own <= 0.0:
+        size = read.quantity(name, width, entry.unit, POSITIVE)
+        if size <= 0.0:
             raise read.refuse(name, width, "must be > 0")
-        tolerance, number = Tolerance(key, own, sigma), read_place(scene, entry.place)
+        tolerance, number = Tolerance(key, size, sigma), read_place(scene, entry.place)
         if number is None:
             raise read.refuse(name, width, "belongs to a number that the scene does not state")
         if entry.bound != ANY and tolerance.reach >= number:
             three = "three sigma of it " if sigma else ""
             raise read.refuse(name, width, f"{three}must be less than the number itself, {number:.6g} {entry.unit}")
-        found.append(tolerance)
-    return tuple(found)
+        tolerances.append(tolerance)
+    return tuple(tolerances)
 
 
 def _flatten(read: Reader, value: object, before: str = "") -> dict[str, Any]:
     """Flatten a table to full keys, whether these are quoted or dotted."""
     if not isinstance(value, dict):
         raise read.refuse("tolerances", value, 'must be a table of keys like "lengths.input" = "0.05 mm"')
-    found: dict[str, Any] = {}
+    flat: dict[str, Any] = {}
     for key, entry in value.items():
-        found |= _flatten(read, entry, f"{before}{key}.") if isinstance(entry, dict) else {f"{before}{key}": entry}
-    return found
+        flat |= _flatten(read, entry, f"{before}{key}.") if isinstance(entry, dict) else {f"{before}{key}": entry}
+    return flat

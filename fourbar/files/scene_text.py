@@ -135,7 +135,9 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
 
 
 def _write_law(law: Law) -> dict[str, Any]:
-    times, angles = ([write_quantity(x, unit) for x in of] for of, unit in ((law.time, "s"), (law.angle, "rad")))
+    times, angles = (
+        [write_quantity(x, unit) for x in numbers] for numbers, unit in ((law.time, "s"), (law.angle, "rad"))
+    )
     return {"time": times, f"theta_{law.bar}": angles, "steps": law.steps, "ends": law.ends}
 
 
@@ -174,11 +176,11 @@ def _write_value(key: str, value: object) -> str:
 
 def _write_tolerances(scene: Scene) -> dict[str, Any]:
     """Write the table of tolerances."""
-    known, rows = list_entries(scene), dict[str, Any]()
+    entries, rows = list_entries(scene), dict[str, Any]()
     for tolerance in scene.tolerances:
-        if tolerance.key not in known:
+        if tolerance.key not in entries:
             raise InputError("tolerances", tolerance.key, "is no number of the scene")
-        width = write_quantity(tolerance.width, known[tolerance.key].unit)
+        width = write_quantity(tolerance.width, entries[tolerance.key].unit)
         rows[tolerance.key] = [width, SIGMA] if tolerance.sigma else width
     return rows
 
@@ -189,9 +191,9 @@ def write_new_scene(lengths: tuple[str, ...] | list[str]) -> str:
     Raises InputError for what is no length, and for bars that cannot close.
     """
     read = Reader("--lengths")
-    given = [(name, " ".join(text.split())) for name, text in zip(BAR_NAMES.values(), lengths, strict=True)]
-    d, a, b, c = (read.quantity(name, text, "m", POSITIVE) for name, text in given)
+    stated = [(name, " ".join(text.split())) for name, text in zip(BAR_NAMES.values(), lengths, strict=True)]
+    d, a, b, c = (read.quantity(name, text, "m", POSITIVE) for name, text in stated)
     FourBar(d, Bar(a), Bar(b), Bar(c))
-    lines = "\n".join(f'{name} = "{text}"' for name, text in given)
+    lines = "\n".join(f'{name} = "{text}"' for name, text in stated)
     text = files("fourbar.files").joinpath("new.toml").read_text(encoding="utf-8")
     return Template(text).substitute(lengths=lines, input=repr(a), coupler=repr(b), output=repr(c))

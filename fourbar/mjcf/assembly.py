@@ -60,18 +60,18 @@ def assemble(
     require_carriable(linkage)
     inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
     gravity, dynamics = (0.0, 0.0), dict[str, dict[str, float]]()
-    of: Any
-    for of in scene.effects:
-        if of.key == "gravity":
-            gravity = (float(of.vector[0]), float(of.vector[1]))
-        elif of.key == "flywheel":
-            inertia[of.bar] += of.inertia
-        elif of.key in at_pins:
-            name, field = at_pins[of.key]
-            for pin, value in getattr(of, field):
+    effect: Any
+    for effect in scene.effects:
+        if effect.key == "gravity":
+            gravity = (float(effect.vector[0]), float(effect.vector[1]))
+        elif effect.key == "flywheel":
+            inertia[effect.bar] += effect.inertia
+        elif effect.key in at_pins:
+            name, field = at_pins[effect.key]
+            for pin, value in getattr(effect, field):
                 dynamics.setdefault(pin, {})[name] = value
         else:
-            raise LimitError(f"the effect {of.key!r} has no counterpart in {form}")
+            raise LimitError(f"the effect {effect.key!r} has no counterpart in {form}")
     (theta_2, of_3_to_2, theta_4), speeds = (start or find_start(scene))[:2]
     theta_3 = theta_2 + of_3_to_2
     foot = {1: 0j, 2: 0j, 3: cmath.rect(linkage.input.length, theta_2)}
@@ -211,16 +211,16 @@ def write_usd(scene: Scene, start: Start | None = None, *, without_loads: bool =
     joints = []
     length = {number: linkage.bar(number).length for number in MOVING_BARS}
     places = {FIRST_PIN[number]: (PARENT[number], number, 0.0) for number in MOVING_BARS} | {"B": (4, 3, length[3])}
-    for pin, (one, other, along) in places.items():
+    for pin, (one, follower, along) in places.items():
         on_one = {"O2": 0j, "A": complex(length[2]), "B": complex(length[4]), "O4": foot[4]}[pin]
         joints.append(
             f"""    def PhysicsRevoluteJoint "{pin}"
     {{
         uniform token physics:axis = "Z"
         {"" if one == 1 else f"rel physics:body0 = </four_bar/{BAR_NAMES[one]}>"}
-        rel physics:body1 = </four_bar/{BAR_NAMES[other]}>
+        rel physics:body1 = </four_bar/{BAR_NAMES[follower]}>
         point3f physics:localPos0 = {_place(on_one)}
-        quatf physics:localRot0 = {_write_turn(turn[other] - turn[one])}
+        quatf physics:localRot0 = {_write_turn(turn[follower] - turn[one])}
         point3f physics:localPos1 = {_place(complex(along))}
         quatf physics:localRot1 = (1, 0, 0, 0)
         bool physics:excludeFromArticulation = {"true" if pin == "B" else "false"}

@@ -231,17 +231,17 @@ def choose_run(theta_2: Array, omega: float, alpha: float) -> WindowMotion:
 
 def find_start(scene: Scene) -> Start:
     """Find the start of the motion: the first position, in the direction of motion, that assembles."""
-    at = command(scene)
+    commanded = command(scene)
     alpha = scene.motion.alpha_2
     speed = scene.motion.omega_2 or 0.0
-    solution = solve(scene, "velocity", at=Command(at.theta_2, at.branch, speed, alpha))
+    solution = solve(scene, "velocity", at=Command(commanded.theta_2, commanded.branch, speed, alpha))
     usable = np.flatnonzero(solution.status_code == OK)
     if not len(usable):
         raise NotAssembledError("the linkage closes at none of the scene's positions: there is no keyframe to write")
-    theta_2 = at.theta_2[usable]
+    theta_2 = commanded.theta_2[usable]
     first = int(usable[np.argmin(theta_2) if speed >= 0.0 else np.argmax(theta_2)])
     assert solution.omega_3 is not None and solution.omega_4 is not None
-    theta = (float(at.theta_2[first]), float(solution.theta_3[first]), float(solution.theta_4[first]))
+    theta = (float(commanded.theta_2[first]), float(solution.theta_3[first]), float(solution.theta_4[first]))
     omega = (speed, float(solution.omega_3[first]), float(solution.omega_4[first]))
     if np.ptp(theta_2) == 0.0:
         theta_2 = theta[0] + np.array([0.0, _compute_span(scene.linkage)])

@@ -50,22 +50,22 @@ class Symbol(NamedTuple):
 
 def list_acting(scene: Scene) -> list[Symbol]:
     """Everything that acts, the drive first; nothing that has no size."""
-    found = []
+    symbols = []
     if scene.drive is not None and scene.motion.free is None:
-        (bar, *start), (other, *end) = scene.drive.start, scene.drive.end
-        found.append(Symbol("cylinder", "F", bar, cmath.rect(*start), end=(other, cmath.rect(*end))))
+        (bar, *start), (bar_2, *end) = scene.drive.start, scene.drive.end
+        symbols.append(Symbol("cylinder", "F", bar, cmath.rect(*start), end=(bar_2, cmath.rect(*end))))
     elif scene.motion.free is None:
-        found.append(Symbol("drive", f"T{scene.drive_bar}", scene.drive_bar, pin=FIRST_PIN[scene.drive_bar]))
+        symbols.append(Symbol("drive", f"T{scene.drive_bar}", scene.drive_bar, pin=FIRST_PIN[scene.drive_bar]))
     for number, load in enumerate(scene.loads, 1):
-        at, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
+        foot, turns = scene.linkage.bar(load.bar).to_centre, load.frame == "bar"
         if load.force is not None and load.force[0] != 0.0:
             beyond, force = cmath.rect(*load.at), cmath.rect(*load.force)
-            found.append(Symbol("force", f"load {number}", load.bar, at, beyond, force, turns, table=load.table))
+            symbols.append(Symbol("force", f"load {number}", load.bar, foot, beyond, force, turns, table=load.table))
         if load.moment != 0.0:
-            found.append(Symbol("moment", f"load {number}", load.bar, at, moment=load.moment, table=load.table))
+            symbols.append(Symbol("moment", f"load {number}", load.bar, foot, moment=load.moment, table=load.table))
     for effect in scene.effects:
-        found += _list_symbols(effect)
-    return found
+        symbols += _list_symbols(effect)
+    return symbols
 
 
 def _list_symbols(effect: Any) -> list[Symbol]:

@@ -63,10 +63,10 @@ def collect_page_data(
     """
     data = collect_live_data(scene, units, signs=(1, -1), midway=midway)
     for columns in data["branches"].values():
-        columns |= {name: null_nan(each) for name, each in columns.items() if isinstance(each, np.ndarray)}
-    given = {str(number): picture for number, picture in _encode_pictures(scene, pictures).items()}
-    found = collect_tolerances(scene, data["over"]["values"] or data["theta_2"]) if scene.tolerances else None
-    return data | {"pictures": given, "tolerances": found, "toml": _write_scene_file(scene)}
+        columns |= {name: null_nan(column) for name, column in columns.items() if isinstance(column, np.ndarray)}
+    encoded = {str(number): picture for number, picture in _encode_pictures(scene, pictures).items()}
+    spreads = collect_tolerances(scene, data["over"]["values"] or data["theta_2"]) if scene.tolerances else None
+    return data | {"pictures": encoded, "tolerances": spreads, "toml": _write_scene_file(scene)}
 
 
 def collect_live_data(
@@ -138,22 +138,26 @@ def _write_scene_file(scene: Scene) -> str | None:
 def _collect_sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> dict[str, Any]:
     """Collect both branches over theta_2, or those of another command over the commanded quantity."""
     motion = scene.motion
-    swept, own = list_sweep(scene), command(scene)
-    where, start, name = thin_out(swept), None, swept.commanded
-    if len(own.angle) == 1:
-        away = np.angle(np.exp(1j * (where.angle - own.angle[0]))) if own.stroke is None else where.places - own.places
+    swept, commanded = list_sweep(scene), command(scene)
+    thinned, start, name = thin_out(swept), None, swept.commanded
+    if len(commanded.angle) == 1:
+        away = (
+            np.angle(np.exp(1j * (thinned.angle - commanded.angle[0])))
+            if commanded.stroke is None
+            else thinned.places - commanded.places
+        )
         start = int(np.argmin(np.abs(away)))
-    theta_2, branches = where.angle, {}
+    theta_2, branches = thinned.angle, {}
     for sign in signs if name == "theta_2" else (motion.branch,):
-        branch = None if motion.through == "follow" else np.full(where.angle.shape, sign, dtype=np.int8)
-        solution = solve(each := set_branch(scene, sign), stage, at=command_at(each, where.places, branch))
+        branch = None if motion.through == "follow" else np.full(thinned.angle.shape, sign, dtype=np.int8)
+        solution = solve(one := set_branch(scene, sign), stage, at=command_at(one, thinned.places, branch))
         branches[str(sign)], theta_2 = _collect_columns(solution), solution.theta_2
     if name != "theta_2":
         branches[str(motion.branch)]["theta_2"] = theta_2
     return {
         "theta_2": null_nan(theta_2),
         "time": None,
-        "over": _over(name, name, where.places, motion.speed),
+        "over": _over(name, name, thinned.places, motion.speed),
         "rate": None,
         "start": start,
         "branches": branches,
@@ -164,41 +168,41 @@ def _collect_sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> d
 
 def _over(name: str, commanded: str, values: Array, speed: float | None = None) -> dict[str, Any]:
     """Say what curves and slider run over, "time" or what is commanded, with its numbers where it is not theta_2."""
-    own = None if name == "theta_2" else values.tolist()
-    return {"name": name, "commanded": commanded, "values": own, "speed": speed}
+    shown = None if name == "theta_2" else values.tolist()
+    return {"name": name, "commanded": commanded, "values": shown, "speed": speed}
 
 
 def _collect_motion(scene: Scene, stage: str | None) -> dict[str, Any]:
     """Collect the one motion that the scene makes: released, or by a law."""
-    whole = solve(scene)
-    assert whole.time is not None and whole.omega_2 is not None and whole.alpha_2 is not None
-    where = thin_out(whole.at)
-    assert where.time is not None
-    solution = solve(scene, stage, at=where)
+    motion = solve(scene)
+    assert motion.time is not None and motion.omega_2 is not None and motion.alpha_2 is not None
+    thinned = thin_out(motion.at)
+    assert thinned.time is not None
+    solution = solve(scene, stage, at=thinned)
     columns = _collect_columns(solution)
     columns["theta_2"] = solution.theta_2.tolist()
     if scene.motion.free is not None:
         for name in ("torque", "torque_error", "power", "drive_force", "drive_force_error"):
             columns.pop(name, None)
         columns["energy"] = compute_energies(scene, solution).kinetic
-    duration = float(where.time[-1] - where.time[0])
+    duration = float(thinned.time[-1] - thinned.time[0])
     rate = _choose_rate(duration)
     return {
         "theta_2": null_nan(solution.theta_2),
-        "time": where.time.tolist(),
-        "over": _over("time", whole.commanded, where.time),
+        "time": thinned.time.tolist(),
+        "over": _over("time", motion.commanded, thinned.time),
         "rate": rate,
         "start": None,
         "branches": {str(scene.motion.branch): columns},
-        "pace": _describe_pace(whole, rate, len(where.time)),
-        "positions": len(whole),
+        "pace": _describe_pace(motion, rate, len(thinned.time)),
+        "positions": len(motion),
     }
 
 
-def thin_out(where: Command) -> Command:
+def thin_out(positions: Command) -> Command:
     """Take at most `MAX_ROWS` of the positions, evenly, both ends included."""
-    n = len(where.angle)
-    return where if n <= MAX_ROWS else where.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
+    n = len(positions.angle)
+    return positions if n <= MAX_ROWS else positions.part(np.round(np.linspace(0, n - 1, MAX_ROWS)).astype(int))
 
 
 def _choose_rate(duration: float) -> float:
@@ -211,17 +215,17 @@ def _choose_rate(duration: float) -> float:
     return float(10.0 ** math.ceil(math.log10(duration / longest))) if duration > longest else 1.0
 
 
-def _describe_pace(whole: Solution, rate: float, shown: int) -> str:
+def _describe_pace(motion: Solution, rate: float, shown: int) -> str:
     """Say what speed 1 means, when the linkage stops before its time, and whether instants were left out."""
     words = "At speed 1× it moves in real time"
     if rate < 1.0:
         words = f"At speed 1× it moves {1.0 / rate:.0f} times slower than it really does"
     elif rate > 1.0:
         words = f"At speed 1× it moves {rate:.0f} times faster than it really does"
-    if whole.stopped_at is not None:
-        words += f". The linkage stops at a limit position at {whole.stopped_at:.4g} s"
-    if len(whole) > shown:
-        words += f". Shown are {shown} of the {len(whole)} instants"
+    if motion.stopped_at is not None:
+        words += f". The linkage stops at a limit position at {motion.stopped_at:.4g} s"
+    if len(motion) > shown:
+        words += f". Shown are {shown} of the {len(motion)} instants"
     return words + "."
 
 
@@ -240,13 +244,13 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
 
 def _encode_pictures(scene: Scene, pictures: Mapping[str, str | Path]) -> dict[int, str]:
     """Encode the pictures of the bars as data URIs: those of the scene, and those given in their place."""
-    found = {}
+    encoded = {}
     for name, path in pictures.items():
         if name not in BARS:
             raise InputError("picture", name, "must name one of " + ", ".join(BARS))
-        found[BARS[name]] = encode_picture(f"picture.{name}", path)
-    own = {picture.bar: picture for picture in scene.pictures if picture.bar not in found}
-    return found | {bar: picture.data_uri() for bar, picture in own.items()}
+        encoded[BARS[name]] = encode_picture(f"picture.{name}", path)
+    by_bar = {picture.bar: picture for picture in scene.pictures if picture.bar not in encoded}
+    return encoded | {bar: picture.data_uri() for bar, picture in by_bar.items()}
 
 
 FORMATS = ("html", "gif", "mp4")

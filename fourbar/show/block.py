@@ -209,8 +209,8 @@ class _Block:
                 turns = round(abs(facts.commanded[1] - facts.commanded[0]) / (2.0 * math.pi))
                 over = "per turn" if turns == 1 else f"in {turns} turns"
             most = max(duty.energy_in, duty.energy_out)
-            given, back = (self._value(energy, "J", most) for energy in (duty.energy_in, duty.energy_out))
-            row += f"; {given} {over} given, {back} taken back"
+            forward, back = (self._value(energy, "J", most) for energy in (duty.energy_in, duty.energy_out))
+            row += f"; {forward} {over} given, {back} taken back"
         lines = [self._row("power", row)]
         if not facts.linear:
             numbers = ((duty.peak_torque, "N m"), (duty.peak_speed, "rad/s"), (duty.rms_torque, "N m"))
@@ -284,8 +284,8 @@ class _Block:
             return []
         places = [self._value(bar.x, "m", self.longest) for bar in bending]
         if facts.kind != "position":
-            where = [self._place(bar.peak.place, named=False) for bar in bending]
-            places = [f"{x}, {place}" for x, place in zip(places, where, strict=True)]
+            positions = [self._place(bar.peak.place, named=False) for bar in bending]
+            places = [f"{x}, {place}" for x, place in zip(places, positions, strict=True)]
         moments = self._cells([bar.peak.value for bar in bending], "N m")
         return _align([("bending", [f"bar {bar}" for bar in facts.bending]), ("  moment", moments), ("  at x", places)])
 

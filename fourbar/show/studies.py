@@ -129,99 +129,99 @@ def _write_angle(angle: float) -> str:
 SENSITIVITY_SCHEMA = "fourbar-sensitivity/1"
 
 
-def list_shown(found: Sensitivity) -> list[str]:
+def list_shown(derivatives: Sensitivity) -> list[str]:
     """Torque and pin forces, or where the scene states no speed the angles; and its own points."""
-    own = [point.name for point in found.scene.points]
-    drive = [name for name in (COUPLE.value, LINE.value) if name in found.by]
-    return [*((*drive, *PIN_FORCES) if drive else ("theta_3", "theta_4")), *own]
+    points = [point.name for point in derivatives.scene.points]
+    drive = [name for name in (COUPLE.value, LINE.value) if name in derivatives.by]
+    return [*((*drive, *PIN_FORCES) if drive else ("theta_3", "theta_4")), *points]
 
 
-def find_largest(found: Sensitivity, quantity: str) -> float:
+def find_largest(derivatives: Sensitivity, quantity: str) -> float:
     """Find the largest magnitude of a quantity over the positions that have one; NaN where none has."""
-    value = found.value(quantity)
+    value = derivatives.value(quantity)
     size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
     return float(np.nanmax(size)) if np.isfinite(size).any() else math.nan
 
 
-def write_sensitivity(found: Sensitivity) -> str:
+def write_sensitivity(derivatives: Sensitivity) -> str:
     """Write the table of the numbers that matter most, below what each quantity depends on most."""
-    return write_table(found.solution.title, _say_influences(found), _make_influence_table(found))
+    return write_table(derivatives.solution.title, _say_influences(derivatives), _make_influence_table(derivatives))
 
 
-def _say_influences(found: Sensitivity) -> list[str]:
+def _say_influences(derivatives: Sensitivity) -> list[str]:
     """Write the lines above the table."""
     lines = [
         "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude"
     ]
-    for name in list_shown(found):
-        own = found.influences(name)
-        angles = [row for row in own if found.keys[row.key].unit == "rad"]
-        most = [rows[0] for rows in ([row for row in own if row not in angles], angles) if rows]
+    for name in list_shown(derivatives):
+        influences = derivatives.influences(name)
+        angles = [row for row in influences if derivatives.keys[row.key].unit == "rad"]
+        most = [rows[0] for rows in ([row for row in influences if row not in angles], angles) if rows]
         if most:
             parts = [f"{row.key} (at theta_2 = {math.degrees(row.theta_2):.6g} deg)" for row in most]
             lines.append(f"{name} depends most on " + ", of the angles on ".join(parts))
-    without = [status for status in found.status if status != "ok"]
+    without = [status for status in derivatives.status if status != "ok"]
     if without:
         counts = ", ".join(f"{without.count(word)} {word.replace('_', ' ')}" for word in dict.fromkeys(without))
         lines.append(f"positions without all derivatives: {counts}")
     return lines
 
 
-def _make_influence_table(found: Sensitivity) -> "Table":
+def _make_influence_table(derivatives: Sensitivity) -> "Table":
     """List a row for each number that matters, those first that change any quantity most against its largest value."""
-    names = list_shown(found)
-    by = {name: {row.key: row.change for row in found.influences(name)} for name in names}
-    rows = [["largest value", *(f"{find_largest(found, name):.4g}" for name in names)]]
-    rows += [[key, *(f"{by[name].get(key, 0.0):.3g}" for name in names)] for key in rank_numbers(found, names)]
+    names = list_shown(derivatives)
+    by = {name: {row.key: row.change for row in derivatives.influences(name)} for name in names}
+    rows = [["largest value", *(f"{find_largest(derivatives, name):.4g}" for name in names)]]
+    rows += [[key, *(f"{by[name].get(key, 0.0):.3g}" for name in names)] for key in rank_numbers(derivatives, names)]
     return make_plain_table(["", *(f"{name}\n{find_unit(name)}" for name in names)], rows, left=("",))
 
 
-def rank_numbers(found: Sensitivity, names: list[str]) -> list[str]:
+def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
     """Rank the numbers that any of the quantities depends on, by their largest share of a largest value."""
     share: dict[str, float] = {}
     for name in names:
-        size = find_largest(found, name)
-        for row in found.influences(name):
+        size = find_largest(derivatives, name)
+        for row in derivatives.influences(name):
             share[row.key] = max(share.get(row.key, 0.0), abs(row.change) / size if size > 0.0 else 0.0)
     return sorted(share, key=lambda key: -share[key])
 
 
-def write_sensitivity_json(found: Sensitivity) -> str:
+def write_sensitivity_json(derivatives: Sensitivity) -> str:
     """One object, SI and rad: d(quantity)/d(key) over the positions, vectors as [x, y], null where there is none."""
     return write_object(
         SENSITIVITY_SCHEMA,
-        title=found.solution.title,
-        drive_bar=found.solution.drive_bar,
-        status=found.status,
-        theta_2=found.solution.theta_2,
+        title=derivatives.solution.title,
+        drive_bar=derivatives.solution.drive_bar,
+        status=derivatives.status,
+        theta_2=derivatives.solution.theta_2,
         keys={
             key: {"value": number, "unit": entry.unit}
-            for (key, entry), number in zip(found.keys.items(), found.numbers.tolist(), strict=True)
+            for (key, entry), number in zip(derivatives.keys.items(), derivatives.numbers.tolist(), strict=True)
         },
-        by={name: dict(zip(found.keys, rows, strict=True)) for name, rows in found.by.items()},
+        by={name: dict(zip(derivatives.keys, rows, strict=True)) for name, rows in derivatives.by.items()},
     )
 
 
 EXTREMES_SCHEMA = "fourbar-extremes/1"
 
 
-def write_extremes(scene: Scene, found: Extremes, units: Conversion) -> str:
+def write_extremes(scene: Scene, proof: Extremes, units: Conversion) -> str:
     """Write each enclosure with its angle, below what it holds over."""
-    return write_table(scene.title, _say_proof(scene, found, units), _make_extremes_table(found, units))
+    return write_table(scene.title, _say_proof(scene, proof, units), _make_extremes_table(proof, units))
 
 
-def _say_proof(scene: Scene, found: Extremes, units: Conversion) -> list[str]:
+def _say_proof(scene: Scene, proof: Extremes, units: Conversion) -> list[str]:
     """Write the lines above the table."""
     unit, factor = find_unit_in("rad", units)
-    parts = " and ".join(f"{low * factor:.6g} to {high * factor:.6g}" for low, high in found.parts)
-    lines = [f"guaranteed over theta_2 = {parts} {unit}, by interval arithmetic in {found.boxes} pieces of it"]
-    if found.distance:
+    parts = " and ".join(f"{low * factor:.6g} to {high * factor:.6g}" for low, high in proof.parts)
+    lines = [f"guaranteed over theta_2 = {parts} {unit}, by interval arithmetic in {proof.boxes} pieces of it"]
+    if proof.distance:
         lines.append(
-            f"left out: theta_2 within {write_value(found.distance, 'rad', units)} "
+            f"left out: theta_2 within {write_value(proof.distance, 'rad', units)} "
             "of a limit of the input or of a pole of "
             "the drive, where the loads grow without bound"
         )
-    if found.nominal is None:
+    if proof.nominal is None:
         lines.append(
             f"each extreme lies between the two numbers given, which differ by about {PROVEN:g} of the largest load"
         )
@@ -234,38 +234,38 @@ def _say_proof(scene: Scene, found: Extremes, units: Conversion) -> list[str]:
     return lines
 
 
-def _make_extremes_table(found: Extremes, units: Conversion) -> "Table":
+def _make_extremes_table(proof: Extremes, units: Conversion) -> "Table":
     """Two rows for each quantity."""
     rows, (angle_unit, of_angle) = [], find_unit_in("rad", units)
-    for name in found.least:
+    for name in proof.least:
         unit, factor = find_unit_in("rad" if name == "transmission" else find_unit(name.strip("|")), units)
-        for word, sign, extreme in (("least", -1, found.least[name]), ("greatest", 1, found.greatest[name])):
+        for word, sign, extreme in (("least", -1, proof.least[name]), ("greatest", 1, proof.greatest[name])):
             ends = (f"{factor * extreme.low:.11g}", f"{factor * extreme.high:.11g}")
             rows.append([name, unit, word, *ends, f"{of_angle * extreme.theta_2:.6f}"])
-            if found.nominal is not None:
-                over = found.over_estimate(name, sign)
+            if proof.nominal is not None:
+                over = proof.over_estimate(name, sign)
                 rows[-1].append("-" if over is None else f"{over:.3g} times")
-    heads = ("", "unit", "", "from", "to", f"theta_2 ({angle_unit})", *(["over-estimate"] if found.nominal else []))
+    heads = ("", "unit", "", "from", "to", f"theta_2 ({angle_unit})", *(["over-estimate"] if proof.nominal else []))
     return make_plain_table(heads, rows, left=("", "unit", "over-estimate"))
 
 
-def write_extremes_json(scene: Scene, found: Extremes) -> str:
+def write_extremes_json(scene: Scene, proof: Extremes) -> str:
     """One object, SI and rad."""
 
-    def rows(of: Extremes) -> dict[str, Any]:
-        return {name: {"least": of.least[name], "greatest": of.greatest[name]} for name in of.least}
+    def rows(bounds: Extremes) -> dict[str, Any]:
+        return {name: {"least": bounds.least[name], "greatest": bounds.greatest[name]} for name in bounds.least}
 
     return write_object(
         EXTREMES_SCHEMA,
         title=scene.title,
-        theta_2=found.parts,
-        distance_from_poles=found.distance,
-        boxes=found.boxes,
-        extremes=rows(found),
-        nominal=None if found.nominal is None else rows(found.nominal),
+        theta_2=proof.parts,
+        distance_from_poles=proof.distance,
+        boxes=proof.boxes,
+        extremes=rows(proof),
+        nominal=None if proof.nominal is None else rows(proof.nominal),
         over_estimate={
-            name: {word: found.over_estimate(name, sign) for word, sign in (("least", -1), ("greatest", 1))}
-            for name in found.least
+            name: {word: proof.over_estimate(name, sign) for word, sign in (("least", -1), ("greatest", 1))}
+            for name in proof.least
         },
     )
 
@@ -274,95 +274,99 @@ EQUILIBRIUM_SCHEMA = "fourbar-equilibrium/1"
 MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 
 
-def write_equilibria(title: str, found: Equilibria) -> str:
+def write_equilibria(title: str, rest: Equilibria) -> str:
     """Write both tables as text."""
-    friction = bool(found.held)
+    friction = bool(rest.held)
     heads = ["theta_2 (deg)", "theta_4 (deg)", "branch", "", "by", "dQ/dq (N m/rad)", "J (kg m^2)", "frequency (Hz)"]
-    rows = [_write_equilibrium(each, friction=friction) for each in found.found]
-    own = make_plain_table([*heads, *(["friction holds (deg)"] if friction else [])], rows, left=("branch", "", "by"))
+    rows = [_write_equilibrium(position, friction=friction) for position in rest.found]
+    table = make_plain_table([*heads, *(["friction holds (deg)"] if friction else [])], rows, left=("branch", "", "by"))
     text = (
-        write_table(title, _count_equilibria(found), own)
+        write_table(title, _count_equilibria(rest), table)
         if rows
-        else "\n".join([*([title] if title else []), *_count_equilibria(found)])
+        else "\n".join([*([title] if title else []), *_count_equilibria(rest)])
     )
-    return text.rstrip("\n") + "\n\n" + write_table("", *_write_holding(found))
+    return text.rstrip("\n") + "\n\n" + write_table("", *_write_holding(rest))
 
 
-def _count_equilibria(found: Equilibria) -> list[str]:
-    count = len(found.found)
-    how = "proven to be all" if found.proven else "of those found, by changes of sign: there may be others"
+def _count_equilibria(rest: Equilibria) -> list[str]:
+    count = len(rest.found)
+    how = "proven to be all" if rest.proven else "of those found, by changes of sign: there may be others"
     lines = [f"{count} equilibri{'um' if count == 1 else 'a'} without friction, {how}"]
-    if found.not_decided:
-        at = " and ".join(f"theta_2 = {_write_degrees(place.theta_2)}" for place in found.not_decided)
-        lines.append(f"at the change point {at} deg nothing is decided: there the linkage has two ways to move")
-    lines += [f"indifferent (Q = 0 throughout): {_write_range(ends)}" for ends in found.indifferent]
+    if rest.not_decided:
+        angles = " and ".join(f"theta_2 = {_write_degrees(place.theta_2)}" for place in rest.not_decided)
+        lines.append(f"at the change point {angles} deg nothing is decided: there the linkage has two ways to move")
+    lines += [f"indifferent (Q = 0 throughout): {_write_range(ends)}" for ends in rest.indifferent]
     lines += [
         f"friction alone holds, without an equilibrium: {_write_range(ends)}"
-        for ends in found.held
-        if all(each.held != ends for each in found.found)
+        for ends in rest.held
+        if all(position.held != ends for position in rest.found)
     ]
     return lines
 
 
-def _write_holding(found: Equilibria) -> tuple[list[str], Any]:
+def _write_holding(rest: Equilibria) -> tuple[list[str], Any]:
     """Write what holds the scene's positions, thinned out to what can be read."""
-    at = found.positions
-    drive = read_drive(at)
-    values, low, high = drive.values, getattr(at, drive.keys.low), getattr(at, drive.keys.high)
+    positions = rest.positions
+    drive = read_drive(positions)
+    values, low, high = drive.values, getattr(positions, drive.keys.low), getattr(positions, drive.keys.high)
     assert values is not None
-    heads, columns = ["theta_2 (deg)", f"{drive.name} ({drive.unit})"], [np.degrees(at.theta_2), values]
+    heads, columns = ["theta_2 (deg)", f"{drive.name} ({drive.unit})"], [np.degrees(positions.theta_2), values]
     if low is not None and high is not None:
         heads, columns = [heads[0], f"from ({drive.unit})", f"to ({drive.unit})"], [columns[0], low, high]
-    still = np.isin(at.status_code, (NOT_ASSEMBLED, SINGULAR))
-    released = [status if no else MOVES[move] for status, no, move in zip(at.status, still, found.moves, strict=True)]
-    rows = list(zip(*map(write_cells, columns), released, strict=True))[:: -(-len(at) // MOST_ROWS)]
-    on = "" if at.drive is not None else f" on bar {at.drive_bar}"
+    still = np.isin(positions.status_code, (NOT_ASSEMBLED, SINGULAR))
+    released = [
+        status if no else MOVES[move] for status, no, move in zip(positions.status, still, rest.moves, strict=True)
+    ]
+    rows = list(zip(*map(write_cells, columns), released, strict=True))[:: -(-len(positions) // MOST_ROWS)]
+    on = "" if positions.drive is not None else f" on bar {positions.drive_bar}"
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
     if np.isfinite(values).any():
         most = int(np.nanargmax(np.abs(values)))
         largest = "largest" if low is None else "largest without friction"
-        lines.append(f"{largest}: {values[most]:.6g} {drive.unit} at theta_2 = {_write_degrees(at.theta_2[most])} deg")
+        lines.append(
+            f"{largest}: {values[most]:.6g} {drive.unit} at theta_2 = {_write_degrees(positions.theta_2[most])} deg"
+        )
     return lines, make_plain_table([*heads, "released"], rows, left=("released",))
 
 
-def _write_equilibrium(each: Equilibrium, *, friction: bool) -> list[str]:
-    place, frequency = each.place, "-" if each.frequency is None else f"{each.frequency:.10g}"
+def _write_equilibrium(equilibrium: Equilibrium, *, friction: bool) -> list[str]:
+    place, frequency = equilibrium.place, "-" if equilibrium.frequency is None else f"{equilibrium.frequency:.10g}"
     row = [
         _write_degrees(place.theta_2),
         _write_degrees(place.theta_4),
         BRANCH_NAMES.get(place.branch, "limit"),
-        each.stability,
+        equilibrium.stability,
     ]
-    row += [each.angle, f"{each.slope:.6g}", f"{each.inertia:.6g}", frequency]
-    return row + ([_write_range(each.held) if each.held else "-"] if friction else [])
+    row += [equilibrium.angle, f"{equilibrium.slope:.6g}", f"{equilibrium.inertia:.6g}", frequency]
+    return row + ([_write_range(equilibrium.held) if equilibrium.held else "-"] if friction else [])
 
 
 def _write_range(ends: tuple[RestPosition, RestPosition]) -> str:
-    one, other = ends
-    text = f"{_write_degrees(one.theta_2)} to {_write_degrees(other.theta_2)}"
-    return text if one.branch == other.branch else f"{text} through a limit"
+    first, last = ends
+    text = f"{_write_degrees(first.theta_2)} to {_write_degrees(last.theta_2)}"
+    return text if first.branch == last.branch else f"{text} through a limit"
 
 
 def _write_degrees(angle: float) -> str:
     return f"{math.degrees(angle):.4f}"
 
 
-def write_equilibria_json(title: str, found: Equilibria) -> str:
+def write_equilibria_json(title: str, rest: Equilibria) -> str:
     """One object, SI and rad."""
-    at, keys = found.positions, read_drive(found.positions).keys
+    positions, keys = rest.positions, read_drive(rest.positions).keys
     return write_object(
         EQUILIBRIUM_SCHEMA,
         title=title,
-        proven=found.proven,
-        equilibria=found.found,
-        indifferent=found.indifferent,
-        held=found.held,
-        not_decided=found.not_decided,
+        proven=rest.proven,
+        equilibria=rest.found,
+        indifferent=rest.indifferent,
+        held=rest.held,
+        not_decided=rest.not_decided,
         positions={
-            "drive_bar": at.drive_bar,
-            "status": at.status,
-            "branch": at.branch,
-            **{name: getattr(at, name) for name in ("theta_2", keys.value, keys.low, keys.high)},
-            "moves": found.moves,
+            "drive_bar": positions.drive_bar,
+            "status": positions.status,
+            "branch": positions.branch,
+            **{name: getattr(positions, name) for name in ("theta_2", keys.value, keys.low, keys.high)},
+            "moves": rest.moves,
         },
     )

@@ -102,20 +102,20 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
     """
     if not _has_between(scene, solution):
         return Between(solution, solution, [], {COUPLE.value, LINE.value, *PIN_FORCES})
-    at = _solve_of(scene)
+    solve_at = _solve_of(scene)
     pins, low, high, branch = _find_reversing(scene, solution)
     for _ in range(ROUNDS if pins else 0):
         places = _cut(low, high)
-        inside = at(places.ravel(), np.repeat(branch, CUTS + 1), "velocity")
+        inside = solve_at(places.ravel(), np.repeat(branch, CUTS + 1), "velocity")
         slips = np.array([_compute_slip(inside, pin).reshape(places.shape)[row] for row, pin in enumerate(pins)])
         turned = np.argmax(slips * slips[:, :1] <= 0.0, axis=1)
         rows = np.arange(len(pins))
         low, high = places[rows, turned - 1], places[rows, turned]
-    merged = _merge(at, solution, np.concatenate([low, high]), np.concatenate([branch, branch]))
+    merged = _merge(solve_at, solution, np.concatenate([low, high]), np.concatenate([branch, branch]))
     angles = low if scene.motion.law is None else scene.motion.law.at(low)[0]
-    peaks, branch, growing = _find_largest(at, merged, list_sizes)
+    peaks, branch, growing = _find_largest(solve_at, merged, list_sizes)
     reversals = sorted(zip(angles.tolist(), pins, strict=True))
-    return Between(solution, _merge(at, merged, peaks, branch), reversals, growing)
+    return Between(solution, _merge(solve_at, merged, peaks, branch), reversals, growing)
 
 
 def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
@@ -137,9 +137,9 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
             largest = searched[0][1] if solution is searched[0][0] else find(solution)
             return {bar: np.abs(bending.moment) for bar, bending in largest.items()}
 
-        at = _solve_of(scene)
-        places, branch, growing = _find_largest(at, solution, list_moments, BENDING_PEAKS, BENDING_ROUNDS)
-        searched += [(peaks := at(places, branch, "force"), find(peaks))] if len(places) else []
+        solve_at = _solve_of(scene)
+        places, branch, growing = _find_largest(solve_at, solution, list_moments, BENDING_PEAKS, BENDING_ROUNDS)
+        searched += [(peaks := solve_at(places, branch, "force"), find(peaks))] if len(places) else []
     bending = dict[int, BarBending]()
     for bar in MOVING_BARS:
         grows = str(bar) in growing
@@ -164,13 +164,13 @@ def _cut(low: Array, high: Array) -> Array:
     return low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, CUTS + 1)
 
 
-def _merge(at: At, solution: Solution, places: Array, branch: Branch) -> Solution:
+def _merge(solve_at: At, solution: Solution, places: Array, branch: Branch) -> Solution:
     """Solve at the positions of a solution and at others among them, in the order of the solution."""
     if not len(places):
         return solution
     over = np.concatenate([solution.at.places, places])
     order = np.unique(over, return_index=True)[1][:: 1 if over[0] < over[1] else -1]
-    return at(over[order], np.concatenate([solution.at.branch, branch])[order], "force")
+    return solve_at(over[order], np.concatenate([solution.at.branch, branch])[order], "force")
 
 
 def _compute_slip(solution: Solution, pin: str) -> Array:
@@ -195,7 +195,7 @@ def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array,
 
 
 def _find_largest(
-    at: At, solution: Solution, sizes: Sizes, most: int = MOST_PEAKS, rounds: int = ROUNDS
+    solve_at: At, solution: Solution, sizes: Sizes, most: int = MOST_PEAKS, rounds: int = ROUNDS
 ) -> tuple[Array, Branch, set[str]]:
     """Find where each size is largest between positions that it has a local maximum at: places, branches, growing."""
     over, branch, peaks = solution.at.places, solution.at.branch, list[tuple[str, int, int, int]]()
@@ -218,7 +218,7 @@ def _find_largest(
     reached = [np.array([present[name][i] for name, i, *_ in peaks])]
     for _ in range(rounds if len(peaks) else 0):
         cut = _cut(low, high)
-        inside = sizes(at(cut.ravel(), np.repeat(branch[top], CUTS + 1), "force"))
+        inside = sizes(solve_at(cut.ravel(), np.repeat(branch[top], CUTS + 1), "force"))
         values = np.array([np.nan_to_num(inside[n].reshape(cut.shape)[k], nan=-1.0) for k, n in enumerate(names)])
         inwards = np.abs(np.arange(CUTS + 1) - np.where(solution.assembled[start], 0, CUTS)[:, None])
         best = np.argmax(np.where(opens[:, None] & (values >= 0.0), inwards, values), axis=1)
@@ -448,17 +448,17 @@ def _list_pin_loads(solution: Solution, between: Between) -> dict[str, PinLoad]:
 
 def _find_strokes(scene: Scene, solution: Solution) -> tuple[float, float]:
     """Find the least and the greatest stroke over all that the commanded bar can reach on its branch."""
-    at, first = solution.at, int(np.argmax(solution.assembled))
-    here = float(at.angle[first])
-    intervals = find_intervals(scene.linkage, at.bar)
+    positions, first = solution.at, int(np.argmax(solution.assembled))
+    here = float(positions.angle[first])
+    intervals = find_intervals(scene.linkage, positions.bar)
     low, high = min(intervals, key=lambda ends: (here - ends[0]) % TURN - (ends[1] - ends[0]))
     width = high - low
     low = here - ((here - low) % TURN if width < TURN else 0.5 * TURN)
     angles = np.linspace(low + INSET * width, low + (1.0 - INSET) * width, FINE + 1)
-    motion = Motion(**{f"theta_{at.bar}": angles}, branch=int(at.branch[first]))  # type: ignore[arg-type]
+    motion = Motion(**{f"theta_{positions.bar}": angles}, branch=int(positions.branch[first]))  # type: ignore[arg-type]
     stroke = solve(replace(scene, motion=motion, tolerances=()), "position").stroke
     assert stroke is not None
-    if at.stroke is not None:  # its side ends where the stroke turns back
+    if positions.stroke is not None:  # its side ends where the stroke turns back
         place = int(np.argmin(np.abs(angles - here)))
         steps = np.sign(np.diff(stroke))
         way = steps[min(place, FINE - 1)]

@@ -163,8 +163,8 @@ def _count_digits(torque: Array, error: Array) -> list[str]:
     """Count the digits of the torque that are not round-off."""
     with np.errstate(all="ignore"):
         digits = np.clip(np.floor(np.log10(np.abs(torque) / error)), 0, MOST_DIGITS)
-    known = np.isfinite(torque) & np.isfinite(error)
-    return write_cells(np.where(known, np.where(error == 0.0, MOST_DIGITS, digits), np.nan))
+    finite = np.isfinite(torque) & np.isfinite(error)
+    return write_cells(np.where(finite, np.where(error == 0.0, MOST_DIGITS, digits), np.nan))
 
 
 @contextmanager

@@ -26,11 +26,11 @@ MOST_RUNS = 5
 SCHEMA = "fourbar-tolerance/1"
 
 
-def list_shown_parts(found: Tolerances) -> list[str]:
+def list_shown_parts(spreads: Tolerances) -> list[str]:
     """Torque and magnitudes of pin forces, or where the scene states no speed the angles; and its own points."""
-    own = [f"{point.name}_{letter}" for point in found.scene.points for letter in "xy"]
-    drive = [name for name in (COUPLE.value, LINE.value) if name in found.spreads]
-    return [*([*drive, *(f"|{name}|" for name in PIN_FORCES)] if drive else ["theta_3", "theta_4"]), *own]
+    points = [f"{point.name}_{letter}" for point in spreads.scene.points for letter in "xy"]
+    drive = [name for name in (COUPLE.value, LINE.value) if name in spreads.spreads]
+    return [*([*drive, *(f"|{name}|" for name in PIN_FORCES)] if drive else ["theta_3", "theta_4"]), *points]
 
 
 def find_part_unit(part: str) -> str:
@@ -39,53 +39,53 @@ def find_part_unit(part: str) -> str:
     return unit
 
 
-def write_heading(found: Tolerances, units: Conversion = DEGREES) -> list[str]:
+def write_heading(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
     """Write the lines above the table."""
     lines = [
-        *describe_counts(found, units),
+        *describe_counts(spreads, units),
         "each quantity at the position where its first-order worst case (worst) is largest; sigma is the standard",
         "deviation of the samples; the variance there is due to",
     ]
-    for part in list_shown_parts(found):
-        if (at := find_worst_position(found.spreads[part])) is not None and (
-            most := _name_largest(found, found.spreads[part], at)
+    for part in list_shown_parts(spreads):
+        if (worst := find_worst_position(spreads.spreads[part])) is not None and (
+            most := _name_largest(spreads, spreads.spreads[part], worst)
         ):
             lines.append(f"  {part}: {most}")
     return lines
 
 
-def describe_counts(found: Tolerances, units: Conversion = DEGREES) -> list[str]:
+def describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
     """Say what was tried, what of it has no answer, and where first order and samples part."""
-    n = len(found.theta_2)
-    count = f"{len(found.scene.tolerances)} tolerance" + ("s" if len(found.scene.tolerances) > 1 else "")
-    lines = [f"{count}, {found.samples} samples (seed {found.seed}), {n} positions"]
-    if found.invalid:
-        lines.append(f"{_write_share(found.invalid, found)} have an impossible dimension, such as a length below 0")
-    if found.apart:
+    n = len(spreads.theta_2)
+    count = f"{len(spreads.scene.tolerances)} tolerance" + ("s" if len(spreads.scene.tolerances) > 1 else "")
+    lines = [f"{count}, {spreads.samples} samples (seed {spreads.seed}), {n} positions"]
+    if spreads.invalid:
+        lines.append(f"{_write_share(spreads.invalid, spreads)} have an impossible dimension, such as a length below 0")
+    if spreads.apart:
         lines.append(
-            f"{_write_share(found.apart, found)} do not assemble at some position at which the nominal linkage does"
+            f"{_write_share(spreads.apart, spreads)} do not assemble at some position at which the nominal linkage does"
         )
-    lines += [line for part in list_shown_parts(found) if (line := describe_parted(found, part, units))]
+    lines += [line for part in list_shown_parts(spreads) if (line := describe_parted(spreads, part, units))]
     return lines
 
 
-def _write_share(count: int, found: Tolerances) -> str:
-    return f"{count} of {found.samples} samples ({100.0 * count / found.samples:.3g} %)"
+def _write_share(count: int, spreads: Tolerances) -> str:
+    return f"{count} of {spreads.samples} samples ({100.0 * count / spreads.samples:.3g} %)"
 
 
-def describe_parted(found: Tolerances, part: str, units: Conversion = DEGREES) -> str:
+def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES) -> str:
     """Say where first order and samples differ; empty where they do not."""
-    spread = found.spreads[part]
-    where = np.flatnonzero(spread.parted)
-    if not where.size:
+    spread = spreads.spreads[part]
+    rows = np.flatnonzero(spread.parted)
+    if not rows.size:
         return ""
     unit, factor = find_unit_in("rad", units)
-    runs = np.split(where, np.flatnonzero(np.diff(where) > 1) + 1)
-    ends = [" to ".join(f"{factor * found.theta_2[i]:.6g}" for i in dict.fromkeys((run[0], run[-1]))) for run in runs]
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    ends = [" to ".join(f"{factor * spreads.theta_2[i]:.6g}" for i in dict.fromkeys((run[0], run[-1]))) for run in runs]
     places = ", ".join(ends[:MOST_RUNS]) + (", ..." if len(ends) > MOST_RUNS else "")
     return (
         f"{part}: the samples spread by more than {100.0 * PARTED:g} % more or less than first order says at "
-        f"{where.size} of {len(found.theta_2)} positions (theta_2 = {places} {unit}): trust the samples there"
+        f"{rows.size} of {len(spreads.theta_2)} positions (theta_2 = {places} {unit}): trust the samples there"
     )
 
 
@@ -94,31 +94,31 @@ def find_worst_position(spread: Spread) -> int | None:
     return int(np.nanargmax(spread.worst)) if np.isfinite(spread.worst).any() else None
 
 
-def make_table(found: Tolerances, units: Conversion = DEGREES) -> "Table":
+def make_table(spreads: Tolerances, units: Conversion = DEGREES) -> "Table":
     """One row for each quantity."""
     angle_unit, of_angle = find_unit_in("rad", units)
     heads = ("", "\nunit", f"theta_2\n{angle_unit}", "\nnominal", "\nsigma", f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %")
     rows = []
-    for part in list_shown_parts(found):
-        spread = found.spreads[part]
-        if (at := find_worst_position(spread)) is None:
+    for part in list_shown_parts(spreads):
+        spread = spreads.spreads[part]
+        if (worst := find_worst_position(spread)) is None:
             continue
         columns = (spread.nominal, spread.deviation, spread.low, spread.high, spread.least, spread.greatest)
         unit, factor = find_unit_in(find_part_unit(part), units)
-        numbers = [f"{factor * column[at]:.6g}" for column in columns]
-        numbers[1] = f"{factor * spread.deviation[at]:.3g}"
-        angle = f"{of_angle * found.theta_2[at]:.6g}"
-        rows.append([part, unit, angle, *numbers, f"{factor * spread.worst[at]:.3g}"])
+        numbers = [f"{factor * column[worst]:.6g}" for column in columns]
+        numbers[1] = f"{factor * spread.deviation[worst]:.3g}"
+        angle = f"{of_angle * spreads.theta_2[worst]:.6g}"
+        rows.append([part, unit, angle, *numbers, f"{factor * spread.worst[worst]:.3g}"])
     return make_plain_table((*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0)
 
 
-def _name_largest(found: Tolerances, spread: Spread, at: int) -> str:
+def _name_largest(spreads: Tolerances, spread: Spread, worst: int) -> str:
     """Name the two tolerances with the largest shares of the variance."""
-    shares, total = spread.shares[:, at], float(spread.shares[:, at].sum())
+    shares, total = spread.shares[:, worst], float(spread.shares[:, worst].sum())
     if not total > 0.0:
         return ""
     order = [i for i in np.argsort(-shares)[:2] if shares[i] > 0.0]
-    return ", ".join(f"{100.0 * shares[i] / total:.0f} % {found.scene.tolerances[i].key}" for i in order)
+    return ", ".join(f"{100.0 * shares[i] / total:.0f} % {spreads.scene.tolerances[i].key}" for i in order)
 
 
 def collect_tolerances(
@@ -134,17 +134,17 @@ def collect_tolerances(
     shown = nullcontext(progress) if quiet else show_running("the samples of the tolerances are solved")
     try:
         with shown as report:
-            found = tolerances(positions, PAGE_SAMPLES, progress=report)
+            spreads = tolerances(positions, PAGE_SAMPLES, progress=report)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
-    at = np.linspace(0, len(found.theta_2) - 1, len(places)).round().astype(int)  # a law is thinned as in `animate`
+    rows = np.linspace(0, len(spreads.theta_2) - 1, len(places)).round().astype(int)  # a law is thinned as in `animate`
 
     def short(values: Array, digits: int) -> list[float | None]:
-        return [float(f"{x:.{digits}g}") if math.isfinite(x) else None for x in values[at].tolist()]
+        return [float(f"{x:.{digits}g}") if math.isfinite(x) else None for x in values[rows].tolist()]
 
     parts: dict[str, Any] = {}
-    for part in list_shown_parts(found):
-        spread = found.spreads[part]
+    for part in list_shown_parts(spreads):
+        spread = spreads.spreads[part]
         ends = {name: getattr(spread, name) - spread.nominal for name in ("low", "high", "least", "greatest")}
         away = {**ends, "worst": spread.worst, "deviation": spread.deviation}
         with np.errstate(all="ignore"):
@@ -155,25 +155,30 @@ def collect_tolerances(
             **{name: short(values, 4) for name, values in away.items()},
             "shares": [short(share, 3) for share in shares],
         }
-    return {"lines": describe_counts(found), "keys": [each.key for each in scene.tolerances], "parts": parts}
+    return {
+        "lines": describe_counts(spreads),
+        "keys": [tolerance.key for tolerance in scene.tolerances],
+        "parts": parts,
+    }
 
 
-def write_json(found: Tolerances) -> str:
+def write_json(spreads: Tolerances) -> str:
     """One object, SI and rad; arrays over the positions, null where there is no value."""
-    stated = found.scene.tolerances
-    keys = [each.key for each in stated]
+    stated = spreads.scene.tolerances
+    keys = [tolerance.key for tolerance in stated]
     return write_object(
         SCHEMA,
-        title=found.scene.title,
-        samples=found.samples,
-        seed=found.seed,
+        title=spreads.scene.title,
+        samples=spreads.samples,
+        seed=spreads.seed,
         tolerances={
-            each.key: {"width": each.width, "distribution": "normal" if each.sigma else "uniform"} for each in stated
+            tolerance.key: {"width": tolerance.width, "distribution": "normal" if tolerance.sigma else "uniform"}
+            for tolerance in stated
         },
-        apart=found.apart,
-        invalid=found.invalid,
-        theta_2=found.theta_2,
-        without_value=found.without,
+        apart=spreads.apart,
+        invalid=spreads.invalid,
+        theta_2=spreads.theta_2,
+        without_value=spreads.without,
         quantities={
             part: {
                 **{name: array for name, array in spread._asdict().items() if name != "shares"},
@@ -181,6 +186,6 @@ def write_json(found: Tolerances) -> str:
                 "shares": dict(zip(keys, spread.shares, strict=True)),
                 "parted": spread.parted,
             }
-            for part, spread in found.spreads.items()
+            for part, spread in spreads.spreads.items()
         },
     )

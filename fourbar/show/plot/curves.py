@@ -101,11 +101,11 @@ def find_poles(view: View) -> Indices:
     return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
 
 
-def break_at_poles(values: Array, where: Indices) -> Array:
+def break_at_poles(values: Array, poles: Indices) -> Array:
     """Copy a curve's values with NaN at the positions next to a pole, so that no line crosses it."""
     out = np.array(values, dtype=float)
     out[~np.isfinite(out)] = np.nan
-    return np.insert(out, where + 1, np.nan)
+    return np.insert(out, poles + 1, np.nan)
 
 
 def choose_limit(values: list[Array]) -> float | None:
@@ -128,11 +128,11 @@ def clip(axes: "Axes", view: View, curves: dict[str, Array], limit: float | None
     index = int(np.nanargmax(np.where(np.isfinite(worst), np.abs(worst), np.nan)))
     if abs(worst[index]) <= limit:
         return
-    where = view.axis.words(view.sweep.at.places[index], 5) if view.time is None else f"t = {view.time[index]:.4g} s"
+    words = view.axis.words(view.sweep.at.places[index], 5) if view.time is None else f"t = {view.time[index]:.4g} s"
     note(
         view,
         f"{what} clipped at {write_number(limit * factor)} {name_of_unit}; the largest evaluated, {name} = "
-        f"{write_quantity(worst[index], unit, view.units)}, is at {where}.",
+        f"{write_quantity(worst[index], unit, view.units)}, is at {words}.",
     )
 
 
@@ -143,7 +143,7 @@ def draw_angles(axes: "Axes", view: View) -> None:
     for bar in bars:
         values = np.degrees(getattr(view.sweep, f"theta_{bar}"))
         axes.plot(over, values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\theta_{bar}$")
-    shown = np.concatenate([np.degrees(getattr(other.sweep, f"theta_{bar}")) for other in view.alike for bar in bars])
+    shown = np.concatenate([np.degrees(getattr(branch.sweep, f"theta_{bar}")) for branch in view.alike for bar in bars])
     set_degree_ticks(axes.yaxis, 1.3 * float(np.nanmax(shown) - np.nanmin(shown)) + 1e-9)
     if len(bars) > 2:
         axes.set(ylabel=r"$\theta$ (°)", title="Angles of the bars")
@@ -167,7 +167,7 @@ def _draw_rates(axes: "Axes", view: View, letter: str, unit: str, title: str, wh
         axes.plot(over, factor * values, color=BAR_COLOURS[bar], ls=BAR_DASHES[bar], label=rf"$\{letter}_{bar}$")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=rf"$\{letter}$ ({shown_unit})", title=title)
-    limit = choose_limit([getattr(other.sweep, f"{letter}_{bar}") for other in view.alike for bar in others])
+    limit = choose_limit([getattr(branch.sweep, f"{letter}_{bar}") for branch in view.alike for bar in others])
     clip(axes, view, curves, limit, what, unit)
     place_legend(axes)
 
@@ -202,17 +202,19 @@ draw_speeds = partial(_draw_points, letter="v", unit="m/s", title="Speeds of poi
 draw_point_accelerations = partial(_draw_points, letter="a", unit="m/s^2", title="Accelerations of points")
 
 
-def _draw_drive(axes: "Axes", view: View, of: Callable[[Solution], Array], letter: str, unit: str, title: str) -> None:
+def _draw_drive(
+    axes: "Axes", view: View, read: Callable[[Solution], Array], letter: str, unit: str, title: str
+) -> None:
     """Draw a quantity of the drive, with its poles."""
-    over, bar, where = draw_axes(axes, view), view.scene.drive_bar, find_poles(view)
-    values, everywhere = of(view.sweep), [of(other.sweep) for other in view.alike]
+    over, bar, poles = draw_axes(axes, view), view.scene.drive_bar, find_poles(view)
+    values, everywhere = read(view.sweep), [read(branch.sweep) for branch in view.alike]
     limit = choose_limit(everywhere)
     factor, shown_unit = choose_unit(limit or find_greatest(*everywhere), unit, view.units)
     symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
-    axes.plot(break_at_poles(over, where), factor * break_at_poles(values, where), color=INK, label=symbol)
-    for index in where:
+    axes.plot(break_at_poles(over, poles), factor * break_at_poles(values, poles), color=INK, label=symbol)
+    for index in poles:
         axes.axvline(0.5 * float(over[index] + over[index + 1]), color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
-    if where.size:
+    if poles.size:
         poles_of = f"torque on bar {bar} ({POLE_REASON[bar]})" if bar else "drive's force (its line has no lever)"
         note(view, f"Dotted: poles of the {poles_of}.")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
@@ -245,7 +247,7 @@ def draw_stroke(axes: "Axes", view: View) -> None:
 
 def list_force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:
     """Magnitudes of pin forces, of every branch that shares the scales."""
-    return [np.hypot(*getattr(other.sweep, name).T) for other in view.alike for name in names]
+    return [np.hypot(*getattr(branch.sweep, name).T) for branch in view.alike for name in names]
 
 
 def draw_forces(axes: "Axes", view: View) -> None:
@@ -255,9 +257,9 @@ def draw_forces(axes: "Axes", view: View) -> None:
     everywhere = list_force_sizes(view)
     limit = choose_limit(everywhere)
     factor, unit = choose_unit(limit or find_greatest(*everywhere), "N", view.units)
-    where = find_poles(view)
+    poles = find_poles(view)
     for name, values in sizes.items():
-        axes.plot(break_at_poles(over, where), factor * break_at_poles(values, where), **choose_force_line(name))
+        axes.plot(break_at_poles(over, poles), factor * break_at_poles(values, poles), **choose_force_line(name))
     axes.set_ylim(bottom=0.0)
     axes.set(ylabel=f"$|F|$ ({unit})", title="Pin forces")
     clip(axes, view, sizes, limit, "Pin forces", "N")
@@ -267,12 +269,12 @@ def draw_forces(axes: "Axes", view: View) -> None:
 def draw_energy(axes: "Axes", view: View) -> None:
     """Kinetic energy of a free motion, and the work that made it."""
     over = draw_axes(axes, view)
-    own = compute_energies(view.scene, view.sweep)
-    shared = [compute_energies(other.scene, other.sweep) for other in view.others] + [own]
-    most = find_greatest(*(values for each in shared for values in (each.kinetic, *each.work.values())))
+    energies = compute_energies(view.scene, view.sweep)
+    shared = [compute_energies(branch.scene, branch.sweep) for branch in view.others] + [energies]
+    most = find_greatest(*(values for energy in shared for values in (energy.kinetic, *energy.work.values())))
     factor, unit = choose_unit(most, "J", view.units)
-    axes.plot(over, factor * own.kinetic, color=INK, lw=2.2, label="kinetic energy")
-    for (name, values), (colour, dashes) in zip(own.work.items(), cycle(WORKS), strict=False):
+    axes.plot(over, factor * energies.kinetic, color=INK, lw=2.2, label="kinetic energy")
+    for (name, values), (colour, dashes) in zip(energies.work.items(), cycle(WORKS), strict=False):
         axes.plot(over, factor * values, color=colour, ls=dashes, label=name.replace("_", " "))
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     axes.set(ylabel=f"energy ({unit})", title="Kinetic energy, and the work done")
@@ -294,9 +296,9 @@ def draw_transmission(axes: "Axes", view: View) -> None:
     axes.plot(over, mu, color=INK)
     axes.axhline(RECOMMENDED, color=MUTED, lw=0.9, ls=(0, (4, 2)))
     place = find_free_place(mu)
-    at = (over[0] + place * (over[-1] - over[0]), RECOMMENDED)
+    corner = (over[0] + place * (over[-1] - over[0]), RECOMMENDED)
     look: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "size": 7.0, "color": MUTED}
-    axes.annotate(f"{RECOMMENDED:g}° recommended", at, xytext=(0, 2), **look)
+    axes.annotate(f"{RECOMMENDED:g}° recommended", corner, xytext=(0, 2), **look)
     axes.set(ylim=(0.0, 96.0), yticks=range(0, 91, 15))
     for theta, height, marker, name in _list_marked(view):
         axes.plot(theta, height, marker, ms=6.0, mew=1.1, ls="none", label=name, clip_on=False, zorder=5, **OPEN)
@@ -321,32 +323,32 @@ def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
     """Limits of the commanded bar and dead centres, on the axis: places, mu (degrees), mark, name."""
     if view.time is not None:
         return []
-    at, marked = view.sweep.at, list[tuple[list[float], list[float], str, str]]()
-    own = np.degrees(at.angle)
-    order = np.argsort(own)
-    margin = 1.5 * float(np.median(np.abs(np.diff(own)))) if len(own) > 1 else 0.0
-    one, other = (bar for bar in MOVING_BARS if bar != at.bar)
-    for bar in sorted({2, 4, at.bar}, key=lambda bar: bar != at.bar):
+    positions, marked = view.sweep.at, list[tuple[list[float], list[float], str, str]]()
+    degrees = np.degrees(positions.angle)
+    order = np.argsort(degrees)
+    margin = 1.5 * float(np.median(np.abs(np.diff(degrees)))) if len(degrees) > 1 else 0.0
+    one, follower = (bar for bar in MOVING_BARS if bar != positions.bar)
+    for bar in sorted({2, 4, positions.bar}, key=lambda bar: bar != positions.bar):
         turned, heights = list[float](), list[float]()
-        for found in limit_positions(view.scene.linkage, bar):
-            theta = {2: found.theta_2, 3: found.theta_3, 4: found.theta_4}
-            sign = math.copysign(1.0, math.sin(theta[other] - theta[one]))
-            difference = found.theta_4 - found.theta_3
-            for place in _list_inside(own, theta[at.bar], margin if bar == at.bar else 0.0):
-                if bar == at.bar or at.branch[np.argmin(np.abs(own - place))] == sign:
+        for limit in limit_positions(view.scene.linkage, bar):
+            theta = {2: limit.theta_2, 3: limit.theta_3, 4: limit.theta_4}
+            sign = math.copysign(1.0, math.sin(theta[follower] - theta[one]))
+            difference = limit.theta_4 - limit.theta_3
+            for place in _list_inside(degrees, theta[positions.bar], margin if bar == positions.bar else 0.0):
+                if bar == positions.bar or positions.branch[np.argmin(np.abs(degrees - place))] == sign:
                     turned.append(place)
                     heights.append(math.degrees(math.atan2(abs(math.sin(difference)), abs(math.cos(difference)))))
-        if at.stroke is not None:  # over which its bar's angle rises or falls throughout
-            turned = np.interp(turned, own[order], view.axis.values[order]).tolist()
-        pair = ", ".join(str(each) for each in MOVING_BARS if each != bar)
-        mark, what = ("s", "limit") if bar == at.bar else ("D", "dead centre")
+        if positions.stroke is not None:  # over which its bar's angle rises or falls throughout
+            turned = np.interp(turned, degrees[order], view.axis.values[order]).tolist()
+        pair = ", ".join(str(number) for number in MOVING_BARS if number != bar)
+        mark, what = ("s", "limit") if bar == positions.bar else ("D", "dead centre")
         marked.append((turned, heights, mark, f"{what}: bars {pair} in line"))
     return [entry for entry in marked if entry[0]]
 
 
-def _list_inside(own: Array, angle: float, margin: float) -> list[float]:
+def _list_inside(angles: Array, angle: float, margin: float) -> list[float]:
     """List an angle (rad) and its full turns that lie in the sweep, degrees."""
-    low, high = float(own.min()) - margin, float(own.max()) + margin
+    low, high = float(angles.min()) - margin, float(angles.max()) + margin
     start = math.degrees(angle)
     first = math.ceil((low - start) / 360.0)
     return [start + 360.0 * k for k in range(first, math.floor((high - start) / 360.0) + 1)]
@@ -365,26 +367,26 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     from matplotlib.ticker import MaxNLocator
 
     force, look = getattr(view.sweep, name), choose_force_line(name)
-    direction, own = np.arctan2(force[:, 1], force[:, 0]), np.hypot(*force.T)
+    direction, size_here = np.arctan2(force[:, 1], force[:, 0]), np.hypot(*force.T)
     everywhere = list_force_sizes(view, (name,))
     limit = choose_limit(everywhere)
     top = limit or 1.08 * find_greatest(*everywhere) or 1.0
     factor, unit = choose_unit(top, "N", view.units)
-    where = find_poles(view)
+    poles = find_poles(view)
     over, every, apart = _describe_spacing(view)
     marks = np.unique(np.round((over - over[0]) / every).astype(int))
     dots = [int(np.argmin(np.abs(over - over[0] - every * k))) for k in marks]
     # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round by the longer arc
-    known = np.isfinite(direction)
-    free = _find_free_direction(direction[known])
-    direction[known] = np.unwrap(direction[known])
-    size = np.where(own <= top, own, np.nan) if limit else own
-    axes.plot(break_at_poles(direction, where), factor * break_at_poles(size, where), **look)
+    finite = np.isfinite(direction)
+    free = _find_free_direction(direction[finite])
+    direction[finite] = np.unwrap(direction[finite])
+    size = np.where(size_here <= top, size_here, np.nan) if limit else size_here
+    axes.plot(break_at_poles(direction, poles), factor * break_at_poles(size, poles), **look)
     axes.plot(direction[dots], factor * size[dots], "o", ms=2.8, color=look["color"], ls="none")
     first = int(np.argmax(np.isfinite(size)))
     start = {**OPEN, "mec": look["color"]}
     axes.plot(direction[[first]], factor * size[[first]], "o", ms=4.6, mew=1.1, zorder=5, **start)
-    if limit and find_greatest(own) > limit:
+    if limit and find_greatest(size_here) > limit:
         note(view, f"Hodographs of {name} clipped at {write_number(factor * top)} {unit}.")
     axes.set_rlim(0.0, factor * top)
     axes.set_thetagrids(range(0, 360, 45))

@@ -161,23 +161,23 @@ def draw_figure(
         scenes = [set_branch(scene, sign) for sign in (1, -1)] if branches == "both" else [scene]
         if position is None and len(scenes) > 1:
             position = choose_common_position(scenes)
-        views = [make_view(each, position) for each in scenes]
+        views = [make_view(branch, position) for branch in scenes]
         for shown in views:
             shown.units, shown.dimensions = units, dimensions
-            shown.others = [other for other in views if other is not shown]
+            shown.others = [view for view in views if view is not shown]
             _look_between(shown)
         return Drawing(_compose(painter, size, views))
 
 
 def _look_between(shown: View) -> None:
     """Add what stands between the positions of the sweep: jumps are drawn where they are, peaks to their height."""
-    found = locate_between(shown.scene, shown.sweep)
-    shown.sweep = found.solution
-    if found.reversals:
+    between = locate_between(shown.scene, shown.sweep)
+    shown.sweep = between.solution
+    if between.reversals:
         axis = shown.axis
-        where = ", ".join(f"{axis.factor * place:.4g}{axis.unit} ({pin})" for place, pin in found.reversals)
+        places = ", ".join(f"{axis.factor * place:.4g}{axis.unit} ({pin})" for place, pin in between.reversals)
         shown.notes.append(
-            f"Dry friction reverses, and the pin forces jump, at {axis.symbol} = {where}.".replace("-", "−")
+            f"Dry friction reverses, and the pin forces jump, at {axis.symbol} = {places}.".replace("-", "−")
         )
 
 

@@ -37,8 +37,8 @@ SHORTEST = 1.0
 
 def _find_ffmpeg() -> str:
     """Find the program: the machine's own, else the one that imageio-ffmpeg brings."""
-    if (own := shutil.which("ffmpeg")) is not None:
-        return own
+    if (installed := shutil.which("ffmpeg")) is not None:
+        return installed
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
 
@@ -90,16 +90,16 @@ def write_film(
 
 def choose_frames(shown: View, count: int) -> list[int]:
     """Choose the positions shown one after the other, by index: the segment that assembles around the one drawn."""
-    closes, at = shown.sweep.assembled, shown.sweep.at
-    here = int(np.argmin(np.abs(at.places - shown.here.at.places[0])))
+    closes, positions = shown.sweep.assembled, shown.sweep.at
+    here = int(np.argmin(np.abs(positions.places - shown.here.at.places[0])))
     gaps = np.flatnonzero(~closes)
     first, last = max(gaps[gaps < here], default=-1) + 1, min(gaps[gaps > here], default=len(closes)) - 1
     if shown.time is not None:
         return [round(i) for i in np.linspace(first, last, count)]
-    if abs(at.angle[last] - at.angle[first] - math.tau) < 1e-6:
+    if abs(positions.angle[last] - positions.angle[first] - math.tau) < 1e-6:
         return [round(i) for i in np.linspace(first, last, count, endpoint=False)]
-    there = [round(i) for i in np.linspace(first, last, max(2, count // 2))]
-    return there + there[-2:0:-1]
+    forward = [round(i) for i in np.linspace(first, last, max(2, count // 2))]
+    return forward + forward[-2:0:-1]
 
 
 def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
@@ -142,10 +142,10 @@ def _make_stage(shown: View, moving: bool) -> tuple["Figure", Any]:
             move_vectors(index)
         axis, places = shown.axis, sweep.at.places
         theta = f"{axis.factor * places[index]:.1f}".replace("-", "−")
-        where = rf"{axis.label} = {theta}{axis.unit}"
+        caption = rf"{axis.label} = {theta}{axis.unit}"
         if shown.time is not None:
             theta = f"{math.degrees(sweep.theta_2[index]):.1f}".replace("-", "−")
-            where = rf"$t$ = {shown.time[index]:.2f} s, $\theta_2$ = {theta}°"
-        axes.set_title(f"{where}, {shown.branch_name} branch", pad=pad)
+            caption = rf"$t$ = {shown.time[index]:.2f} s, $\theta_2$ = {theta}°"
+        axes.set_title(f"{caption}, {shown.branch_name} branch", pad=pad)
 
     return figure, move

@@ -72,14 +72,14 @@ class Couple:
 
 def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
     """Every force and couple on a bar at the position drawn, d'Alembert's included: together they vanish."""
-    where, turned = place_of(view.scene.linkage, view.here, 0, 1.0).pins, view.state().direction(bar)
+    pins, turned = place_of(view.scene.linkage, view.here, 0, 1.0).pins, view.state().direction(bar)
     arrows: list[Arrow] = []
     couples: list[Couple] = []
     for pin in ENDS[bar]:
         name = PIN_FORCE[pin]
         onto, shown = (1.0, name) if name[2] == str(bar) else (-1.0, f"F{name[2]}{name[1]}")
         force = onto * complex(*getattr(view.here, name)[0])
-        arrows.append(Arrow(write_force_name(shown), where[pin] - where[FIRST_PIN[bar]], force, FORCE_COLOURS[name]))
+        arrows.append(Arrow(write_force_name(shown), pins[pin] - pins[FIRST_PIN[bar]], force, FORCE_COLOURS[name]))
     if view.scene.drive_bar == bar and view.scene.motion.free is None:
         couples.append(Couple(f"$T_{bar}$", float(view.here.torque[0])))  # type: ignore[index]
     recorder = _record_actions(view)
@@ -209,8 +209,8 @@ def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
 def _draw_one(
     axes: "Axes", view: View, bar: int, arrows: list[Arrow], scale: float, biggest: float, labels: Labels, span: float
 ) -> None:
-    where = place_of(view.scene.linkage, view.here, 0, 1.0).pins
-    along = where[ENDS[bar][1]] - where[ENDS[bar][0]]
+    pins = place_of(view.scene.linkage, view.here, 0, 1.0).pins
+    along = pins[ENDS[bar][1]] - pins[ENDS[bar][0]]
     end, middle = split_components(along), split_components(0.5 * along)
     line = ([0.0, end[0]], [0.0, end[1]])
     axes.plot(*line, color=BAR_COLOURS[bar], lw=5.0, alpha=0.45, solid_capstyle="round", zorder=2)
@@ -252,9 +252,9 @@ def _draw_one(
 def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
     """One line each."""
     lines = []
-    for each in couples:
-        size = write_quantity(abs(each.moment), "N m", view.units)
-        lines.append(f"{'↺' if each.moment > 0.0 else '↻'} {each.text} = {size}")
+    for couple in couples:
+        size = write_quantity(abs(couple.moment), "N m", view.units)
+        lines.append(f"{'↺' if couple.moment > 0.0 else '↻'} {couple.text} = {size}")
     axes.set_axis_off()
     look: dict[str, Any] = {"va": "top", "size": 7.5, "linespacing": 1.45, "color": INK if lines else MUTED}
     axes.text(0.0, 1.0, "\n".join(lines) or "no couples", transform=axes.transAxes, **look)

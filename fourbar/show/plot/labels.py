@@ -126,16 +126,23 @@ def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
 
 
 def _choose_spot(
-    at: Point, away: float, half: Point, dots: np.ndarray, boxes: list[Box], per_point: float, mark: float, inside: Box
+    point: Point,
+    away: float,
+    half: Point,
+    dots: np.ndarray,
+    boxes: list[Box],
+    per_point: float,
+    mark: float,
+    inside: Box,
 ) -> Point:
     """Choose the centre of the label: the candidate that covers least, the nearest and most outward first."""
-    best, best_cost, edge = at, math.inf, 0.5 * per_point * dots[:, 2]
+    best, best_cost, edge = point, math.inf, 0.5 * per_point * dots[:, 2]
     for reach in REACH:
         for k in range(DIRECTIONS):
             angle = away + (k + 1) // 2 * (1 if k % 2 else -1) * math.tau / DIRECTIONS
             cosine, sine = math.cos(angle), math.sin(angle)
             gap = (reach + mark) * per_point
-            x, y = at[0] + cosine * (gap + half[0]), at[1] + sine * (gap + half[1])
+            x, y = point[0] + cosine * (gap + half[0]), point[1] + sine * (gap + half[1])
             hit = (np.abs(dots[:, 0] - x) < half[0] + edge) & (np.abs(dots[:, 1] - y) < half[1] + edge)
             clashes = sum(abs(x - 0.5 * (b[0] + b[2])) < half[0] + 0.5 * (b[2] - b[0]) and
                           abs(y - 0.5 * (b[1] + b[3])) < half[1] + 0.5 * (b[3] - b[1]) for b in boxes)  # fmt: skip

@@ -43,15 +43,15 @@ def draw_mechanism(axes: "Axes", view: View, solution: Solution, index: int, lab
     place = place_of(view.scene.linkage, solution, index, factor)
     if view.sweep.stroke is not None:
         place = place._replace(barrel=symbols.BARREL * factor * float(np.nanmin(view.sweep.stroke)))
-    where = {name: split_components(pin) for name, pin in place.pins.items()}
+    pins = {name: split_components(pin) for name, pin in place.pins.items()}
     centre = sum(place.pins.values()) / 4.0
     middle, drawn = split_components(centre), []
     for number, (start, stop) in ENDS.items():
-        (x, y), colour = zip(where[start], where[stop], strict=True), BAR_COLOURS[number]
+        (x, y), colour = zip(pins[start], pins[stop], strict=True), BAR_COLOURS[number]
         drawn += axes.plot(x, y, color=colour, lw=4.5, solid_capstyle="round", zorder=4)
-        labels.keep_off(axes, where[start], where[stop], width=4.5)
+        labels.keep_off(axes, pins[start], pins[stop], width=4.5)
         labels.add(Label(axes, write_bar_name(view, number), (0.5 * sum(x), 0.5 * sum(y)), middle, colour, 9.0, 2.0))
-    for name, point in where.items():
+    for name, point in pins.items():
         drawn += axes.plot(*[[v] for v in point], "o", ms=6.0, mew=1.2, zorder=6, **OPEN)
         labels.add(Label(axes, pin_name(name), point, middle, INK, 9.0, 2.5))
     for name, path in solution.points.items():
@@ -85,8 +85,8 @@ def draw_mechanism(axes: "Axes", view: View, solution: Solution, index: int, lab
 
 def _list_carried(view: View, place: Place) -> Iterator[tuple[int, complex]]:
     """List what may lie off its bar: own points, mass centres, and where forces, moments and springs act."""
-    for own in view.scene.points:
-        yield own.bar, place.point(own.bar, cmath.rect(*own.from_pin))
+    for point in view.scene.points:
+        yield point.bar, place.point(point.bar, cmath.rect(*point.from_pin))
     for number in MOVING_BARS:
         if view.scene.linkage.bar(number).mass > 0.0:
             yield number, place.point(number, view.scene.linkage.bar(number).to_centre)
@@ -172,11 +172,11 @@ COUPLER_CURVES: tuple[tuple[str, Any], ...] = (
 def draw_linkage(axes: "Axes", view: View, labels: Labels, *, moving: bool = False) -> None:
     """Draw the linkage at the position drawn, over the paths of its points; with velocities where it is `moving`."""
     factor, unit, size = scale_of(view)
-    where = locate_pins(view, factor)
+    pins = locate_pins(view, factor)
     draw_paths(axes, view, labels)
     if view.dimensions:
-        at = tuple(0.5 * (a + b) for a, b in zip(where["O2"], where["O4"], strict=True))
-        labels.add(Label(axes, write_bar_name(view, 1), (at[0], at[1]), where["B"], MUTED, 9.0, 2.0))
+        middle = tuple(0.5 * (a + b) for a, b in zip(pins["O2"], pins["O4"], strict=True))
+        labels.add(Label(axes, write_bar_name(view, 1), (middle[0], middle[1]), pins["B"], MUTED, 9.0, 2.0))
     draw_mechanism(axes, view, view.here, 0, labels)
     if moving:
         draw_vectors(axes, view, view.here, factor, size)
@@ -194,8 +194,8 @@ def draw_paths(axes: "Axes", view: View, labels: Labels) -> None:
         scaled = factor * path
         axes.plot(*scaled.T, color=colour, lw=1.0, ls=dashes, zorder=2, label=name)
         labels.keep_off(axes, *[(float(x), float(y)) for x, y in scaled[:: max(1, len(scaled) // 120)]])
-    where = locate_pins(view, factor)
-    O2, O4 = where["O2"], where["O4"]
+    pins = locate_pins(view, factor)
+    O2, O4 = pins["O2"], pins["O4"]
     axes.plot(*zip(O2, O4, strict=True), color=MUTED, lw=1.0, ls=(0, (8, 3, 2, 3)), zorder=1)
     labels.keep_off(axes, O2, O4)
     for pin in (O2, O4):
@@ -215,40 +215,40 @@ def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
     sweep = view.sweep
     massive = view.scene.linkage.coupler.mass > 0.0
     middle = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
-    found: list[tuple[Array, str, Any, str]] = [
+    paths: list[tuple[Array, str, Any, str]] = [
         (sweep.A, BAR_COLOURS[2], (0, (1, 2)), "path of $A$"),
         (sweep.B, BAR_COLOURS[4], (0, (1, 2)), "path of $B$"),
         (middle, BAR_COLOURS[3], (0, (4, 1.5)), "coupler curve of " + ("$G_3$" if massive else "its mid-point")),
     ]
     for bar, centre in ((2, sweep.G2), (4, sweep.G4)):
         if view.scene.linkage.bar(bar).mass > 0.0:
-            found.append((centre, BAR_COLOURS[bar], (0, (6, 2, 1, 2)), f"path of $G_{bar}$"))
-    found += [(path, POINT, (0, (3, 1, 1, 1)), f"path of {name}") for name, path in sweep.points.items()]
+            paths.append((centre, BAR_COLOURS[bar], (0, (6, 2, 1, 2)), f"path of $G_{bar}$"))
+    paths += [(path, POINT, (0, (3, 1, 1, 1)), f"path of {name}") for name, path in sweep.points.items()]
     closes = sweep.assembled[:, None]
-    return [(np.where(closes, path, np.nan), colour, dashes, name) for path, colour, dashes, name in found]
+    return [(np.where(closes, path, np.nan), colour, dashes, name) for path, colour, dashes, name in paths]
 
 
 def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
     """Paths of the scene's own points of the coupler; where it has none, of points along its line and off it."""
     factor, unit, _ = scale_of(view)
-    where, names = locate_pins(view, factor), [point.name for point in view.scene.points if point.bar == 3]
+    pins, names = locate_pins(view, factor), [point.name for point in view.scene.points if point.bar == 3]
     for (name, path), (colour, dashes) in zip(_list_coupler_points(view, names), cycle(COUPLER_CURVES), strict=False):
         lw = 1.8 if name in (*names, "0.5") else 1.1
         axes.plot(*(factor * path).T, color=colour, lw=lw, ls=dashes, label=name, zorder=3)
     faint: dict[str, Any] = {"color": MUTED, "alpha": 0.55, "solid_capstyle": "round", "zorder": 2}
     for ends in ENDS.values():
-        axes.plot(*zip(*(where[end] for end in ends), strict=True), lw=2.5, **faint)
+        axes.plot(*zip(*(pins[end] for end in ends), strict=True), lw=2.5, **faint)
     for name in names:
         x, y = (float(x) for x in factor * view.here.points[name][0])
-        axes.plot(*zip(where["A"], (x, y), where["B"], strict=True), lw=0.8, ls=":", **faint)
+        axes.plot(*zip(pins["A"], (x, y), pins["B"], strict=True), lw=0.8, ls=":", **faint)
         axes.plot([x], [y], "D", ms=4.5, mew=1.2, zorder=8, **{**OPEN, "mec": POINT})
-        labels.keep_off(axes, where["A"], (x, y), where["B"])
-        labels.add(Label(axes, name, (x, y), where["A"], POINT, 8.5, 2.5))
-    for name, (x, y) in where.items():
+        labels.keep_off(axes, pins["A"], (x, y), pins["B"])
+        labels.add(Label(axes, name, (x, y), pins["A"], POINT, 8.5, 2.5))
+    for name, (x, y) in pins.items():
         axes.plot([x], [y], "o", ms=4.5, mew=1.0, zorder=5, **OPEN)
         if name in ("O2", "O4"):
             labels.add(Label(axes, pin_name(name), (x, y), (0.0, 1e9), INK, 8.5, 2.0))
-    labels.keep_off(axes, *where.values())
+    labels.keep_off(axes, *pins.values())
     axes.set_aspect("equal", adjustable="datalim")
     title = f"Coupler curves, {view.branch_name} branch"
     axes.set(xlabel=f"$x$ ({unit})", ylabel=f"$y$ ({unit})", title=title)

@@ -49,7 +49,7 @@ MOST_PANELS = 6
 """Torque, the four pin forces, and a point."""
 
 
-def draw_tolerances(found: Tolerances, path: str | Path, units: Conversion = SI) -> None:
+def draw_tolerances(spreads: Tolerances, path: str | Path, units: Conversion = SI) -> None:
     """Draw the deviations from the nominal with their bands into a file, whole or not at all.
 
     Raises InputError for another ending than of svg, png, pdf, or a single position; DependencyError without
@@ -57,33 +57,33 @@ def draw_tolerances(found: Tolerances, path: str | Path, units: Conversion = SI)
     """
     target = Path(path)
     kind = format_of(target)
-    if len(found.theta_2) < 2:
-        raise InputError(f"motion.{found.scene.motion.commanded}", "one position", "a picture of bands needs a sweep")
+    if len(spreads.theta_2) < 2:
+        raise InputError(f"motion.{spreads.scene.motion.commanded}", "one position", "a picture of bands needs a sweep")
     with apply_style():
         from matplotlib.figure import Figure
 
-        parts = list_shown_parts(found)[:MOST_BANDS]
+        parts = list_shown_parts(spreads)[:MOST_BANDS]
         columns = (len(parts) + 2) // 2
         figure = Figure(figsize=(2.95 * columns, 5.6), layout="constrained")
         panels = figure.subplots(2, columns, squeeze=False).ravel()
         for axes, part in zip(panels, parts, strict=False):
-            _draw_band(axes, found, part, units)
+            _draw_band(axes, spreads, part, units)
         for axes in panels[len(parts) + 1 :]:
             axes.set_axis_off()
-        _draw_shares(panels[len(parts)], found, parts[0], units)
-        title = shorten_text(found.scene.title, 80) or "Four-bar linkage"
-        figure.suptitle(f"{title}: what the tolerances do ({found.samples} samples)", **TITLE)
+        _draw_shares(panels[len(parts)], spreads, parts[0], units)
+        title = shorten_text(spreads.scene.title, 80) or "Four-bar linkage"
+        figure.suptitle(f"{title}: what the tolerances do ({spreads.samples} samples)", **TITLE)
         caption = (
             f"Deviation from the nominal. Filled: {BAND[0]:g} to {BAND[1]:g} % of the samples; thin: least and "
             "greatest sampled; dashed: first-order worst case."
         )
-        lines = [caption, *(line for part in parts if (line := describe_parted(found, part)))]
+        lines = [caption, *(line for part in parts if (line := describe_parted(spreads, part)))]
         figure.supxlabel("\n".join(textwrap.fill(line, 52 * columns) for line in lines), **CAPTION)
         save(figure, target, kind)
 
 
-def _list_positions(axes: "Axes", found: Tolerances, units: Conversion) -> Any:
-    over = axis_of(found.scene, command(found.scene), units)
+def _list_positions(axes: "Axes", spreads: Tolerances, units: Conversion) -> Any:
+    over = axis_of(spreads.scene, command(spreads.scene), units)
     axes.set_xlim(over.values.min(), over.values.max())
     if over.unit == "°":
         set_degree_ticks(axes.xaxis, 2.0 * float(np.ptp(over.values)))
@@ -91,8 +91,8 @@ def _list_positions(axes: "Axes", found: Tolerances, units: Conversion) -> Any:
     return over.values
 
 
-def _draw_band(axes: "Axes", found: Tolerances, part: str, units: Conversion) -> None:
-    spread, over = found.spreads[part], _list_positions(axes, found, units)
+def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) -> None:
+    spread, over = spreads.spreads[part], _list_positions(axes, spreads, units)
     ends = [spread.low, spread.high, spread.least, spread.greatest]
     away = [end - spread.nominal for end in ends]
     sizes = np.abs(np.concatenate([*away, spread.worst]))
@@ -111,14 +111,14 @@ def _draw_band(axes: "Axes", found: Tolerances, part: str, units: Conversion) ->
     axes.set(ylabel=f"deviation ({unit})", title=part)
 
 
-def _draw_shares(axes: "Axes", found: Tolerances, part: str, units: Conversion) -> None:
+def _draw_shares(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) -> None:
     from matplotlib.transforms import offset_copy
 
-    spread, over = found.spreads[part], _list_positions(axes, found, units)
+    spread, over = spreads.spreads[part], _list_positions(axes, spreads, units)
     with np.errstate(all="ignore"):
         shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
     order = np.argsort(-np.nan_to_num(shares).sum(axis=1))
-    names = [found.scene.tolerances[i].key for i in order]
+    names = [spreads.scene.tolerances[i].key for i in order]
     rows = [shares[i] for i in order[:MOST_SHARES]]
     if len(order) > MOST_SHARES:
         rows.append(shares[order[MOST_SHARES:]].sum(axis=0))
@@ -133,12 +133,12 @@ def _draw_shares(axes: "Axes", found: Tolerances, part: str, units: Conversion) 
 
 def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
     """One panel for each quantity over the same rows."""
-    found = sensitivity(shown.scene)
-    names = list_shown(found)[:MOST_PANELS]
-    keys = rank_numbers(found, names)[:MOST_NUMBERS][::-1]
+    derivatives = sensitivity(shown.scene)
+    names = list_shown(derivatives)[:MOST_PANELS]
+    keys = rank_numbers(derivatives, names)[:MOST_NUMBERS][::-1]
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, name in zip(panels, names, strict=True):
-        changes = {row.key: abs(row.change) for row in found.influences(name)}
+        changes = {row.key: abs(row.change) for row in derivatives.influences(name)}
         sizes = np.array([changes.get(key, 0.0) for key in keys])
         factor, unit = choose_unit(sizes.max(initial=0.0), find_unit(name), shown.units)
         axes.barh(range(len(keys)), factor * sizes, height=0.62, color=FORCE_COLOURS.get(name, INK))
@@ -146,8 +146,8 @@ def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
         axes.set(ylim=(-0.6, len(keys) - 0.4), title=shorten_text(name, 12), xlabel=unit)
         axes.grid(False, axis="y")
         axes.locator_params(axis="x", nbins=3)
-        most, own_unit = choose_unit(find_largest(found, name), find_unit(name), shown.units)
-        text = f"largest\n{most * find_largest(found, name):.3g} {own_unit}"
+        most, own_unit = choose_unit(find_largest(derivatives, name), find_unit(name), shown.units)
+        text = f"largest\n{most * find_largest(derivatives, name):.3g} {own_unit}"
         axes.text(0.98, 0.02, text, transform=axes.transAxes, ha="right", va="bottom", size=6.8)
     shown.notes.append(
         "Bars: the largest change over the sweep by 1 % of a number, of an angle by 1°; pin forces by their magnitude."

@@ -63,9 +63,9 @@ class Place(NamedTuple):
     def small(self, pin: str, size: float) -> float:
         """Shrink the size of what stands around a pin where a bar there is short: it would hide the bar."""
         ring = list(self.pins)  # in the order of the loop
-        at = ring.index(pin)
-        beside = [self.pins[ring[(at + step) % len(ring)]] for step in (-1, 1)]
-        shortest = min(abs(other - self.pins[pin]) for other in beside)
+        place = ring.index(pin)
+        beside = [self.pins[ring[(place + step) % len(ring)]] for step in (-1, 1)]
+        shortest = min(abs(pin_beside - self.pins[pin]) for pin_beside in beside)
         return min(size, max(SMALLEST * size, SHARE * shortest))
 
     def point(self, bar: int, z: complex) -> complex:
@@ -222,13 +222,13 @@ def draw_vectors(axes: "Axes", view: View, solution: Solution, factor: float, si
         sizes = [np.hypot(*values.T) for values in collect_point_vectors(view.scene, view.sweep, letter).values()]
         if not (top := choose_limit(sizes) or find_greatest(*sizes)):
             continue
-        found = collect_point_vectors(view.scene, solution, letter)
-        feet = [solution.points[name] if name in solution.points else getattr(solution, name) for name in found]
-        shafts = [LONGEST * size * v / np.maximum(np.hypot(*v.T), top)[:, None] for v in found.values()]
+        vectors = collect_point_vectors(view.scene, solution, letter)
+        feet = [solution.points[name] if name in solution.points else getattr(solution, name) for name in vectors]
+        shafts = [LONGEST * size * v / np.maximum(np.hypot(*v.T), top)[:, None] for v in vectors.values()]
         tips = np.concatenate([factor * foot + shaft for foot, shaft in zip(feet, shafts, strict=True)])
         axes.update_datalim(tips[np.isfinite(tips).all(axis=1)])
         look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.0045, "zorder": 7}
-        start = np.zeros((2, len(found)))
+        start = np.zeros((2, len(vectors)))
         drawn.append((axes.quiver(*start, *start, color=colour, label=label, **look), feet, shafts))
 
     def move(index: int) -> None:

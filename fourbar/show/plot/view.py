@@ -49,7 +49,7 @@ class View:
     def axis(self) -> "Axis":
         """Quantity on the horizontal axis: time, or the commanded quantity."""
         if self.time is not None:
-            longest = max(float(other.time[-1]) for other in self.alike if other.time is not None)
+            longest = max(float(view.time[-1]) for view in self.alike if view.time is not None)
             factor, unit = (1.0, "s") if longest >= 1.0 else choose_unit(longest, "s")
             return Axis("t", "$t$", f" {unit}", factor, factor * self.time)
         return axis_of(self.scene, self.sweep.at, self.units)
@@ -100,12 +100,14 @@ class Axis(NamedTuple):
         return f"{self.symbol} = {self.factor * place:.{digits}g}{self.unit}".replace("-", "−")
 
 
-def axis_of(scene: Scene, at: Command, units: Conversion) -> Axis:
+def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:
     """Make the axis of what is commanded."""
-    if at.stroke is not None:
+    if positions.stroke is not None:
         factor, unit = choose_unit(max(scene.linkage.lengths), "m", units)
-        return Axis("stroke", "stroke", f" {unit}", factor, factor * at.stroke)
-    return Axis(f"θ{'₀₁₂₃₄'[at.bar]}", rf"$\{at.commanded}$", "°", math.degrees(1.0), np.degrees(at.angle))
+        return Axis("stroke", "stroke", f" {unit}", factor, factor * positions.stroke)
+    return Axis(
+        f"θ{'₀₁₂₃₄'[positions.bar]}", rf"$\{positions.commanded}$", "°", math.degrees(1.0), np.degrees(positions.angle)
+    )
 
 
 def where_in_words(solution: Solution) -> str:
@@ -117,9 +119,9 @@ def where_in_words(solution: Solution) -> str:
 def collect_point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Array]:
     """Velocities ("v") or accelerations ("a") of A, B, the mass centres of bars that have mass, and own points."""
     drawn = ("A", "B", *(f"G{bar}" for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0))
-    found = {name: getattr(solution, f"{letter}_{name}") for name in drawn}
-    found |= solution.velocity if letter == "v" else solution.acceleration
-    return {name: values for name, values in found.items() if values is not None}
+    vectors = {name: getattr(solution, f"{letter}_{name}") for name in drawn}
+    vectors |= solution.velocity if letter == "v" else solution.acceleration
+    return {name: values for name, values in vectors.items() if values is not None}
 
 
 def is_over_time(scene: Scene) -> bool:
@@ -129,14 +131,16 @@ def is_over_time(scene: Scene) -> bool:
 
 def list_sweep(scene: Scene) -> Command:
     """List the positions as what is commanded rises; a single one is put among those of the default range."""
-    own = command(scene)
-    if len(own.angle) > 1:
-        return own.part(np.argsort(own.places, kind="stable"))
-    wide = command_at(scene, default_places(scene, float(own.angle[0])))
+    stated = command(scene)
+    if len(stated.angle) > 1:
+        return stated.part(np.argsort(stated.places, kind="stable"))
+    wide = command_at(scene, default_places(scene, float(stated.angle[0])))
     # the same position may lie whole turns away from the default range
-    turns = np.round((0.5 * (wide.angle[0] + wide.angle[-1]) - own.angle) / math.tau) if own.stroke is None else 0.0
-    places, first = np.unique(np.concatenate([wide.places, own.places + turns * math.tau]), return_index=True)
-    return command_at(scene, places, np.concatenate([wide.branch, own.branch])[first])
+    turns = (
+        np.round((0.5 * (wide.angle[0] + wide.angle[-1]) - stated.angle) / math.tau) if stated.stroke is None else 0.0
+    )
+    places, first = np.unique(np.concatenate([wide.places, stated.places + turns * math.tau]), return_index=True)
+    return command_at(scene, places, np.concatenate([wide.branch, stated.branch])[first])
 
 
 def choose_common_position(scenes: "list[Scene]") -> float | None:
@@ -168,13 +172,13 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     """
     if is_over_time(scene):
         return _view_motion(scene, position)
-    where = list_sweep(scene)
-    sweep = solve(scene, at=where)
+    positions = list_sweep(scene)
+    sweep = solve(scene, at=positions)
     _require_assembled(sweep)
-    own = command(scene)
+    stated = command(scene)
     if position is None:
-        position = float(own.places[0]) if len(own.angle) == 1 else choose_position([sweep])
-    branch = where.branch[[np.argmin(np.abs(where.places - position))]]
+        position = float(stated.places[0]) if len(stated.angle) == 1 else choose_position([sweep])
+    branch = positions.branch[[np.argmin(np.abs(positions.places - position))]]
     shown = View(scene, sweep, solve(scene, at=command_at(scene, np.array([position]), branch)))
     if not shown.here.assembled[0]:
         raise NotAssembledError(f"the linkage does not assemble at {where_in_words(shown.here)}")
