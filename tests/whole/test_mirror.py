@@ -53,7 +53,7 @@ JUDGED_BY = {
     "validation/scenes/test_hard_families.py": "validation/engines: exact; validation/engines/mujoco: shipped",
     "validation/report/test_sections.py": "validation/report: hard_picture",
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives led monitor motions runner",
-    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds calls cuts sensitivities equilibria "
+    "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds cuts sensitivities equilibria "
     "files variants",
     "validation/run/test_released.py": "validation/engines: pinocchio_forward; validation/engines/mujoco: released",
     "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
@@ -61,8 +61,8 @@ JUDGED_BY = {
     "validation/check/test_mjcf.py": "validation/check: differences screen; "
     "validation/engines/mujoco: describe theirs topology",
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "
-    "ladder thesis_dynamics thesis_positions thirteen",
-    "validation/regression/test_regression.py": "validation/regression: accept change changes fault history "
+    "thesis_dynamics thesis_positions thirteen",
+    "validation/regression/test_regression.py": "validation/regression: accept change changes fault "
     "record render scenes; validation/report: junit",
     "validation/report/test_report.py": "validation/report: figures machine record summary svg templating",
     # studies: each through its command

@@ -83,7 +83,7 @@ def test_the_others_run_and_the_missing_named_with_the_reason(library: str, tmp_
     assert {row["engine"] for row in rows} == {"formulas", *(ALL - ENGINES[library])}
     assert "fails" not in {row["verdict"] for row in rows}  # MuJoCo refuses bars without mass
     for name in ENGINES[library]:
-        assert f"not run {name}: {reason}" in done.stdout
+        assert f"Not run: {name}: {reason}" in done.stdout
         assert f"Not run: {name}: " in (tmp_path / "out" / "report.html").read_text()
         assert f"not run: {name}: " in (tmp_path / "out" / "report.md").read_text()
     printed = done.stderr.strip().splitlines()[-1]

@@ -17,7 +17,7 @@ COMMANDS = {
     "compare": "fourbar_validation.regression.accept:compare",
     "check": "fourbar_validation.check:check",
     "check-mjcf": "fourbar_validation.check.mjcf:command",
-    "published": "fourbar_validation.published.ladder:published",
+    "published": "fourbar_validation.published.comparison:published",
     "cost": "fourbar_validation.cost.cost:cost",
     "advise": "fourbar_validation.advise.advise:command",
 }

@@ -85,7 +85,7 @@ def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path: Path, monke
     out = tmp_path / "none.xml"
     result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-14", "-o", str(out)], standalone_mode=False)
     assert result.return_value == 1 and not out.exists()
-    assert "no setting of plain MJCF" in result.output and "inverse dynamics" in result.output
+    assert "No setting of plain MJCF" in result.output and "inverse dynamics" in result.output
     still = replace(turning(), motion=fourbar.Motion(1.0, 10.0))
     scene.write_text(fourbar.dump(still))
     result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
@@ -156,7 +156,7 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
         assert first.setting == setting and first.times > 10.0 and why in matters.write_sentence(found)
         assert all(first.times >= other.times for other in others)
     quiet = [replace(each, times=1.5) for each in found]
-    assert matters.write_sentence(quiet).startswith("no setting matters by itself")
+    assert matters.write_sentence(quiet).startswith("No setting matters by itself")
 
 
 def test_several_scenes_have_one_table(tmp_path: Path) -> None:
@@ -170,7 +170,7 @@ def test_several_scenes_have_one_table(tmp_path: Path) -> None:
     result = CliRunner().invoke(advise.command, [*files, "--error", "1e-4"], standalone_mode=False)
     assert result.return_value == 1  # one of them cannot be run through
     lines = result.output.splitlines()
-    assert lines[1].startswith("the timestep matters most here: twice as long the error is")
+    assert lines[1].startswith("The timestep matters most here. If it is twice as long, the error is")
     assert lines[-2].split()[0] == "one.toml" and lines[-1].split()[:2] == ["still.toml", "-"]
     with pytest.raises(fourbar.InputError, match="MJCF of one scene, not of 2"):
         CliRunner().invoke(advise.command, [*files, "--error", "1e-4", "-o", "x.xml"], standalone_mode=False,

@@ -296,7 +296,7 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
     monkeypatch.setattr(study, "ROUNDS", 1)
     result = CliRunner().invoke(cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False)
     assert result.exception is None and result.return_value == 0, result.output
-    assert "matters most here: " in result.output and ", because " in result.output
+    assert "matters most here. " in result.output and ", because " in result.output
     assert re.search(r"RK4 steps +ms/turn +\+-", result.output)
     assert any(re.search(r": .* \d+e-\d+ +\d+ +\S+ +\d+ % *$", line) for line in result.output.splitlines())
     folder = tmp_path / "out" / "small"

@@ -12,9 +12,14 @@ import fourbar
 from fourbar.formulas.mobility import limit_positions
 from fourbar_validation.compare.tolerance import EPS
 from fourbar_validation.published import comparison as command
-from fourbar_validation.published.comparison import explain_difference, is_explained, list_figures
+from fourbar_validation.published.comparison import (
+    explain_difference,
+    is_explained,
+    list_figures,
+    list_ladder_rows,
+    published,
+)
 from fourbar_validation.published.figures import ERRATA, PublishedFigure, compare
-from fourbar_validation.published.ladder import list_ladder_rows, published
 from fourbar_validation.published.program import (
     DATA,
     LENGTHS,

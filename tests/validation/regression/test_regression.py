@@ -29,10 +29,9 @@ from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression import record, render
-from fourbar_validation.regression.accept import accept_command, compare
+from fourbar_validation.regression.accept import HISTORY, accept_command, compare
 from fourbar_validation.regression.change import Kind
 from fourbar_validation.regression.changes import compare_rows, compare_runs
-from fourbar_validation.regression.history import HISTORY
 from fourbar_validation.regression.record import (
     About,
     Recorded,

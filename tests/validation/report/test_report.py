@@ -256,10 +256,10 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
         "2.5e-07 1.0e-05 F12 of first, 40.0 deg" in words
         and "our own consistency 1.0e-06 1.0e-05 study torque" in words
     )
-    assert "left out: 1 times, for 1 reasons (--verbose lists them)" in words and "too near" not in words
-    assert words.endswith(f"{summary.verdict} report: {tmp_path / 'report.html'}") and len(printed.splitlines()) < 14
+    assert "1 comparisons were left out, for 1 reasons; --verbose lists them." in words and "too near" not in words
+    assert words.endswith(f"{summary.verdict}. Report: {tmp_path / 'report.html'}") and len(printed.splitlines()) < 14
     print_table(summary, tmp_path, verbose=True)
-    assert "left out in 1 scene(s): extremes: too near" in " ".join(capsys.readouterr().out.split())
+    assert "extremes left out in 1 scene: too near" in " ".join(capsys.readouterr().out.split())
     assert write_markdown(summary).splitlines()[6].startswith("| mujoco-simulated")
 
 

@@ -77,11 +77,11 @@ class Advice:
             f"tc = {s.time_constant_steps:.3g} steps, pads {s.pad}, tolerance 0, flywheel {s.flywheel:g}"
         )
         if self.reached:
-            return f"{setting}: {errors}, required {self.required:g}"
+            return f"{setting}. Errors: {errors}; required: {self.required:g}."
         return (
-            f"no setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.required:g}; "
-            f"the best was {setting}: {errors}. "
-            f"The formulas, and inverse dynamics of either engine with loop multipliers, reach round-off"
+            f"No setting of plain MJCF within {MOST_STEPS} steps was found to reach {self.required:g}. "
+            f"The best was {setting}. Errors: {errors}. "
+            "The formulas, and inverse dynamics of either engine with loop multipliers, reach round-off."
         )
 
 
@@ -221,14 +221,15 @@ def command(scenes: tuple[Path, ...], wanted: float, output: Path | None) -> int
         influences = measure_influences(scene, setup, advice.best.settings)
         click.echo(f"{file.name}: {advice.reason}")
         click.echo(f"{write_sentence(influences)}")
-        click.echo(f"{len(advice.attempts)} runs of the scene, {sum(a.steps for a in advice.attempts)} steps")
+        steps = sum(attempt.steps for attempt in advice.attempts)
+        click.echo(f"The search ran the scene {len(advice.attempts)} times, {steps} steps in all.")
         reached &= advice.reached
         rows.append(
             (file.name, *advice.cells(), influences[0].setting if influences[0].times >= MATTERS else "none by itself")
         )
         if output is not None and advice.reached:
             write_text(output, write_mjcf(scene, advice.best.settings))
-            click.echo(f"written to {output}")
+            click.echo(f"The MJCF is written to {output}.")
     if len(rows) > 1:
         from rich.console import Console
 

@@ -37,9 +37,11 @@ class SettingInfluence:
     why: str
 
     def __str__(self) -> str:
-        error = f"the error is {self.error:.1e}, {self.times:.2g} times as large"
-        lost = error if math.isfinite(self.error) else "MuJoCo loses the motion"
-        return f"{self.setting} matters most here: {self.changed} {lost}, because {self.why}"
+        effect = "MuJoCo loses the motion"
+        if math.isfinite(self.error):
+            effect = f"the error is {self.error:.1e}, {self.times:.2g} times as large"
+        setting = self.setting[0].upper() + self.setting[1:]
+        return f"{setting} matters most here. If it is {self.changed}, {effect}, because {self.why}."
 
 
 def judge_trial(scene: Scene, trial: Trial) -> WorstErrors:
@@ -91,7 +93,7 @@ def write_sentence(influences: list[SettingInfluence]) -> str:
     """Name the setting that matters most, and why."""
     if influences and influences[0].times >= MATTERS:
         return str(influences[0])
-    return f"no setting matters by itself here: changed alone none makes the error {MATTERS:g} times as large"
+    return f"No setting matters by itself here: none, changed alone, makes the error {MATTERS:g} times as large."
 
 
 def _describe_changes(
@@ -116,7 +118,7 @@ def _describe_changes(
     if settings.pad is not None:
         yield (
             "the stiffness by pads",
-            "without it",
+            "left out",
             replace(settings, pad=None),
             lambda _: _find_yielding(scene, "without pads the closure"),
         )

@@ -62,12 +62,12 @@ def cost(scenes: tuple[Path, ...], out: Path) -> int:
         held = sum(law.holds for law in laws if law.decided)
         most = ranked[0].setting if ranked[0].times >= MATTERS else "none by itself"
         rows.append((name, *find_cheapest(curves), f"{held} of {sum(law.decided for law in laws)}", most))
-        click.echo(f"written to {out / name}: {', '.join(sorted(path.name for path in written))}")
+        click.echo(f"Written to {out / name}: {', '.join(sorted(path.name for path in written))}.")
     if len(rows) > 1:
         head = ("scene", *(f"RK4 steps for {error:g}" for error in WANTED), "laws hold", "matters most")
         Console().print(make_table(head, rows, show_edge=False))
     if not fitted:
-        click.echo("Nothing was compared: no law has points enough for a fit")
+        click.echo("Nothing was compared: no law has points enough for a fit.")
     return HOLDS if fitted and all(law.holds for law in fitted) else FAILED
 
 

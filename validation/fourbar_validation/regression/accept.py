@@ -1,5 +1,12 @@
-"""`python -m validation compare` and `accept`."""
+"""`python -m validation compare` and `accept`, which keeps the rows of every accepted run in one table.
 
+The table is history.parquet, which pandas and DuckDB read: one line per row, and one per time (quantity "time":
+`times_formulas` is the engine's time over that of the formulas on the scene), with the run's date, commit, machine and
+versions in columns of their own (`version_mujoco`).
+"""
+
+import hashlib
+import json
 from collections.abc import Callable, Iterable, Mapping
 from itertools import chain
 from pathlib import Path
@@ -9,15 +16,66 @@ from typing import Any
 import click
 
 from fourbar.errors import HOLDS, InputError
-from fourbar.writing import write_text
-from fourbar_validation.compare.columns import CSV_ROWS
+from fourbar.writing import write_bytes, write_text
+from fourbar_validation.compare.columns import CSV_ROWS, null_nan
 from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import FAILS, Row
+from fourbar_validation.compare.rows import FAILS, MADE_OF, Row, sort_rows
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Differences, compare_runs
-from fourbar_validation.regression.history import HISTORY, append
-from fourbar_validation.regression.record import ABOUT, ACCEPTED, TABLES, accept, find_baseline, open_run
+from fourbar_validation.regression.record import ABOUT, ACCEPTED, TABLES, About, accept, find_baseline, open_run
 from fourbar_validation.regression.scenes import find_renamed
+
+HISTORY = "history.parquet"
+TIME = "time"
+
+
+def append(file: Path, about: About, rows: list[Row], times: Mapping[tuple[str, str], float]) -> None:
+    """Append a run to the table, which is made if there is none.
+
+    A run with the same date and rows is appended once. InputError if the file is damaged or no such table.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = _write_table(about, rows, times)
+    if file.exists():
+        try:
+            old = pq.read_table(pa.BufferReader(file.read_bytes()), page_checksum_verification=True)
+            if table["run"][0].as_py() in set(old["run"].to_pylist()):
+                return
+            table = pa.concat_tables([old, table], promote_options="default")
+        except (OSError, ValueError, KeyError, TypeError, pa.ArrowException):
+            raise InputError("--to", str(file), "is damaged, or no table written by `accept`") from None
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(file, sink.getvalue().to_pybytes())
+
+
+def _write_table(about: About, rows: list[Row], times: Mapping[tuple[str, str], float]) -> Any:
+    """Write a run as columns; a text that recurs is kept once."""
+    import pyarrow as pa
+
+    nothing: dict[str, Any] = dict.fromkeys((*MADE_OF, "times_formulas"))
+    lines = [nothing | {name: null_nan(getattr(row, name)) for name in MADE_OF} for row in sort_rows(rows)]
+    for (scene, engine), ratio in sorted(times.items()):
+        lines.append(nothing | {"scene": scene, "engine": engine, "quantity": TIME, "times_formulas": ratio})
+    name = hashlib.sha256(repr((about.date, [tuple(line.values()) for line in lines])).encode()).hexdigest()[:16]
+    run = {"run": name, "date": about.date, "commit": about.commit, "machine": about.machine}
+    run |= {"settings": json.dumps(about.settings, sort_keys=True)}
+    run |= {f"version_{name}": version for name, version in about.versions.items()}
+    hashes = {
+        scene: hashlib.sha256(json.dumps(dict(entries), sort_keys=True).encode()).hexdigest()[:16]
+        for scene, entries in about.scenes.items()
+    }
+    kinds = MADE_OF | {"times_formulas": float}
+    word, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
+    names = [*run, *MADE_OF, "scene_hash", "times_formulas"]
+    schema = pa.schema([(name, number if kinds.get(name) is float else word) for name in names])
+    return pa.Table.from_pylist(
+        [run | line | {"scene_hash": hashes.get(line["scene"], "")} for line in lines], schema=schema
+    )
+
 
 FORMS: dict[str, Callable[[Differences], str]] = {
     "markdown": render.write_markdown,

@@ -37,17 +37,18 @@ def print_table(summary: Summary, out: Path, *, verbose: bool = False) -> None:
             f"error {write_number(row.error)}, allowed {write_number(row.allowed)}: {escape(clean_line(row.reason))}"
         )
     if summary.counts[FAILS] > len(summary.failures):
-        console.print(f"and {summary.counts[FAILS] - len(summary.failures)} more that fail, in results.csv")
+        console.print(f"{summary.counts[FAILS] - len(summary.failures)} more rows fail; results.csv has them.")
     if verbose:
         for engine, reason, count in summary.refusals:
-            console.print(f"left out in {count} scene(s): {escape(engine)}: {escape(clean_line(reason))}")
+            scenes = f"{count} scene{'s' if count > 1 else ''}"
+            console.print(f"{escape(engine)} left out in {scenes}: {escape(clean_line(reason))}")
     elif summary.refusals:
         count = sum(count for *_, count in summary.refusals)
-        console.print(f"left out: {count} times, for {len(summary.refusals)} reasons (--verbose lists them)")
+        console.print(f"{count} comparisons were left out, for {len(summary.refusals)} reasons; --verbose lists them.")
     for engine, reason in summary.missing:
-        console.print(f"[bold red]not run[/] {escape(engine)}: {escape(reason)}")
-    console.print(f"[bold]{escape(summary.verdict)}[/]")
-    console.print(f"report: {escape(clean_line(str(out / 'report.html')))}", soft_wrap=True)
+        console.print(f"[bold red]Not run:[/] {escape(engine)}: {escape(reason)}")
+    console.print(f"[bold]{escape(summary.verdict)}.[/]")
+    console.print(f"Report: {escape(clean_line(str(out / 'report.html')))}", soft_wrap=True)
 
 
 def _make_engine_table(summary: Summary) -> "Table":

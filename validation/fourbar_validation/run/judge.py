@@ -20,11 +20,10 @@ from fourbar_validation.run.printed import check_blocks, check_error_bars, check
 from fourbar_validation.run.question import Question, select_positions
 from fourbar_validation.run.released import check_released
 from fourbar_validation.run.shipped.bounds import extremes
-from fourbar_validation.run.shipped.calls import study
 from fourbar_validation.run.shipped.cuts import internal_forces
 from fourbar_validation.run.shipped.equilibria import equilibria
 from fourbar_validation.run.shipped.files import sdf, usd
-from fourbar_validation.run.shipped.sensitivities import sensitivity, tolerances
+from fourbar_validation.run.shipped.sensitivities import sensitivity, study, tolerances
 
 
 class Check(NamedTuple):
