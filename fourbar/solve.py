@@ -116,9 +116,9 @@ def solve(
                 evaluated = evaluate(case, block, wanted, names)
                 _store_block(case, evaluated, arrays, code, part)
     unwrap_angles(arrays, commanded.bar)
-    for name, stated in (("stroke", commanded.stroke), ("stroke_speed", commanded.stroke_speed)):
-        if stated is not None and name in arrays:  # as commanded, wherever it has a value
-            arrays[name][...] = stated + 0.0 * arrays[name]
+    if commanded.stroke is not None:
+        for name in {"stroke", "stroke_speed"} & arrays.keys():  # as commanded, wherever it has a value
+            arrays[name][...] = getattr(commanded, name) + 0.0 * arrays[name]
     if study is not None:
         study.refuse(arrays, code)
     solution = make_solution(scene if study is None else study.members(None, 1), commanded, code, arrays)

@@ -42,7 +42,7 @@ class Actions:
         self.moments: dict[int, Any] = {}
         """Moments about the first pins O2, A, O4, N m, without the couples between two bars."""
         self.on_coupler: list[tuple[Any, Any, Any, Any]] = []
-        """Forces on the coupler, where they act from pin B (in the bar's frame, and beyond, world axes); moments."""
+        """Forces on the coupler with where they act, as in `force`, and moments."""
         self.couples: dict[str, Any] = {}
         """Couples between the two bars that meet at a pin, on the second of them, N m."""
         self.through: dict[str, Any] = {}
@@ -54,26 +54,27 @@ class Actions:
             term.act(self, self.state)
         return self
 
-    def force(self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = 0.0j) -> None:
+    def force(self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = None) -> None:
         """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.
 
         Parameters
         ----------
         point : of the bar's frame at its first pin, complex, m.
-        beyond : vector from there to where the force acts, complex, m, world axes.
+        beyond : vector from there to where the force acts, complex, m, world axes; left out: it acts there.
         """
         if bar != 1:
             self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
-            self.twist(bar, cross(-force, point * self.state.direction(bar) + beyond))
+            arm = point * self.state.direction(bar)
+            self.twist(bar, cross(-force, arm if beyond is None else arm + beyond))
             if bar == 3:
-                self.on_coupler.append((force, point - self.state.lengths.b, beyond, 0.0))
+                self.on_coupler.append((force, point, beyond, 0.0))
 
     def moment(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar, N m; on the ground it does nothing."""
         if bar != 1:
             self.twist(bar, moment)
             if bar == 3:
-                self.on_coupler.append((0.0j, 0.0j, 0.0j, moment))
+                self.on_coupler.append((None, 0.0j, None, moment))
 
     def twist(self, bar: int, moment: Number) -> None:
         """Add a moment about a bar's first pin."""
@@ -116,7 +117,10 @@ class Actions:
             for key, of_one in getattr(unit, name).items():
                 sums[key] = sums.get(key, 0.0) + size * of_one
             setattr(total, name, sums)
-        scaled = [(size * force, point, beyond, size * moment) for force, point, beyond, moment in unit.on_coupler]
+        scaled = [
+            (None if force is None else size * force, point, beyond, size * moment)
+            for force, point, beyond, moment in unit.on_coupler
+        ]
         total.on_coupler = self.on_coupler + scaled
         return total
 
@@ -141,7 +145,10 @@ class Actions:
         """Compute the moment on the coupler about pin B, N m, which is small where forces act near B."""
         total = self.couples.get("A", 0.0) - self.couples.get("B", 0.0)
         for force, point, beyond, moment in self.on_coupler:
-            total = total + moment + cross(-force, point * self.state.at.u3 + beyond)
+            total = total + moment
+            if force is not None:
+                arm = (point - self.state.lengths.b) * self.state.at.u3
+                total = total + cross(-force, arm if beyond is None else arm + beyond)
         return total
 
     def sense(self, pin: str) -> Number:

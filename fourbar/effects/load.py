@@ -135,7 +135,7 @@ class Load(Effect):
         if self.force is not None:
             force, arm, G = polar(*self.force), polar(*self.at), actions.bodies[self.bar - 2].z
             if self.frame == "bar":
-                force, G, arm = force * state.direction(self.bar), G + arm, 0.0j
+                force, G, arm = force * state.direction(self.bar), G + arm, None
             actions.force(self.bar, factor * force, G, arm)
         if is_any(self.moment != 0.0):
             actions.moment(self.bar, factor * self.moment)

@@ -183,8 +183,11 @@ class Case(NamedTuple):
         half = decide_half_angles(self.linkage, self.path.unit, half, index, q, remainder, self.path.bar)
         return half, index
 
-    def _compute_inertia(self, state: State, acceleration: Any) -> "_Inertia":
-        """Compute d'Alembert's forces and moments, and what they add to the generalized force."""
+    def _compute_inertia(self, state: State, acceleration: Any, sine: Any) -> "_Inertia":
+        """Compute d'Alembert's forces and moments, and what they add to the generalized force.
+
+        `sine`: of theta_3 - theta_2 if the moment about pin B is wanted, otherwise None.
+        """
         a, at, k, square = self.lengths.a, state.at, state.k, state.speed * state.speed
         wrenches, mass_at_A = inertia_wrenches(a, self.bodies, at, state.moving)
         inertial = others = half_slope(a, self.bodies, at, k) * square
@@ -194,17 +197,15 @@ class Case(NamedTuple):
             inertial = others + of_input * acceleration
         if self.path.bar != 2:  # bar 2 has inertia of its own
             others = others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
-        return _Inertia(inertial, others, wrenches, mass_at_A)
+        about_B = 0.0 if sine is None else coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine)
+        return _Inertia(inertial, others, wrenches, mass_at_A, about_B)
 
     def dynamics(self, state: State, acceleration: Any, side: Any = 0) -> Dynamics:
         """Compute pin forces and the drive under everything that acts; for the parameters see `Actions`."""
         actions = Actions(state, self.bodies, side).add(self.terms)
-        inertia = self._compute_inertia(state, acceleration)
         driven = (self.drive_bar,) if self.drive is None else self.drive.apart
         sines = {bar: self.path.drive_sine(state.at, bar) for bar in driven}
-        if 4 in sines:
-            about_B = coupler_about_B(self.lengths, self.bodies[1], state.at, state.moving, sines[4])
-            inertia = inertia._replace(about_B=about_B)
+        inertia = self._compute_inertia(state, acceleration, sines.get(4))
         unit = None if self.drive is None else self.drive.per_newton(actions)
         gain = state.k[self.drive_bar - 2] if unit is None else unit.work()[0]
         bodies = _FreeBodies(state, inertia, sines, unit, gain)
@@ -274,9 +275,10 @@ class _FreeBodies(NamedTuple):
         inertia = self.inertia if with_inertia else _Inertia()
         if self.drive is not None:
             actions = actions.plus(self.drive, driving_torque(self.gain, inertia.total, actions.work()[0]))
+        if len(self.sines) == 1:
+            (bar,) = self.sines
+            return self._solve_from_two_moments(bar, actions, inertia)
         pins = {bar: self._solve_from_two_moments(bar, actions, inertia) for bar in self.sines}
-        if len(pins) == 1:
-            return next(iter(pins.values()))
         s2, s3, s4 = (abs(self.sines[bar]) for bar in MOVING_BARS)
         first, second = (s2 >= s3) & (s2 >= s4), s3 >= s4
         forces = zip(*(pins[bar] for bar in MOVING_BARS), strict=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.evaluation.case import NO_POSITIONS, Case, Dynamics, Evaluated
-from fourbar.formulas.arithmetic import is_any, select
+from fourbar.formulas.arithmetic import angle, is_any, select
 from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
@@ -261,9 +261,9 @@ def make_no_value(quantity: Any) -> complex:
 
 
 SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
-    "theta_2": lambda state: state.theta(2),
-    "theta_3": lambda state: state.theta(3),
-    "theta_4": lambda state: state.theta(4),
+    "theta_2": lambda state: state.theta_2,
+    "theta_3": lambda state: state.q if state.bar == 3 else angle(state.at.u3),
+    "theta_4": lambda state: state.q if state.bar == 4 else angle(state.at.u4),
     "sin_mu": lambda state: state.at.sin_mu,
     "condition": lambda state: abs(state.at.sin_mu if state.bar == 2 else state.sine),
     "omega_2": lambda state: state.moving.omega_2,

@@ -9,7 +9,7 @@ Source: R. L. Norton, Design of Machinery, ch. 6 and 7; B. Paul, Kinematics and 
 
 from typing import NamedTuple
 
-from fourbar.formulas.arithmetic import Number, angle, conjugate, divisor, is_any, namespace, select, vector
+from fourbar.formulas.arithmetic import Number, conjugate, divisor, is_any, namespace, select, vector
 from fourbar.formulas.position import Loop, Position
 
 FAST = 4.0
@@ -167,10 +167,6 @@ class State(NamedTuple):
     """Independent angle, rad; None: theta_2."""
     sine: Number = None
     """Sine between the two other moving bars, zero at the limits of the bar; None: that of theta_4 - theta_3."""
-
-    def theta(self, bar: int) -> Number:
-        """Return the angle of bar 2, 3 or 4, rad: the independent one as it is, others in [-pi, pi]."""
-        return self.theta_2 if bar == 2 else self.q if bar == self.bar else angle(self.direction(bar))
 
     def direction(self, bar: int) -> Number:
         """e^{i theta} of bar 1 (from O2 to O4), 2, 3 or 4."""

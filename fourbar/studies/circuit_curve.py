@@ -57,7 +57,7 @@ class _Sizes(Actions):
         self.size: Any = 0.0
         self.fastest = np.max(np.abs([state.k.h2, state.k.h3, state.k.h4]), axis=0)
 
-    def force(self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = 0.0j) -> None:
+    def force(self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = None) -> None:
         super().force(bar, force, point, beyond)
         if bar == 3:
             self.size = self.size + np.abs(force) * self.state.lengths.a * self.fastest

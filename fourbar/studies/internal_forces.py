@@ -157,11 +157,12 @@ class _Recorder(Actions):
         self.place: Any = 0.0j
         """Point in the bar's axes where a pure couple acts."""
 
-    def force(self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = 0.0j) -> None:
+    def force(self, bar: int, force: Any, point: Any = 0.0j, beyond: Any = None) -> None:
         """Record a force on the bar, world axes."""
         if bar == self.bar:
             back = np.conj(self.state.direction(bar))
-            self.items.append((point + beyond * back, force * back, 0.0))
+            place = point if beyond is None else point + beyond * back
+            self.items.append((place, force * back, 0.0))
 
     def moment(self, bar: int, moment: Any) -> None:
         """Record a couple on the bar."""

@@ -104,9 +104,9 @@ class Recorder(Actions):
         self.arrows: dict[int, list[Arrow]] = {bar: [] for bar in BAR_NAMES}
         self.turns: dict[int, list[Couple]] = {bar: [] for bar in BAR_NAMES}
 
-    def force(self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = 0.0j) -> None:
+    def force(self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = None) -> None:
         """Add a force on a bar, applied at a point of its frame, or `beyond` it in world axes."""
-        arm = point * self.state.direction(bar) + beyond
+        arm = point * self.state.direction(bar) + (0.0j if beyond is None else beyond)
         self.arrows[bar].append(Arrow(self.name.replace("#", str(bar)), take_one(arm), take_one(force), INK))
 
     def pull(self, start: Any, end: Any, force: Number) -> None:
