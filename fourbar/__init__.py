@@ -29,8 +29,8 @@ from fourbar.scene.motion import FromLimit as FromLimit
 from fourbar.scene.motion import Law as Law
 from fourbar.scene.motion import Motion as Motion
 from fourbar.scene.motion import Sweep as Sweep
+from fourbar.scene.numbers import Point as Point
 from fourbar.scene.numbers import Tolerance as Tolerance
-from fourbar.scene.point import Point as Point
 from fourbar.solution import Solution as Solution
 from fourbar.solve import solve as solve
 

@@ -25,7 +25,7 @@ from fourbar.quantities import (
 )
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import COMMANDS
-from fourbar.scene.point import POINT_STAGES
+from fourbar.scene.numbers import POINT_STAGES
 from fourbar.scene.scene import Independent
 from fourbar.solution import Array, Solution, unwrap
 

@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fourbar.effects.actions import Actions as Actions
+    from fourbar.effects.effect import Actions as Actions
     from fourbar.effects.effect import Effect as Effect
     from fourbar.effects.flywheel import Flywheel as Flywheel
     from fourbar.effects.friction import Friction as Friction
@@ -37,7 +37,7 @@ OTHER_FILES = {
     "Effect": "effect",
     **dict.fromkeys(("Load", "Table"), "load"),
     **dict.fromkeys(("Spring", "SpringEnd"), "spring"),
-    "Actions": "actions",
+    "Actions": "effect",
     "LinearDrive": "linear_drive",
 }
 

@@ -1,19 +1,205 @@
-"""Base classes of all effects, without units or files."""
+"""Base classes of effects, and the sums of the forces and moments that loads and effects apply to the bars."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
+from functools import cache
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import Number
+from fourbar.formulas.arithmetic import Number, cross, is_any, select, sign
 from fourbar.formulas.motion import State
-from fourbar.formulas.pin_forces import PinForces
-from fourbar.linkage import PINS, Declared, require
+from fourbar.formulas.pin_forces import Bodies, Body, PinForces, Wrenches
+from fourbar.linkage import PINS, Declared, FourBar, require
 from fourbar.quantities import Array
+
+AT_REST = 50.0 * 2.0**-52
+"""A slip below this part of the input's coefficient and of those it is made of is what rounding leaves of zero."""
+
+
+def list_bodies(linkage: FourBar, effects: Iterable[Any] = ()) -> Bodies:
+    """List the inertial properties of bars 2, 3, 4, with the inertia that effects (a flywheel) add."""
+    bodies = [Body(bar.mass, bar.moment_of_inertia, bar.to_centre) for bar in linkage.moving]
+    for effect in effects:
+        for bar, inertia in effect.carried.items():
+            bodies[bar - 2] = bodies[bar - 2]._replace(I=bodies[bar - 2].I + inertia)
+    return bodies[0], bodies[1], bodies[2]
+
+
+class Actions:
+    """Sums over everything that acts on bars 2, 3, 4 apart from pins and inertia.
+
+    Parameters
+    ----------
+    state : positions and motion.
+    bodies : of bars 2, 3, 4.
+    side : the sense in which pins at rest are about to turn: +1 as theta_2 grows, -1 as it falls, 0 neither; between
+        them the part of its torque that dry friction holds them with.
+    """
+
+    def __init__(self, state: State, bodies: Bodies, side: Number = 0) -> None:
+        self.state, self.bodies, self.side = state, bodies, side
+        self.forces: dict[int, Any] = {}
+        """Resultants of the bars on which any acts, complex, N."""
+        self.moments: dict[int, Any] = {}
+        """Moments about the first pins O2, A, O4, N m, without the couples between two bars."""
+        self.on_coupler: list[tuple[Any, Any, Any, Any]] = []
+        """Forces on the coupler with where they act, as in `force`, and moments."""
+        self.couples: dict[str, Any] = {}
+        """Couples between the two bars that meet at a pin, on the second of them, N m."""
+        self.through: dict[str, Any] = {}
+        """Forces between bars 2 and 3, 3 and 4, as if through their pin, on the second of them, complex, N."""
+
+    def add(self, terms: Iterable[Any]) -> Self:
+        """Add what loads and effects do, but for what depends on the pin forces; return these sums."""
+        for term in terms:
+            term.act(self, self.state)
+        return self
+
+    def force(self, bar: int, force: Number, point: Number = 0.0j, beyond: Number = None) -> None:
+        """Add a force (complex, N, world axes) on a bar; on the ground it does nothing.
+
+        Parameters
+        ----------
+        point : of the bar's frame at its first pin, complex, m.
+        beyond : vector from there to where the force acts, complex, m, world axes; left out: it acts there.
+        """
+        if bar != 1:
+            self.forces[bar] = self.forces[bar] + force if bar in self.forces else force
+            arm = point * self.state.direction(bar)
+            self.twist(bar, cross(-force, arm if beyond is None else arm + beyond))
+            if bar == 3:
+                self.on_coupler.append((force, point, beyond, 0.0))
+
+    def moment(self, bar: int, moment: Number) -> None:
+        """Add a pure couple on a bar, N m; on the ground it does nothing."""
+        if bar != 1:
+            self.twist(bar, moment)
+            if bar == 3:
+                self.on_coupler.append((None, 0.0j, None, moment))
+
+    def twist(self, bar: int, moment: Number) -> None:
+        """Add a moment about a bar's first pin."""
+        self.moments[bar] = self.moments[bar] + moment if bar in self.moments else moment
+
+    def couple(self, pin: str, couple: Number) -> None:
+        """Add a couple on the second of the two bars that meet at a pin, and its opposite on the first, N m."""
+        self.couples[pin] = self.couples[pin] + couple if pin in self.couples else couple
+
+    def pull(self, start: Any, end: Any, force: Number) -> None:
+        """Add a force (complex, N, world axes) at a point of a bar, and its opposite at one of another bar.
+
+        It acts along the line of the two points. Between bars that meet at a pin it goes through the pin and leaves a
+        couple, by the arm of the point that is nearer to the pin; between moving bars it is in no sum of another bar.
+        """
+        pin = find_common_pin(start.bar, end.bar)
+        if pin is None:
+            self.pull_ends(start, end, force)
+            return
+        first, second = PINS[pin]
+        on_second = force if start.bar == second else -force
+        (from_start, square), (from_end, other_square) = (point.from_pin(pin, self.state) for point in (start, end))
+        by_one, by_other = from_start * self.state.direction(start.bar), from_end * self.state.direction(end.bar)
+        self.couple(pin, select(square < other_square, cross(-on_second, by_one), cross(-on_second, by_other)))
+        if first == 1:  # the pin is the first one of the other bar
+            self.force(second, on_second)
+        else:
+            self.through[pin] = self.through[pin] + on_second if pin in self.through else on_second
+
+    def pull_ends(self, start: Any, end: Any, force: Number) -> None:
+        """Add the two forces where they act."""
+        for point, sense in ((start, 1.0), (end, -1.0)):
+            self.force(point.bar, sense * force, point.of(self.state))
+
+    def plus(self, unit: "Actions", size: Number) -> "Actions":
+        """Make the sum of these and of what a drive of a size does that does `unit` per newton."""
+        total = Actions(self.state, self.bodies, self.side)
+        for name in ("forces", "moments", "couples", "through"):
+            sums = dict(getattr(self, name))
+            for key, of_one in getattr(unit, name).items():
+                sums[key] = sums.get(key, 0.0) + size * of_one
+            setattr(total, name, sums)
+        scaled = [
+            (None if force is None else size * force, point, beyond, size * moment)
+            for force, point, beyond, moment in unit.on_coupler
+        ]
+        total.on_coupler = self.on_coupler + scaled
+        return total
+
+    def work(self) -> tuple[Number, Number]:
+        """Compute the generalised force Q (power over the independent angle's speed) of all and of bars 3, 4, N m.
+
+        That of bars 3 and 4 is without what goes through pin A.
+        """
+        k = self.state.k
+        parts = [self.moments[bar] * h for bar, h in ((3, k.h3), (4, k.h4)) if bar in self.moments]
+        if 3 in self.forces:
+            parts.append(cross(-self.state.lengths.a * k.h2 * self.forces[3], self.state.at.u2))
+        others = sum(parts[1:], parts[0]) if parts else 0.0
+        total = others + self.moments[2] * k.h2 if 2 in self.moments else others
+        for pin, couple in self.couples.items():
+            total = total + couple * self.state.slip(pin)
+            if pin != "O2":
+                others = others + couple * (k.h3 if pin == "A" else self.state.slip(pin))
+        return total, others
+
+    def about_B(self) -> Number:
+        """Compute the moment on the coupler about pin B, N m, which is small where forces act near B."""
+        total = self.couples.get("A", 0.0) - self.couples.get("B", 0.0)
+        for force, point, beyond, moment in self.on_coupler:
+            total = total + moment
+            if force is not None:
+                arm = (point - self.state.lengths.b) * self.state.at.u3
+                total = total + cross(-force, arm if beyond is None else arm + beyond)
+        return total
+
+    def sense(self, pin: str) -> Number:
+        """Sign of omega_j - omega_i at a pin; at rest the one that a motion beginning to `side` would have.
+
+        A linkage at rest begins to move as theta_2 grows or falls; a pin that is at rest in a linkage that
+        moves turns in either sense.
+        """
+        slip, turning = self.state.slip(pin), self.turning(pin)
+        if not is_any(self.side != 0):
+            return turning * sign(slip * self.state.speed)
+        moving = np.where(turning, np.sign(slip * self.state.speed), self.side)
+        return np.where(np.equal(self.state.speed, 0.0), self.side * turning * np.sign(slip), moving)
+
+    def turning(self, pin: str) -> Number:
+        """Mark where the two bars rotate relative to each other in a motion, as far as round-off can tell."""
+        i, j = PINS[pin]
+        h = self.state.coefficient
+        return abs(self.state.slip(pin)) > AT_REST * (abs(h(2)) + abs(h(i)) + abs(h(j)))
+
+    def wrenches(self, inertia: Wrenches) -> Wrenches:
+        """Everything that acts on each bar, with d'Alembert's forces and moments."""
+        R, M = [*inertia[:3]], [*inertia[3:6]]
+        for bar, force in self.forces.items():
+            R[bar - 2] = R[bar - 2] + force
+        for bar, moment in self.moments.items():
+            M[bar - 2] = M[bar - 2] + moment
+        for pin, couple in self.couples.items():
+            i, j = PINS[pin]
+            if pin != "B":  # which has a place of its own
+                M[j - 2] = M[j - 2] + couple
+                if i != 1:
+                    M[i - 2] = M[i - 2] - couple
+        return Wrenches(R[0], R[1], R[2], M[0], M[1], M[2], self.couples.get("B", 0.0))
+
+    def at_pins(self, pins: PinForces) -> PinForces:
+        """Return what the pins themselves carry of the forces between their bars."""
+        if not self.through:
+            return pins
+        A, B = (self.through.get(pin, 0.0) for pin in ("A", "B"))
+        return pins._replace(F32=pins.F32 + A, F43=pins.F43 + B)
+
+
+@cache
+def find_common_pin(first: int, second: int) -> str | None:
+    """Return the pin at which two bars meet, or None if they have none in common."""
+    return next((pin for pin, bars in PINS.items() if {first, second} == {*bars}), None)
 
 
 class SolvedFriction(NamedTuple):

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from fourbar.effects.actions import Actions
-from fourbar.effects.effect import PinRows
+from fourbar.effects.effect import Actions, PinRows
 from fourbar.formulas.arithmetic import is_any
 from fourbar.formulas.motion import State
 from fourbar.linkage import AT_LEAST_ZERO, Declared

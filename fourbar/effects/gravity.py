@@ -6,8 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fourbar.effects.actions import Actions
-from fourbar.effects.effect import Effect
+from fourbar.effects.effect import Actions, Effect
 from fourbar.formulas.arithmetic import is_any, namespace, polar, vector
 from fourbar.formulas.longer import shorten
 from fourbar.formulas.motion import State

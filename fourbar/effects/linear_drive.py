@@ -11,7 +11,7 @@ which is of the same form, with (theta_2', theta_3', theta_4') = (sin(theta_4 - 
 
 from dataclasses import dataclass
 
-from fourbar.effects.actions import Actions
+from fourbar.effects.effect import Actions
 from fourbar.effects.spring import COINCIDE, SpringEnd, require_ends
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number, is_any, namespace

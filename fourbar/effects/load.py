@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fourbar.effects.actions import Actions
-from fourbar.effects.effect import Effect
+from fourbar.effects.effect import Actions, Effect
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import PI_LOW, angle, is_any, make_like, namespace, nearest, polar, split_sum
 from fourbar.formulas.longer import shorten

@@ -16,8 +16,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions
-from fourbar.effects.effect import PinRows, SolvedFriction
+from fourbar.effects.effect import Actions, PinRows, SolvedFriction
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import is_any, make_like
 from fourbar.formulas.longer import shorten

@@ -6,8 +6,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions
-from fourbar.effects.effect import Effect
+from fourbar.effects.effect import Actions, Effect
 from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import dot, is_any, namespace, polar, select, sine_of, vector
 from fourbar.formulas.motion import State

@@ -8,8 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions
-from fourbar.effects.effect import PinRows
+from fourbar.effects.effect import Actions, PinRows
 from fourbar.errors import expect
 from fourbar.formulas.arithmetic import Number, conjugate, namespace, wrap_angle
 from fourbar.formulas.motion import State

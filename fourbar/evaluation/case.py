@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, list_bodies
-from fourbar.effects.effect import SolvedFriction
+from fourbar.effects.effect import Actions, SolvedFriction, list_bodies
 from fourbar.formulas.arithmetic import angle, is_any, polar, select
 from fourbar.formulas.longer import change_numbers, lengthen
 from fourbar.formulas.motion import Coefficients, State, rates

@@ -35,7 +35,7 @@ from fourbar.quantities import (
     WOUND,
 )
 from fourbar.scene import Command
-from fourbar.scene.point import POINT_STAGES
+from fourbar.scene.numbers import POINT_STAGES
 
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
 WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)

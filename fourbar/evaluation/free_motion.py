@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects.actions import Actions, list_bodies
-from fourbar.effects.effect import Effect
+from fourbar.effects.effect import Actions, Effect, list_bodies
 from fourbar.errors import DependencyError, FourBarError, InputError, LimitError, expect, say_install
 from fourbar.evaluation.case import Case
 from fourbar.formulas.motion import Coefficients, State, rates

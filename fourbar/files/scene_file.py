@@ -22,8 +22,7 @@ from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
 from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, SPLINES, STROKE_COMMAND, Free, FromLimit, Law, Motion, Sweep
-from fourbar.scene.numbers import Tolerance
-from fourbar.scene.point import Point
+from fourbar.scene.numbers import Point, Tolerance
 from fourbar.solution import Array
 from fourbar.studies.keys import COMMAND_KEYS, LEFT_OUT, is_left_out, list_entries, read_place, refuse_key
 

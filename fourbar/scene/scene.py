@@ -14,8 +14,7 @@ from fourbar.formulas.mobility import MARGIN, choose_range, find_limit_angles, f
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.quantities import Array
 from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, STROKE_COMMAND, FromLimit, Motion, Sweep
-from fourbar.scene.numbers import Tolerance
-from fourbar.scene.point import Point
+from fourbar.scene.numbers import Point, Tolerance
 
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive, Load

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects.actions import Actions, list_bodies
+from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import DependencyError, InputError, expect, say_install
 from fourbar.evaluation.case import compute_state
 from fourbar.formulas.arithmetic import dot

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
-from fourbar.effects.actions import Actions
+from fourbar.effects.effect import Actions
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.evaluation.evaluate import list_kinematics
@@ -17,7 +17,7 @@ from fourbar.formulas.arithmetic import polar
 from fourbar.quantities import FORCES, NOT_ASSEMBLED, OK, PIN_FORCES, SINGULAR, STAGE_OF, STAGES, STATUS_NAMES
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.point import POINT_STAGES
+from fourbar.scene.numbers import POINT_STAGES
 from fourbar.scene.scene import turn_bar
 from fourbar.solution import Array, Solution, find_values, split_parts
 from fourbar.solve import solve

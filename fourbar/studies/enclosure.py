@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import list_bodies
+from fourbar.effects.effect import list_bodies
 from fourbar.errors import DependencyError, InputError, LimitError, expect, say_install
 from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import dot

@@ -22,7 +22,7 @@ from fourbar.quantities import (
 )
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.point import POINT_STAGES
+from fourbar.scene.numbers import POINT_STAGES
 from fourbar.scene.scene import turn_bar
 from fourbar.studies.keys import SceneNumber, command_key, list_entries, read_place, refuse_key, replace_numbers
 

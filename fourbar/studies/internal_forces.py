@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, list_bodies
+from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import cross, polar

@@ -11,7 +11,7 @@ from fourbar.effects import LinearDrive, Load, Spring, SpringEnd, Springs, Table
 from fourbar.linkage import MOVING_BARS, PINS, SECOND_PIN, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
-from fourbar.scene.point import Point
+from fourbar.scene.numbers import Point
 from fourbar.solve import solve
 from fourbar_validation.scenes.random import (
     Place,

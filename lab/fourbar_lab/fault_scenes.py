@@ -23,7 +23,7 @@ from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import PINS, Bar, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, Free, FromLimit, Law, Motion, Sweep
-from fourbar.scene.point import Point
+from fourbar.scene.numbers import Point
 from fourbar_validation.scenes.suites import read_default_suite
 
 CRANK = FourBar(

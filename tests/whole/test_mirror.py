@@ -32,7 +32,6 @@ JUDGED_BY = {
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve zeros; fourbar/show: studies",
     "fourbar/test_solve.py": "fourbar: linkage solution; fourbar/scene: motion; fourbar/evaluation: case",
     "fourbar/studies/test_study.py": "fourbar/scene: motion; fourbar/studies: keys",
-    "fourbar/studies/test_spread.py": "fourbar/scene: numbers",
     # parts of one document or picture
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document effects model settings",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",

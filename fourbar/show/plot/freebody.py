@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.effects.actions import Actions, list_bodies
+from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number
 from fourbar.formulas.motion import State

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects.actions import Actions, list_bodies
+from fourbar.effects.effect import Actions, list_bodies
 from fourbar.evaluation.case import compute_state
 from fourbar.formulas.arithmetic import cross, dot
 from fourbar.formulas.path import compute_state as state_of

@@ -7,7 +7,7 @@ from flint import arb, ctx
 from scipy.optimize import brentq
 
 import fourbar
-from fourbar.effects.actions import Actions, list_bodies
+from fourbar.effects.effect import Actions, list_bodies
 from fourbar.evaluation.case import compute_state
 from fourbar.evaluation.free_motion import integrate
 from fourbar.formulas.mobility import follow_smooth_path, limit_positions

@@ -24,7 +24,7 @@ from fourbar.effects import (
 from fourbar.quantities import VECTORS
 from fourbar.scene import command
 from fourbar.scene.motion import Free, FromLimit, Law
-from fourbar.scene.point import Point
+from fourbar.scene.numbers import Point
 from fourbar.studies.keys import list_entries, replace_place
 from fourbar.studies.study import Study, vary
 

@@ -27,7 +27,7 @@ from fourbar.effects import (
     Viscous,
     list_kinds,
 )
-from fourbar.effects.actions import Actions, list_bodies
+from fourbar.effects.effect import Actions, list_bodies
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import compute_state
 from fourbar.linkage import MOVING_BARS

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.effects import Actions
-from fourbar.effects.actions import list_bodies
+from fourbar.effects.effect import list_bodies
 from fourbar.evaluation.case import Case, compute_state
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.longer import change_numbers

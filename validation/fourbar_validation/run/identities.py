@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects import Actions
-from fourbar.effects.actions import list_bodies
+from fourbar.effects.effect import list_bodies
 from fourbar.evaluation.case import compute_state
 from fourbar.formulas.pin_forces import Wrenches
 from fourbar.linkage import MOVING_BARS, PIN_FORCE

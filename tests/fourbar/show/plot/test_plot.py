@@ -16,7 +16,7 @@ from matplotlib.text import Text
 
 import fourbar
 from fourbar.effects import Effect, Flywheel, PinFriction, Spring, SpringEnd, Springs, Torsion
-from fourbar.effects.actions import list_bodies
+from fourbar.effects.effect import list_bodies
 from fourbar.errors import DependencyError, InputError, NotAssembledError
 from fourbar.formulas.mobility import find_intervals
 from fourbar.formulas.path import compute_state

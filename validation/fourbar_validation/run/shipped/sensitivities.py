@@ -13,7 +13,7 @@ from fourbar.effects import Load
 from fourbar.effects.load import Table
 from fourbar.quantities import FORCES, LINE, UNKNOWNS
 from fourbar.scene import Scene
-from fourbar.scene.point import Point
+from fourbar.scene.numbers import Point
 from fourbar.studies.keys import command_key
 from fourbar.studies.spread import Spread
 from fourbar_validation.compare.answer import Array
