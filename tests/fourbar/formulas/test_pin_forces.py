@@ -318,3 +318,15 @@ def test_the_forces_of_a_member_are_the_same_alone_and_beside_others() -> None:
         for name in names:
             assert np.array_equal(getattr(together, name)[member], getattr(alone, name)[0]), (length, name)
             assert np.isfinite(getattr(alone, name)).all()
+
+
+@pytest.mark.parametrize("beside", [1e-3, 1e-6, 1e-9])
+def test_a_force_beside_B_has_its_moment_there(beside: float) -> None:
+    """With the output driven and bars 2 and 4 free of moments, b u3 x F32 is the moment about B: force times arm."""
+    b, direction = 0.25, 0.3
+    link = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(b, centre=(0.0, 0.0)), fourbar.Bar(0.22))
+    load = fourbar.Load(3, (1.0, direction), (b + beside, 0.0), frame="bar")
+    s = fourbar.solve(fourbar.Scene(link, fourbar.Motion(np.linspace(0.1, 6.0, 7), 0.0), 4, (load,)))
+    arm = (b + beside) - b  # exact: as the doubles have it
+    exact = arm * math.sin(direction) / (b * np.abs(np.sin(s.theta_3 - s.theta_2)))
+    assert np.hypot(*s.F32.T) == pytest.approx(exact, rel=GROWN)
