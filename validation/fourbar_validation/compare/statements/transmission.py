@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from fourbar.formulas import mobility, transmission
 from fourbar.formulas.path import compute_state as state_of
 from fourbar.formulas.path import drive_sine, find_singular
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Predicted
 from fourbar_validation.compare.statements.finding import Finding, Place, Seen
@@ -20,6 +21,7 @@ from fourbar_validation.compare.tolerance import (
     NOTHING_TO_TELL,
     TURN,
     Array,
+    Mask,
     count_half_turns,
     find_lever,
     find_roundoff,
@@ -47,59 +49,81 @@ def compare_transmission(scene: Scene, seen: Seen, answer: Answer, predicted: Pr
     yield from _compare_time_ratio(scene.linkage, seen)
 
 
+class _Claim(NamedTuple):
+    """One statement over a motion: its error and what is allowed at each position, and where it is demanded, (n,)."""
+
+    what: str
+    error: Array
+    allowed: Array
+    where: Mask
+    rates: bool = False
+    """True if it follows from the speeds, otherwise from the angles."""
+
+
 def _compare_over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator[Finding]:
+    """Compare the worst position of each statement over the scene's own motion."""
+    at = answer.at
+    assert at is not None
+    for claim in _list_claims(scene, answer):
+        allowed, where = claim.allowed, claim.where & ~(claim.allowed >= NOTHING_TO_TELL)
+        beyond = where & ~(claim.error <= allowed)
+        if predicted is not None and beyond.any():
+            if claim.rates:
+                lost = predicted("omega_4", beyond) / np.abs(answer.quantities["omega_4"])
+            else:
+                lost = predicted("theta_3", beyond) + predicted("theta_4", beyond)
+            allowed = np.where(beyond, np.fmax(allowed, DEGRADED * lost), allowed)
+            where = where & ~(allowed >= NOTHING_TO_TELL)
+        if where.any():
+            most = np.flatnonzero(where)[find_worst(find_used(claim.error[where], allowed[where]))]
+            yield Finding(float(claim.error[most]), float(allowed[most]), float(at.theta_2[most]), claim.what)
+    yield _compare_distance(scene, at)
+
+
+def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
+    """List what the formulas state at each position, against the engine's angles and speeds."""
     at, linkage = answer.at, scene.linkage
-    extremes = transmission.transmission_extremes(linkage)
     assert at is not None and at.omega_2 is not None and answer.assembled is not None
-    state = state_of(linkage, at.theta_2, at.branch)
-    half = state.at.half
+    state, drive = (
+        state_of(linkage, at.theta_2, at.branch),
+        scene.drive_bar or 2,
+    )  # the leverage of a line is a quantity
     theta = {2: at.theta_2, **{bar: answer.quantities[f"theta_{bar}"] for bar in (3, 4)}}
-    drive = scene.drive_bar or 2  # the leverage of a line is compared as a quantity
-    one, other = (theta[bar] for bar in MOVING_BARS if bar != drive)
-    driven = np.abs(np.sin(other - one))
+    first, second = (theta[bar] for bar in MOVING_BARS if bar != drive)
     angle = np.abs(wrap_angle(theta[4] - theta[3]))
     sine = np.abs(np.sin(angle))
+    half = state.at.half  # a row of its own compares whether both say that the loop closes
+    closed = answer.assembled & (half.outer >= 0.0) & (half.inner >= 0.0) & ~find_singular(state.at)
+    extremes = transmission.transmission_extremes(linkage)
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = EQUIVALENCE.factor * count_half_turns(linkage.ground_angle, at.theta_2) / (find_lever(linkage) * sine)
         ratio = answer.quantities["omega_4"] / at.omega_2
         gained = transmission.mechanical_advantage(state, *RADII) * ratio * (RADII[1] / RADII[0]) - 1.0
         largest = np.maximum(1.0, np.maximum(np.abs(ratio), np.abs(answer.quantities["omega_3"] / at.omega_2)))
         allowed_gain = allowed / sine * largest / np.abs(ratio)
-    closed = (
-        answer.assembled & (half.outer >= 0.0) & (half.inner >= 0.0) & ~find_singular(state.at)
-    )  # a row of its own compares whether both say so
-    where = closed & ~(allowed >= NOTHING_TO_TELL)  # a missing number is none that holds
-    moving = where & (at.omega_2 != 0.0)
+    # the divisor of every tolerance must not come from the formulas alone
+    yield _Claim("condition", np.abs(state.at.sin_mu - np.sin(theta[4] - theta[3])), allowed, closed)
+    drive_condition = np.abs(np.abs(drive_sine(state.at, drive)) - np.abs(np.sin(second - first)))
+    yield _Claim("drive condition", drive_condition, allowed, closed)
     acute = np.minimum(angle, math.pi - angle)
+    yield _Claim("transmission angle", np.abs(transmission.transmission_angle(state) - acute), allowed, closed)
     outside = np.maximum(np.maximum(extremes.least - angle, angle - extremes.greatest), 0.0)
-    for what, error, bound, counts in (
-        # the divisor of every tolerance must not come from the formulas alone
-        ("condition", np.abs(state.at.sin_mu - np.sin(theta[4] - theta[3])), allowed, where),
-        ("drive condition", np.abs(np.abs(drive_sine(state.at, drive)) - driven), allowed, where),
-        ("transmission angle", np.abs(transmission.transmission_angle(state) - acute), allowed, where),
-        ("beyond the extremes", outside, allowed, where),
-        ("mechanical advantage", np.abs(gained), allowed_gain, moving & ~(allowed_gain >= NOTHING_TO_TELL)),
-    ):
-        beyond = counts & ~(error <= bound)
-        if predicted is not None and beyond.any():
-            if what == "mechanical advantage":
-                lost = predicted("omega_4", beyond) / np.abs(answer.quantities["omega_4"])
-            else:
-                lost = predicted("theta_3", beyond) + predicted("theta_4", beyond)
-            bound = np.where(beyond, np.fmax(bound, DEGRADED * lost), bound)  # noqa: PLW2901
-            counts = counts & ~(bound >= NOTHING_TO_TELL)  # noqa: PLW2901
-        if counts.any():
-            most = np.flatnonzero(counts)[find_worst(find_used(error[counts], bound[counts]))]
-            yield Finding(float(error[most]), float(bound[most]), float(at.theta_2[most]), what)
-    branch = at.branch.astype(float)
-    nearest = transmission.distance_to_singular(linkage, at.theta_2, drive, branch)
-    result = _compute_to_singular(scene, at.theta_2, branch)
-    error = np.where(np.isinf(nearest) == np.isinf(result), 0.0, math.inf)
-    finite = np.isfinite(nearest) & np.isfinite(result)
-    error[finite] = np.abs(nearest[finite] - result[finite])
+    yield _Claim("beyond the extremes", outside, allowed, closed)
+    moving = closed & (at.omega_2 != 0.0) & ~(allowed >= NOTHING_TO_TELL)  # a missing number is none that holds
+    yield _Claim("mechanical advantage", np.abs(gained), allowed_gain, moving, rates=True)
+
+
+def _compare_distance(scene: Scene, at: Command) -> Finding:
+    """Compare how far it is to a singular position with the limits and dead centres that are stated."""
+    branch, drive = at.branch.astype(float), scene.drive_bar or 2
+    ours = transmission.distance_to_singular(scene.linkage, at.theta_2, drive, branch)
+    theirs = _compute_to_singular(scene, at.theta_2, branch)
+    error = np.where(np.isinf(ours) == np.isinf(theirs), 0.0, math.inf)
+    finite = np.isfinite(ours) & np.isfinite(theirs)
+    error[finite] = np.abs(ours[finite] - theirs[finite])
     most = int(np.argmax(error))
-    bound = EPS * 8.0 * (np.abs(at.theta_2) + abs(linkage.ground_angle) + TURN)
-    yield Finding(float(error[most]), float(bound[most]), float(at.theta_2[most]), "distance to a singular position")
+    allowed = EPS * 8.0 * (abs(at.theta_2[most]) + abs(scene.linkage.ground_angle) + TURN)
+    return Finding(float(error[most]), float(allowed), float(at.theta_2[most]), "distance to a singular position")
 
 
 def _find_collinear(linkage: FourBar) -> list[float]:

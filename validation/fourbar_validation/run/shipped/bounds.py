@@ -9,8 +9,9 @@ import fourbar
 from fourbar.errors import InputError, LimitError
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
+from fourbar.studies.enclosure import Extreme
 from fourbar_validation.compare.rows import REFUSES, Row
-from fourbar_validation.compare.tolerance import ErrorBound
+from fourbar_validation.compare.tolerance import Array, ErrorBound
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.run.question import NotAskedError, Question
 from fourbar_validation.run.shipped.variants import SceneFile, ask_free_bodies, make_row
@@ -45,33 +46,51 @@ def extremes(question: Question) -> list[Row]:
             scene, tolerances=tuple(fourbar.Tolerance(f"lengths.{k}", GIVEN * x) for k, x in lengths.items())
         )
     try:
-        bounds = fourbar.extremes(scene, [drive])
+        proven = fourbar.extremes(scene, [drive])
     except (InputError, LimitError) as limit:
         return [Row.unmeasured(question.name, "extremes", "exact", drive, REFUSES, str(limit))]
-    assert bounds.nominal is not None
-    ends = [each[drive] for part in (bounds, bounds.nominal) for each in (part.least, part.greatest)]
-    theta_2 = np.concatenate(
-        [*(np.linspace(low, high, POSITIONS) for low, high in bounds.parts), [each.theta_2 for each in ends]]
+    assert proven.nominal is not None
+    bounds = [of[drive] for of in (proven.least, proven.greatest, proven.nominal.least, proven.nominal.greatest)]
+    in_interval = [np.linspace(low, high, POSITIONS) for low, high in proven.parts]
+    theta_2 = np.concatenate([*in_interval, [bound.theta_2 for bound in bounds]])
+    linkages = _list_corners(replace(scene, motion=scene.motion.replace(angle=theta_2, through="sign")))
+    values = np.array([ask_free_bodies(linkage).quantities[drive] for linkage in linkages])
+    every_corner = len(scene.tolerances) <= MOST  # otherwise the bounds need not be reached at one of those tried
+    error = np.max(
+        [
+            _find_beyond(theta_2, values, bounds[0], -1.0, reached=every_corner),
+            _find_beyond(theta_2, values, bounds[1], 1.0, reached=every_corner),
+            _find_beyond(theta_2, values[:1], bounds[2], -1.0),
+            _find_beyond(theta_2, values[:1], bounds[3], 1.0),
+            np.zeros_like(theta_2),
+        ],
+        axis=0,
     )
-    reach = {each.key: each.reach for each in scene.tolerances[:MOST]}
-    bare = replace(scene, tolerances=(), motion=scene.motion.replace(angle=theta_2, through="sign"))
-    corners = [dict(zip(reach, signs, strict=True)) for signs in product((-INSIDE, INSIDE), repeat=len(reach))]
-    file = SceneFile(bare)
-    moved = [file.move({key: sign * reach[key] for key, sign in corner.items()}) for corner in ({}, *corners)]
-    values = np.array([ask_free_bodies(member).quantities[drive] for member in moved])
-    size = max(abs(end) for each in ends for end in each[:2])
-    error = np.zeros_like(theta_2)
-    all_moved = len(reach) == len(scene.tolerances)
-    for of, own, within in ((bounds, values, all_moved), (bounds.nominal, values[:1], True)):
-        for sign, each in ((-1.0, of.least[drive]), (1.0, of.greatest[drive])):
-            proven, reached = (each.high, each.low) if sign > 0 else (-each.low, -each.high)
-            beyond = (sign * own).max(axis=0) - proven  # NaN where a linkage has no torque: nothing holds there
-            if within:
-                at = int(np.flatnonzero(theta_2 == each.theta_2)[0])
-                beyond[at] = max(beyond[at], reached - float((sign * own[:, at]).max()))
-            error = np.maximum(error, beyond / size)
+    size = max(abs(end) for bound in bounds for end in bound[:2])
     reason = f"{len(values)} linkages at {len(theta_2)} positions"
-    return [make_row(question, "extremes", drive, error, BOUNDS, theta_2, reason)]
+    return [make_row(question, "extremes", drive, error / size, BOUNDS, theta_2, reason)]
+
+
+def _list_corners(scene: Scene) -> list[Scene]:
+    """List the linkage itself, then those at the corners of its tolerances."""
+    reach = {tolerance.key: tolerance.reach for tolerance in scene.tolerances[:MOST]}
+    file = SceneFile(replace(scene, tolerances=()))
+    corners = product((-INSIDE, INSIDE), repeat=len(reach))
+    moves = [{key: sign * reach[key] for key, sign in zip(reach, signs, strict=True)} for signs in corners]
+    return [file.move(move) for move in ({}, *moves)]
+
+
+def _find_beyond(theta_2: Array, values: Array, bound: Extreme, sign: float, *, reached: bool = True) -> Array:
+    """Compute by how much values, one line for each linkage, lie beyond a greatest value (sign 1) or a least (-1).
+
+    `reached`: whether one of them must come as far as the bound says that the extreme does, at its position.
+    """
+    most, least = (bound.high, bound.low) if sign > 0 else (-bound.low, -bound.high)
+    beyond = np.asarray((sign * values).max(axis=0) - most)  # NaN where a linkage has no torque: nothing holds there
+    if reached:
+        i = int(np.flatnonzero(theta_2 == bound.theta_2)[0])
+        beyond[i] = max(beyond[i], least - float((sign * values[:, i]).max()))
+    return beyond
 
 
 def _require_conditioned(scene: Scene) -> None:
