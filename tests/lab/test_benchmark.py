@@ -113,7 +113,7 @@ def test_a_simulator_answers_single_states_at_its_own_motion(folder: Path) -> No
 
 def test_what_integrates_released_motions_alone_refuses_positions(folder: Path) -> None:
     pytest.importorskip("pinocchio")
-    adapter = "fourbar_validation.engines.pinocchio_forward:PinocchioReleased"
+    adapter = "fourbar_validation.engines.pinocchio:PinocchioReleased"
     (folder / "engines.toml").write_text(f'[[engine]]\nname = "it"\nadapter = "{adapter}"\n')
     letters = run(folder, "crank_rocker", "gz_physics_987")
     assert letters["it", "crank_rocker"] == REFUSED

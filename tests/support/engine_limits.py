@@ -18,7 +18,7 @@ from fourbar.scene import Scene, command
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.tolerance import SIMULATED
-from fourbar_validation.engines import pinocchio_forward
+from fourbar_validation.engines import pinocchio
 from fourbar_validation.engines.limits import (
     FASTEST,
     HEAVIEST,
@@ -111,12 +111,12 @@ def _centre_kept(r: float) -> bool:
 def _proximal(mu: float) -> bool:
     """Whether Pinocchio's constrained acceleration is a number with this proximal parameter."""
     scene = replace(_base(), loads=(), motion=Motion(1.0, 3.0))
-    kept = pinocchio_forward.PROXIMAL
+    kept = pinocchio.PROXIMAL
     try:
-        pinocchio_forward.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
-        released = pinocchio_forward.PinocchioReleased().release(scene, np.array([0.0, 0.01]))
+        pinocchio.PROXIMAL = (kept[0], mu, kept[2] if mu else 1)
+        released = pinocchio.PinocchioReleased().release(scene, np.array([0.0, 0.01]))
     finally:
-        pinocchio_forward.PROXIMAL = kept
+        pinocchio.PROXIMAL = kept
     return bool(np.isfinite(released.theta_2).all())
 
 

@@ -39,24 +39,22 @@ JUDGED_BY = {
     "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody labels linkage "
     "studies style symbols view",
     # a comparison is tested by engines with given answers
-    "validation/run/test_judge.py": "validation/compare: answer compare effects rows; "
+    "validation/run/test_judge.py": "validation/compare: answer compare effects; "
     "validation/run: answers command identities question run",
-    "validation/compare/statements/test_statements.py": "validation/compare/statements: finding limit_positions "
-    "transmission",
+    "validation/compare/statements/test_statements.py": "validation/compare/statements: limit_positions transmission",
     # adapters: judged against printed figures, each other, and faults put in front of them
     "validation/engines/test_engines.py": "validation/engines: balls description "
     "limits loaded loop pinocchio prediction tree; lab/engines: drake exudyn exudyn_elements opensim; "
     "validation/scenes: random; validation/engines/mujoco: closed_loop inverse",
-    "validation/engines/test_guests.py": "validation: engine; validation/engines: keeper output processes workers",
+    "validation/engines/test_guests.py": "validation: engine; validation/engines: keeper processes workers",
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
     "validation/scenes/test_hard_families.py": "validation/engines: exact; validation/engines/mujoco: shipped",
     "validation/report/test_sections.py": "validation/report: hard_picture",
-    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives led monitor motions runner",
+    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives monitor runner",
     "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds cuts sensitivities equilibria "
     "files variants",
-    "validation/run/test_released.py": "validation/engines: pinocchio_forward; validation/engines/mujoco: released",
-    "validation/check/test_check.py": "validation/check: fitted judge judgement mistakes theirs; "
-    "validation/run: printed",
+    "validation/run/test_released.py": "validation/engines/mujoco: released",
+    "validation/check/test_check.py": "validation/check: fitted judge mistakes theirs; validation/run: printed",
     "validation/check/test_mjcf.py": "validation/check: differences screen; "
     "validation/engines/mujoco: describe theirs topology",
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "

@@ -11,8 +11,7 @@ from fourbar.mjcf.settings import RECIPE
 from fourbar.scene import Scene
 from fourbar_lab.simulators.motion import Instant, Readings, run_through, start, turn
 from fourbar_validation.compare.answer import Array
-from fourbar_validation.engines.pinocchio import PinocchioTree
-from fourbar_validation.engines.pinocchio_forward import ClosedTree, make_step
+from fourbar_validation.engines.pinocchio import ClosedTree, PinocchioTree, make_step
 
 VERSION = pin.__version__
 STEPS = (314, 628, 1256)

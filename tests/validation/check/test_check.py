@@ -18,8 +18,8 @@ from fourbar.quantities import LINE_QUANTITIES, OK, UNITS, VECTORS
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import Law
 from fourbar.solve import solve
+from fourbar_validation.check.check import Judgement, judge_table
 from fourbar_validation.check.judge import Allowance
-from fourbar_validation.check.judgement import Judgement, judge_table
 from fourbar_validation.check.mistakes import list_hypotheses
 from fourbar_validation.check.theirs import LARGEST_FILE, NOT_JUDGED, read_table
 from fourbar_validation.cli import status

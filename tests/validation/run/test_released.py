@@ -54,7 +54,7 @@ def test_what_follows_the_path_has_no_instant_to_compare() -> None:
 
 def answering(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[Row]:
     """The rows of Pinocchio where its answer is changed."""
-    from fourbar_validation.engines.pinocchio_forward import PinocchioReleased
+    from fourbar_validation.engines.pinocchio import PinocchioReleased
 
     true = PinocchioReleased.release
     monkeypatch.setattr(PinocchioReleased, "release", lambda *given: change(true(*given)))

@@ -280,17 +280,17 @@ def test_a_free_motion_through_change_points_in_every_engine() -> None:
 
 def test_an_engine_that_drifts_unpredicted_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wrong by the same amount with either step: its own step says nothing of it, the exact solution does."""
-    from fourbar_validation.engines import pinocchio_forward
+    from fourbar_validation.engines import pinocchio
 
     (name, scene), *_ = families.released(durations=(1.0,), steps=4)
-    true = pinocchio_forward.PinocchioReleased.release
+    true = pinocchio.PinocchioReleased.release
 
     def off(self: Any, scene: Scene, times: np.ndarray) -> Any:
         released = true(self, scene, times)
         released.theta_2 += 1e-3
         return released
 
-    monkeypatch.setattr(pinocchio_forward.PinocchioReleased, "release", off)
+    monkeypatch.setattr(pinocchio.PinocchioReleased, "release", off)
     rows = judge(name, scene).rows
     assert [r.verdict for r in rows if (r.engine, r.quantity) == ("pinocchio-forward", "theta_2")] == [FAILS]
 

@@ -25,8 +25,7 @@ from fourbar_validation.check.differences import Difference, find_differences, o
 from fourbar_validation.check.screen import list_unread, read_mjcf
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Held
-from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import Row, make_plain, write_results
+from fourbar_validation.compare.rows import Counts, Row, make_plain, write_results
 from fourbar_validation.compare.tolerance import SIMULATED, ErrorBound, hold_simulated
 from fourbar_validation.engines.processes import WORKER_MEMORY, bound_memory
 from fourbar_validation.report.templating import render, write_number

@@ -254,7 +254,7 @@ class CostStudy:
         return [*points, self._time_answer("one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0)]
 
     def _time_pinocchio_forward(self) -> list[CostPoint]:
-        from fourbar_validation.engines.pinocchio_forward import PinocchioForward
+        from fourbar_validation.engines.pinocchio import PinocchioForward
 
         points = []
         reference = self._time_rk4_step()

@@ -29,8 +29,7 @@ from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.rows import FORMULAS, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines import keeper, protocol
-from fourbar_validation.engines.output import KEPT, print_kept
-from fourbar_validation.engines.processes import WORKER_MEMORY
+from fourbar_validation.engines.processes import KEPT, WORKER_MEMORY, print_kept
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.places import CHECKOUT, PACKAGE
 

@@ -1,19 +1,24 @@
-"""Pinocchio: recursive Newton-Euler on the open tree, its own kinematics, the loop closed by multipliers."""
+"""Pinocchio: recursive Newton-Euler on the open tree, the loop closed by multipliers; and a released motion."""
 
-from collections.abc import Sequence
+import math
+import time
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from fourbar.effects import Gravity
 from fourbar.errors import LimitError
-from fourbar.scene import Scene
-from fourbar_validation.compare.answer import Array
+from fourbar.mjcf import Settings, choose_run, size_flywheel
+from fourbar.scene import Command, Scene, command
+from fourbar_validation.compare.answer import Array, ReleasedAnswer
 from fourbar_validation.engines.description import FIRST_PIN, find_unknown, list_parts, rotate_by
 from fourbar_validation.engines.effects import TERM_OF, list_acting
-from fourbar_validation.engines.loop import Exact
-from fourbar_validation.engines.tree import Tree
+from fourbar_validation.engines.loaded import make_no_wrenches
+from fourbar_validation.engines.loop import Assembler, Exact, LimitDetector, Trial, make_blank, split_answer
+from fourbar_validation.engines.tree import Tree, solve_closed, solve_multipliers
 
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -105,3 +110,157 @@ PinocchioInverse = partial(Exact, "pinocchio-inverse", PinocchioTree)
 
 def _place_at(x: float, y: float) -> Any:
     return pin.SE3(np.eye(3), np.array([x, y, 0.0]))
+
+
+NAME = "pinocchio-forward"
+TIME_CONSTANT_STEPS = 10.0
+"""Time constant of Baumgarte's stabilisation of a free motion, in timesteps: with 30 the loop is lost at a change point
+from h = 5 ms on."""
+PROXIMAL = (1e-14, 1e-8, 10)
+"""Accuracy, mu, iterations. With the default mu = 0 every acceleration is NaN: of the three rows of the closure only
+two are independent in the plane."""
+Acceleration = Callable[[Array, Array], Array]
+
+
+class ClosedTree:
+    """A tree with its loop closed at B; `time_constant`: of the stabilisation, s: Kp = 1/tc^2 and Kd = 2/tc."""
+
+    def __init__(self, tree: PinocchioTree, time_constant: float) -> None:
+        self.tree = tree
+        ends = [(tree.joint[bar], tree.model.frames[tree.frame[f"end{bar}"]].placement) for bar in (3, 4)]
+        closure = pin.RigidConstraintModel(
+            pin.ContactType.CONTACT_3D, tree.model, *ends[0], *ends[1], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        gains = pin.BaumgarteCorrectorParameters(1.0 / time_constant**2, 2.0 / time_constant)
+        closure.setBaumgarteCorrectorParameters(gains)
+        self.models, self.found = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+        self.models.append(closure)
+        self.found.append(closure.createData())
+        self.data = tree.model.createData()
+        pin.initConstraintDynamics(tree.model, self.data, self.models, self.found)
+        self.proximal = pin.ProximalSettings(*PROXIMAL)
+
+    def start(self, theta_2: float, branch: int, omega_2: float) -> tuple[Array, Array] | None:
+        """Assemble at the speeds that keep the loop closed; None if it does not close."""
+        q = Assembler(self.tree).find(theta_2, branch)
+        return None if q is None else (np.array(q), solve_closed(self.tree.jacobian(), omega_2))
+
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
+        """Accelerate the closed loop under loads, effects and the flywheel's motor."""
+        model, data = self.tree.model, self.data
+        return pin.constraintDynamics(model, data, q, v, tau, self.models, self.found, self.proximal).copy()
+
+    def loop_force(self) -> Array:
+        """F43 of the acceleration last found, (2,), N."""
+        return np.array(self.found[0].contact_force.linear[:2])
+
+
+def make_step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Array]:
+    """Make one step of the classical Runge-Kutta method."""
+    a1 = f(q, v)
+    v2 = v + 0.5 * h * a1
+    a2 = f(q + 0.5 * h * v, v2)
+    v3 = v + 0.5 * h * a2
+    a3 = f(q + 0.5 * h * v2, v3)
+    v4 = v + h * a3
+    a4 = f(q + h * v3, v4)
+    return q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4), v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+
+
+class PinocchioForward:
+    """One scene, driven at omega_2 by a flywheel, stepped with the classical Runge-Kutta method.
+
+    `time_constant_steps`: of the closure's stabilisation, in steps.
+    """
+
+    def __init__(self, scene: Scene, command: Command, steps_per_revolution: float, time_constant_steps: float) -> None:
+        self.omega, self.alpha = float(np.max(command.omega_2)), float(np.max(command.alpha_2))  # type: ignore[arg-type]
+        self.scene, self.command = scene, command
+        self.run = choose_run(command.theta_2, self.omega, self.alpha)
+        settings = Settings(steps_per_revolution=steps_per_revolution, steps_per_window=1)
+        self.h = self.run.timestep(settings)
+        self.tree = PinocchioTree(scene)
+        self.armature = self.tree.model.armature = np.array([size_flywheel(scene, settings), 0.0, 0.0])
+        self.loop = ClosedTree(self.tree, time_constant_steps * self.h)
+
+    def acceleration(self, q: Array, v: Array) -> Array:
+        """Return the acceleration of the closed loop under loads, effects and the flywheel's motor."""
+        tree, tau = self.tree, self.armature * self.alpha
+        if tree.terms:
+            tree.place(q)  # type: ignore[arg-type]
+            # what acts, as generalised forces: the difference it makes to inverse dynamics
+            tree.moving(v, np.zeros(3))
+            acted = tree.torques()
+            tau = tau + tree.needed(tree.field, make_no_wrenches()) - acted
+        return np.array(self.loop.acceleration(q, v, tau))
+
+    def forward(self) -> Trial:
+        """Run through the positions; each is read at the step nearest to it."""
+        order = np.argsort(self.command.theta_2 if self.omega > 0.0 else -self.command.theta_2, kind="stable")
+        first = int(order[0])
+        state = self.loop.start(float(self.command.theta_2[first]), int(self.command.branch[first]), self.omega)
+        if state is None:
+            raise LimitError("the loop does not close at the first position")
+        (q, v), done, stepping = state, 0, 0.0
+        out = make_blank(len(order))
+        for row, index in enumerate(order):
+            target = round(self.run.time(float(self.command.theta_2[index])) / self.h)
+            began = time.process_time()
+            while done < target:
+                q, v = make_step(self.acceleration, q, v, self.h)
+                done += 1
+            stepping += time.process_time() - began
+            if not np.isfinite(q).all():
+                break
+            for name, value in self._read(q, v, self.acceleration(q, v)).items():
+                out[name][row] = value
+        at, quantities = split_answer(out, self.command.branch[order])
+        return Trial(at, quantities, done, 2.0 * np.pi / self.run.fastest / self.h, stepping)
+
+    def _read(self, q: Array, v: Array, a: Array) -> dict[str, Array | float]:
+        """Compute torque and pin forces at a state, with the multiplier of the closure that the engine solved for."""
+        tree = self.tree
+        tree.place(q)  # type: ignore[arg-type]
+        tree.model.armature = np.zeros(3)
+        tree.moving(v, a)
+        needed = tree.torques()
+        if self.scene.drive_bar == 2:
+            loop_force, torque = self.loop.loop_force(), -self.armature[0] * (a[0] - self.alpha)
+        else:
+            unknowns = solve_multipliers(tree.jacobian(), tree.turns[self.scene.drive_bar], needed)
+            loop_force, torque = unknowns[:2], float(unknowns[2])
+        forces = tree.forces(loop_force, torque)
+        tree.model.armature = self.armature
+        made = {"theta_2": q[0], "omega_2": v[0], "alpha_2": a[0]}
+        return {**made, "torque": torque, "F43": loop_force, **forces}
+
+
+class PinocchioReleased:
+    """Free motion of the closed loop with a fixed step, s."""
+
+    name, version = NAME, pin.__version__
+
+    def __init__(self, step: float = 2e-3) -> None:
+        self.step = step
+
+    def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
+        """Integrate the motion at the given times, rising from 0 (s)."""
+        setting = f"RK4 {self.step:g} s"
+        if scene.loads or any(not isinstance(effect, Gravity) for effect in scene.effects):
+            return ReleasedAnswer.refused(NAME, setting, "in forward dynamics only gravity has a model here")
+        tree, start, none = PinocchioTree(scene), command(scene), np.zeros(3)
+        loop, detector = ClosedTree(tree, TIME_CONSTANT_STEPS * self.step), LimitDetector(int(start.branch[0]))
+        state = loop.start(float(start.theta_2[0]), int(start.branch[0]), scene.motion.omega_2 or 0.0)
+        if state is None:
+            return ReleasedAnswer.refused(NAME, setting, "the loop does not close at the start")
+        (q, v), rows, now = state, [], 0.0
+        for t in times:
+            steps = math.ceil((t - now) / self.step - 1e-6)
+            for taken in range(1, steps + 1):
+                q, v = make_step(lambda q, v: loop.acceleration(q, v, none), q, v, (t - now) / steps)
+                detector.look(now + taken * (t - now) / steps, q[0] + q[1], q[2])
+            now = float(t)
+            energy, data = pin.computeMechanicalEnergy(tree.model, tree.data, q, v), tree.data
+            rows.append((q[0], v[0], energy, data.kinetic_energy + abs(data.potential_energy)))
+        theta_2, omega, energy, terms = np.array(rows).T
+        return ReleasedAnswer(NAME, setting, theta_2, omega, energy, terms, detector.stopped_at)

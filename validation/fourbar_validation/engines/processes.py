@@ -1,13 +1,16 @@
-"""Run other programs to their end, and bound the memory of this process: past the bound it gets a MemoryError."""
+"""Run other programs to their end, bound the memory of this process, and keep what engines print in it."""
 
+import ctypes
 import os
 import subprocess
-from collections.abc import Container, Mapping, Sequence
-from contextlib import suppress
+import sys
+import tempfile
+from collections.abc import Container, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
-from fourbar_validation.compare.rows import write_one_line
+from fourbar_validation.compare.rows import make_plain, write_one_line
 from fourbar_validation.places import import_path
 
 WORKER_MEMORY = 8 * 2**30
@@ -71,3 +74,61 @@ def start_harness(line: Sequence[object], **how: Any) -> Ended:
     """Run an interpreter that is to find this code, wherever it lies; for `how` see `run_to_end`."""
     with import_path() as path:
         return run_to_end(line, variables={"PYTHONPATH": path}, **how)
+
+
+KEPT = 20_000
+"""Bytes that are kept of one answer's output: half from its beginning, half from its end."""
+_file: list[BinaryIO] = []
+"""The one file of this process, once it keeps what is printed."""
+
+
+def keep_output() -> None:
+    """Send what this process prints into a file that goes with it, from now on."""
+    if not _file:
+        _file.append(tempfile.TemporaryFile(buffering=0))  # noqa: SIM115 - as long as the process
+        sys.stdout = sys.stderr = None
+    take_printed()
+
+
+@contextmanager
+def keep_printed(outputs: dict[str, str], engine: str) -> Iterator[None]:
+    """Add what is printed meanwhile to the outputs, under the name of the engine."""
+    take_printed()
+    try:
+        yield
+    finally:
+        if text := take_printed():
+            outputs[engine] = outputs.get(engine, "") + text
+
+
+def print_kept(data: bytes) -> None:
+    """Add what a program outside printed to what this process keeps; nothing where it keeps none."""
+    if _file and data:
+        _file[0].write(data)
+
+
+def take_printed() -> str:
+    """Take what was printed since the last call, as plain text; nothing where this process does not keep it."""
+    if not _file:
+        return ""
+    file = _file[0]
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(Exception):  # there is none, it was closed, or is somebody else's
+            stream.flush()
+    with suppress(AttributeError, OSError, TypeError):  # another system than those of the Unix family
+        ctypes.CDLL(None).fflush(None)
+    size = file.seek(0, os.SEEK_END)
+    file.seek(0)
+    text = file.read(min(size, KEPT // 2))
+    remaining = max(size - KEPT, 0)
+    file.seek(remaining, os.SEEK_CUR)
+    text += f"\n... {remaining} bytes left out ...\n".encode() * bool(remaining) + file.read()
+    file.truncate(0)
+    file.seek(0)
+    for name, descriptor in (("stdout", 1), ("stderr", 2)):  # an engine may have closed them, or sent them elsewhere
+        os.dup2(file.fileno(), descriptor)
+        if getattr(getattr(sys, name), "closed", True):
+            # line by line, in the order of what libraries print
+            stream = open(descriptor, "w", 1, "utf-8", "backslashreplace", closefd=False)  # noqa: SIM115
+            setattr(sys, name, stream)
+    return make_plain(text.decode(errors="backslashreplace"))

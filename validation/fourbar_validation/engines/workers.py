@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 from fourbar.errors import DependencyError
 from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.rows import say_error
-from fourbar_validation.engines.output import keep_output
-from fourbar_validation.engines.processes import bound_memory
+from fourbar_validation.engines.processes import bound_memory, keep_output
 
 if TYPE_CHECKING:
     from pebble import ProcessPool

@@ -18,8 +18,7 @@ import click
 from fourbar.errors import HOLDS, InputError
 from fourbar.writing import write_bytes, write_text
 from fourbar_validation.compare.columns import CSV_ROWS, null_nan
-from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import FAILS, MADE_OF, Row, sort_rows
+from fourbar_validation.compare.rows import FAILS, MADE_OF, Counts, Row, sort_rows
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Differences, compare_runs
 from fourbar_validation.regression.record import ABOUT, ACCEPTED, TABLES, About, accept, find_baseline, open_run

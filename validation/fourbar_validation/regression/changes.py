@@ -8,8 +8,7 @@ from itertools import groupby
 from typing import TypeVar
 
 from fourbar.errors import FAILED, HOLDS, InputError
-from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import FORMULAS, VERDICTS, Row, sort_rows
+from fourbar_validation.compare.rows import FORMULAS, VERDICTS, Counts, Row, sort_rows
 from fourbar_validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, compare_row
 from fourbar_validation.regression.fault import Fault
 from fourbar_validation.regression.record import About

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from fourbar.quantities import LINE, UNKNOWNS
-from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import FAILS, REFUSES, UNDECIDED, Row, sort_rows, write_rows
+from fourbar_validation.compare.rows import FAILS, REFUSES, UNDECIDED, Counts, Row, sort_rows, write_rows
 from fourbar_validation.report.record import Record
 from fourbar_validation.report.summary import OWN, OWN_ENGINES, STATEMENT, Summary, compute_shares
 from fourbar_validation.report.templating import count_or_size, render, write_number, write_share

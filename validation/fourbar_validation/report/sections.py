@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fourbar_validation.compare.columns import read_columns
-from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import VERDICTS, Row
+from fourbar_validation.compare.rows import VERDICTS, Counts, Row
 from fourbar_validation.report.html import Section, SectionFigure
 from fourbar_validation.scenes.hard_families import FAMILIES
 

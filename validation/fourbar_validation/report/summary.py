@@ -13,8 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from fourbar.errors import HOLDS
-from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import DEGRADED, FORMULAS, REFUSES, SHIPPED, Row
+from fourbar_validation.compare.rows import DEGRADED, FORMULAS, REFUSES, SHIPPED, Counts, Row
 from fourbar_validation.compare.tolerance import (
     EPS,
     EQUIVALENCE,

@@ -15,7 +15,7 @@ from fourbar_validation.compare.compare import Comparison, Predicted
 from fourbar_validation.compare.rows import FAILS, REFUSES, VERDICTS, Row
 from fourbar_validation.compare.scales import has_angles
 from fourbar_validation.compare.statements import limit_positions, transmission
-from fourbar_validation.compare.statements.finding import look, make_worst_row
+from fourbar_validation.compare.statements.limit_positions import look, make_worst_row
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.registry import Engine, hold, make_prediction
 from fourbar_validation.run.question import Question, remove_angles

@@ -18,7 +18,7 @@ from fourbar_validation.compare.rows import FORMULAS, Row, make_breakdown, make_
 from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import Array, Mask
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.output import keep_printed
+from fourbar_validation.engines.processes import keep_printed
 from fourbar_validation.engines.protocol import require_near
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.report.record import Record, Timing

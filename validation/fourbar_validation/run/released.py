@@ -40,7 +40,7 @@ def _answer_mujoco(step: float) -> Any:
 
 
 def _answer_pinocchio(step: float) -> Any:
-    from fourbar_validation.engines.pinocchio_forward import PinocchioReleased
+    from fourbar_validation.engines.pinocchio import PinocchioReleased
 
     return PinocchioReleased(step)
 

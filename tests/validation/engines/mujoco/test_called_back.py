@@ -14,7 +14,7 @@ from fourbar.effects import Friction, Gravity, Load, Table
 from fourbar.scene import Scene
 from fourbar.scene.motion import Law
 from fourbar_validation.compare.rows import Row
-from fourbar_validation.engines.mujoco import motions, simulate
+from fourbar_validation.engines.mujoco import runner, simulate
 from fourbar_validation.engines.mujoco.called_back import OVERRUN, clip_angles
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
@@ -98,7 +98,7 @@ def test_a_fault_in_a_table_fails_the_run(factor: float, monkeypatch: pytest.Mon
 @pytest.mark.parametrize("factor", [-1.0, 1.001, 0.0], ids=["wrong sign", "a thousandth more", "missing"])
 def test_a_drive_that_does_not_follow_the_law_fails_the_run(factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """The engine is judged at the motion it made; that it is not the law's, its own speed says."""
-    monkeypatch.setattr(motions.Lawful, "alpha", changed(motions.Lawful.alpha, factor))
+    monkeypatch.setattr(runner.Lawful, "alpha", changed(runner.Lawful.alpha, factor))
     posed = crank_rocker(motion=fourbar.Motion(law=LAWS["periodic"]), loads=(), effects=())
     failed = [row for row in simulated(posed) if not row.passed]
     assert any("does not turn as commanded" in row.reason for row in failed)

@@ -18,7 +18,7 @@ from fourbar_validation.compare.compare import Comparison, Held
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
-from fourbar_validation.engines.mujoco.led import Lead
+from fourbar_validation.engines.mujoco.drives import Lead
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observe_order
 from fourbar_validation.engines.registry import ENGINES

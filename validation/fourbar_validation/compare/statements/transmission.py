@@ -13,7 +13,7 @@ from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Predicted
-from fourbar_validation.compare.statements.finding import Finding, Place, Seen
+from fourbar_validation.compare.statements.limit_positions import Finding, Place, Seen
 from fourbar_validation.compare.tolerance import (
     DEGRADED,
     EPS,

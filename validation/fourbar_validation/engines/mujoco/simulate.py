@@ -29,10 +29,19 @@ from fourbar_validation.engines.mujoco.called_back import (
     take_full_size,
 )
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
-from fourbar_validation.engines.mujoco.led import Lead, Led
+from fourbar_validation.engines.mujoco.drives import Lead, Led
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, list_alarms
-from fourbar_validation.engines.mujoco.motions import Lawful, MotionSegment, Steady, find_extremes, order_in_time
-from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, find_assembled, split_segments
+from fourbar_validation.engines.mujoco.runner import (
+    LIGHT_FLYWHEEL,
+    Lawful,
+    MotionSegment,
+    SimulatedRun,
+    Steady,
+    find_assembled,
+    find_extremes,
+    order_in_time,
+    split_segments,
+)
 
 SHARED = (
     "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of loads; what is commanded or the "

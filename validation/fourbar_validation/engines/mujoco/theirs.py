@@ -25,8 +25,7 @@ from fourbar_validation.engines.loaded import Assembled, Values
 from fourbar_validation.engines.loop import MADE, Angles, Assembler, make_blank, read_each, split_answer
 from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, load_force, solve_couple
 from fourbar_validation.engines.mujoco.describe import Described, describe_model, set_entry
-from fourbar_validation.engines.mujoco.motions import order_in_time
-from fourbar_validation.engines.mujoco.runner import Stepper, find_assembled, split_segments
+from fourbar_validation.engines.mujoco.runner import Stepper, find_assembled, order_in_time, split_segments
 from fourbar_validation.engines.mujoco.topology import Topology, find_topology
 from fourbar_validation.engines.tree import solve_closed
 

@@ -23,8 +23,14 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler, Trial, make_blank, split_answer
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
-from fourbar_validation.engines.mujoco.motions import Steady, order_in_time
-from fourbar_validation.engines.mujoco.runner import LIGHT_FLYWHEEL, SimulatedRun, find_assembled, split_segments
+from fourbar_validation.engines.mujoco.runner import (
+    LIGHT_FLYWHEEL,
+    SimulatedRun,
+    Steady,
+    find_assembled,
+    order_in_time,
+    split_segments,
+)
 
 STIFF = 4e-2
 """error (tc/h)^4 of RK4 with tc in steps: measured 1.3e-2 to 6e-2 on crank-rocker, drag link and double rocker."""

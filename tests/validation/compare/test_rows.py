@@ -18,8 +18,17 @@ from fourbar_validation.cli import status
 from fourbar_validation.compare.answer import Answer, ReleasedAnswer
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.compare import Comparison, Held
-from fourbar_validation.compare.counts import Counts
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED, VERDICTS, Row, write_results
+from fourbar_validation.compare.rows import (
+    AGREES,
+    DEGRADED,
+    FAILS,
+    REFUSES,
+    UNDECIDED,
+    VERDICTS,
+    Counts,
+    Row,
+    write_results,
+)
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.cost.laws import ErrorLaw
 from fourbar_validation.engines.registry import ENGINES, Engine
