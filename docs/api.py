@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import re
 import textwrap
 from typing import Any
 
@@ -74,9 +75,18 @@ def row(name: str, kind: str, meaning: str) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in (f"`{name}`", f"`{kind}`", meaning)) + " |"
 
 
+def unwrap(text: str) -> str:
+    """Join the lines of each paragraph, except in lists, underlined sections and examples."""
+    paragraphs = text.split("\n\n")
+    return "\n\n".join(
+        lines if re.search(r"^(\s|--|>>>)", lines, re.MULTILINE) else " ".join(lines.split("\n"))
+        for lines in paragraphs
+    )
+
+
 def entry(name: str, thing: Any, level: str = "###") -> str:
     """Write heading, signature, docstring and fields of one name."""
-    text = inspect.getdoc(thing) or ""
+    text = unwrap(inspect.getdoc(thing) or "")
     parts = [f"{level} {name}"]
     if (callable(thing) and not inspect.isclass(thing)) or ("Parameters" in text and not issubclass(thing, Exception)):
         parts.append(f"```python\n{name}{signature(thing)}\n```")
