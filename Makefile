@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-LONG := kills package machines engines simulators problems standing free fuzz accuracy suites
+LONG := kills package machines engines simulators problems benchmark free fuzz accuracy suites
 
 .PHONY: validate test test-all check long-test $(LONG:%=long-%) models docs setup clean
 
@@ -25,7 +25,7 @@ check: setup
 	$(BIN)/mypy
 
 # everything that `make test-all` samples, in full; each part ends within one hour on two cores. Minutes of two idle cores: kills
-# at most 16, suites 6, package 3, standing 2; from the processor's time of a share: machines 7 for each kernel that the
+# at most 16, suites 6, package 3; from the processor's time of a share: machines 7 for each kernel that the
 # processor has, free 15, fuzz 14, accuracy 12; the others below 5
 long-test: $(LONG:%=long-%)
 $(LONG:%=long-%): setup
@@ -42,8 +42,9 @@ long-simulators:
 	$(BIN)/python -m pytest -m nightly
 long-problems:
 	PROBLEMS=all $(BIN)/python -m pytest tests/lab/simulators/test_problems.py
-long-standing:
-	$(BIN)/python -m fourbar_lab standing
+long-benchmark:
+	$(BIN)/python -m fourbar_lab benchmark
+	$(BIN)/python -m fourbar_lab findings
 long-free:
 	FREE_MOTIONS=30 $(BIN)/python -m pytest -n 2 tests/fourbar/evaluation/test_free_motion_reference.py
 long-fuzz:

@@ -1,7 +1,7 @@
 """Writes the blocks of docs/benchmark.md and docs/findings.md between comments, and figures. `python docs/benchmark.py`
 
-Data and figures of problems come from models/problems, letters and errors from docs/examples/*.csv, findings from the
-docstrings of docs/findings/*.py. The sentences around them are written by hand.
+Data and figures of problems come from models/problems, letters and errors from docs/examples/benchmark.csv, findings
+from the docstrings of docs/findings/*.py. The sentences around them are written by hand.
 """
 
 import csv
@@ -24,16 +24,19 @@ from fourbar.show.plot.linkage import draw_mechanism, draw_support, locate_pins,
 from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, apply_style
 from fourbar.show.plot.view import make_view
 from fourbar.writing import write_text
+from fourbar_lab.benchmark import DIFFERENTIATED as LOOP
+from fourbar_lab.benchmark import name_row
 from fourbar_lab.simulators.findings import read_findings
-from fourbar_lab.simulators.standing import write_size
-from fourbar_validation.check.problem import GROUPS, LEVELS, MISSING, WORSE
+from fourbar_validation.check.problem import MISSING, WORSE
+from fourbar_validation.compare.rows import read_cell_text
 from fourbar_validation.report.svg import COORDINATES, LONG_NUMBER
 
 DOCS = Path(__file__).parent
 PAGES = ("benchmark.md", "findings.md")
 FIGURES = DOCS / "benchmark"
 PROBLEMS = DOCS.parent / "models" / "problems"
-LETTERS, STANDING = DOCS / "examples" / "benchmark.csv", DOCS / "examples" / "standing.csv"
+TABLE = DOCS / "examples" / "benchmark.csv"
+TORQUE_AND_FORCES = ("torque", *PIN_FORCES)
 BLOCK = re.compile(r"<!-- data (\w+) -->\n.*?<!-- end -->\n", re.DOTALL)
 SHOWN_AT = {"change_point": math.radians(40.0), "pinocchio_2729": math.radians(110.0)}
 """Positions of figures, rad, where the position that the project's figures choose shows little."""
@@ -125,32 +128,35 @@ def name_answers(name: str, problem: dict[str, Any]) -> str:
     )
 
 
+def read_rows() -> list[dict[str, str]]:
+    """Read the table of the benchmark, each engine with its version."""
+    with TABLE.open(encoding="utf-8", newline="") as file:
+        return [{**row, "engine": name_row(row["engine"], row["version"])} for row in csv.DictReader(file)]
+
+
 def write_matrix(names: list[str]) -> list[str]:
     """Write a row for each engine with two letters for each problem, and below why a letter is none of A and R."""
-    worst: dict[str, dict[str, dict[str, str]]] = {}
+    letters: dict[str, dict[str, str]] = {}
     reasons: dict[str, list[str]] = {}
-    order = (*LEVELS, WORSE, MISSING, "R")
-    with LETTERS.open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            engine = row["engine"] if row["version"] in row["engine"] else f"{row['engine']} {row['version']}"
-            group = next((group for group, quantities in GROUPS.items() if row["quantity"] in quantities), "motion")
-            group = "all" if row["quantity"] == "all" else group
-            letters = worst.setdefault(engine, {}).setdefault(row["problem"], {})
-            letters[group] = max(letters.get(group, row["level"]), row["level"], key=order.index)
-            if row["level"] in ("B", "C", WORSE, MISSING) and row["reason"]:
-                reasons.setdefault(row["reason"], []).append(engine)
+    for row in read_rows():
+        if row["letters"]:
+            letters.setdefault(row["engine"], {})[row["problem"]] = read_cell_text(row["letters"])
+        if row["level"] in ("B", "C", WORSE, MISSING) and row["reason"] not in ("", "not read"):
+            reasons.setdefault(row["reason"], []).append(row["engine"])
     rows = [["engine", *(str(number) for number in range(1, len(names) + 1))], ["---", *[":-:"] * len(names)]]
-    for engine, cells in worst.items():
-        rows.append([engine, *(write_letters(cells.get(name, {})) for name in names)])
+    rows += [[engine, *(cells.get(name, MISSING) for name in names)] for engine, cells in letters.items()]
     lines = [f"|{'|'.join(row)}|" for row in rows]
-    return [*lines, "", *(f"- {', '.join(dict.fromkeys(engines))}: {why}" for why, engines in reasons.items())]
+    return [*lines, "", *(f"- {name_together(engines)}: {why}" for why, engines in reasons.items())]
 
 
-def write_letters(levels: dict[str, str]) -> str:
-    """Write a cell: reactions, then torque, or the motion where no torque is asked."""
-    if "all" in levels or not levels:
-        return levels.get("all", MISSING)
-    return levels.get("reactions", MISSING) + levels.get("torque", levels.get("motion", MISSING))
+def name_together(engines: list[str]) -> str:
+    """Name rows by the words that all their names begin with, or by their programs."""
+    common = list[str]()
+    for words in zip(*(engine.split(" ") for engine in engines), strict=False):
+        if len(set(words)) > 1:
+            break
+        common.append(words[0])
+    return " ".join(common).rstrip(":,") or ", ".join(dict.fromkeys(engine.partition(":")[0] for engine in engines))
 
 
 def write_findings(*, known: bool) -> list[str]:
@@ -166,21 +172,24 @@ def write_findings(*, known: bool) -> list[str]:
     return lines
 
 
-def write_standing() -> list[str]:
-    """Write the worst error of torque and forces for each setting of each simulator: single states, and finest turn."""
-    settings: dict[tuple[str, str], list[dict[str, str]]] = {}
-    with STANDING.open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            settings.setdefault((f"{row['subject']} {row['version']}", row["setting"]), []).append(row)
-    rows = [["simulator", "setting", "pin forces", "states", "turn", "steps", "s/s"], ["---"] * 3 + ["---:"] * 4]
-    for (simulator, setting), lines in settings.items():
-        pins = [pin for pin in PIN_FORCES if lines[0][pin]]
-        worst = [max(float(line[name]) for name in ("torque", *pins)) for line in lines]
-        states = [write_size(error) for error, line in zip(worst, lines, strict=True) if not line["steps"]]
-        cost = float(f"{float(lines[-1]['cpu_s_per_s']):.2g}")
-        turn = [write_size(worst[-1]), lines[-1]["steps"], f"{cost:g}"]
+def write_runs() -> list[str]:
+    """Write the worst error of torque and forces in one loop, for each engine in its finest timestep or at states."""
+    runs: dict[str, dict[str, dict[str, str]]] = {}
+    for row in read_rows():
+        if row["problem"] == LOOP and row["setting"] != "exact" and row["quantity"] in ("gap at B", *TORQUE_AND_FORCES):
+            runs.setdefault(row["engine"], {}).setdefault(row["setting"], {})[row["quantity"]] = row["error"]
+            runs[row["engine"]][row["setting"]]["seconds"] = row["seconds"]
+    rows = [["engine", "pin forces", "steps a turn", "error", "gap at B", "s"], ["---"] * 2 + ["---:"] * 4]
+    for engine, settings in runs.items():
+        setting, errors = list(settings.items())[-1]
+        steps = "states" if "states" in setting else setting.rpartition(" ")[2].removesuffix("/rev")
+        if "torque" not in errors:
+            continue
+        pins = [pin for pin in PIN_FORCES if errors.get(pin, "nan") != "nan"]
+        worst = max(float(errors[name]) for name in ("torque", *pins))
+        cells = [f"{worst:.1g}", f"{float(errors['gap at B']):.1g}" if "gap at B" in errors else "", errors["seconds"]]
         read = "all" if len(pins) == len(PIN_FORCES) else ", ".join(pins)
-        rows.append([simulator, setting, read, *(states or [""]), *turn])
+        rows.append([engine, read, steps, *cells])
     return [f"|{'|'.join(row)}|" for row in rows]
 
 
@@ -259,7 +268,7 @@ WRITERS: dict[str, Callable[[list[str]], list[str]]] = {
     "matrix": write_matrix,
     "findings": lambda _: write_findings(known=False),
     "limits": lambda _: write_findings(known=True),
-    "standing": lambda _: write_standing(),
+    "runs": lambda _: write_runs(),
 }
 """Writers of the blocks that are no problem's, by name; each is given the names of the page's problems."""
 

@@ -1,149 +1,271 @@
-"""`python -m fourbar_lab benchmark`: every engine is asked every problem; one table, one page with a letter a cell."""
+"""`python -m fourbar_lab benchmark`: every engine is asked every problem; a table, and a page with letters."""
 
 import json
+import math
+import re
 import shlex
 import time
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
+import numpy as np
 
-from fourbar.errors import DependencyError, InputError
+from fourbar import sensitivity
+from fourbar.errors import DependencyError, FourBarError, InputError
+from fourbar.quantities import PIN_FORCES
 from fourbar.writing import write_text
 from fourbar_lab.simulators.problems import PROBLEMS, list_problems
 from fourbar_validation.check.problem import MISSING, RESULT, find_levels, judge, read_problem
 from fourbar_validation.compare.answer import EngineError
-from fourbar_validation.compare.rows import write_csv, write_one_line
-from fourbar_validation.engines.environments import FILE, Entry, prepare_program, read_engines, read_engines_of
+from fourbar_validation.compare.rows import say_error, write_csv, write_one_line
+from fourbar_validation.engines import protocol
+from fourbar_validation.engines.environments import FILE, Entry, prepare_program, read_engines_of
 from fourbar_validation.engines.guests import HELLO, Running
 from fourbar_validation.places import find_checkout
 from fourbar_validation.report.machine import name_machine
+from fourbar_validation.report.svg import draw_svg, shrink_svg
 from fourbar_validation.report.templating import render
 
 ENGINES = Path(__file__).parent / FILE
 REFUSED = "R"
-COLUMNS = ("problem", "engine", "version", "setting", "quantity", "error", "level", "seconds", "reason")
+DIFFERENTIATED = "crank_rocker"
+"""Problem whose errors are drawn over time, and at which an engine that has derivatives is asked for them."""
+COLUMNS = (
+    *("problem", "engine", "version", "setting", "quantity", "error", "level", "letters", "seconds", "reason"),
+)  # fmt: skip
+KIND = re.compile(r" \((released|slider-crank)\)$")
+"""End of the name of an entry that answers one kind of problem for the row that the rest of its name names."""
 
 
-class Outcome(NamedTuple):
-    """Result of one engine on one problem."""
+class Run(NamedTuple):
+    """One answer: of several timesteps each is one."""
 
-    letters: str
-    """Reactions and torque; of a released motion reactions and motion."""
-    numbers: list[tuple[str, str, str]]
-    """Quantity, error, level."""
-    reason: str
     setting: str
     seconds: float
-    script: str
-    folder: str
-    """Folder of its result files."""
+    """Processor time as the engine states it, else the time to its answer, s."""
+    numbers: list[tuple[str, str, str]]
+    """Quantity, error, level."""
 
 
-def read_reasons(files: Iterable[Path]) -> dict[str, str]:
-    """Read why an engine's letters are not A, by its name."""
-    reasons: dict[str, str] = {}
-    for file in files:
-        if file.is_file():
-            reasons = {**tomllib.loads(file.read_text(encoding="utf-8")).get("because", {}), **reasons}
+@dataclass(slots=True)
+class MatrixCell:
+    """What one engine answered to one problem."""
+
+    letters: str = MISSING
+    """Reactions and torque, of a released motion reactions and motion, in the finest of its timesteps."""
+    reason: str = ""
+    runs: list[Run] = field(default_factory=list)
+    order: float | None = None
+    """Power of the timestep with which the torque's error fell in the last step."""
+    script: str = ""
+    file: str = ""
+    """Result file of the finest timestep."""
+
+
+@dataclass(slots=True)
+class MatrixRow:
+    """One engine in one setting."""
+
+    entry: Entry
+    hello: dict[str, Any] = field(default_factory=dict)
+    cells: dict[str, MatrixCell] = field(default_factory=dict)
+    slopes: list[tuple[str, dict[str, str]]] = field(default_factory=list)
+    """Ways of differentiation with the relative error of the torque and of each of its derivatives."""
+    changed: str = ""
+    """Changes to the engine's input or defaults that its adapter states."""
+
+    def text(self, key: str) -> str:
+        """Return a text of hello, in one line."""
+        return write_one_line(str(self.hello.get(key, "")))
+
+
+def name_row(engine: str, version: str) -> str:
+    """Name an engine with its version, which stands before the way in which it is used."""
+    program, colon, way = engine.partition(":")
+    return engine if not version or version in engine else f"{program} {version}{colon}{way}"
+
+
+def read_reasons(file: Path) -> dict[str, str]:
+    """Read why letters are not A, by the name of a row, or by what it begins with."""
+    reasons: dict[str, str] = tomllib.loads(file.read_text(encoding="utf-8")).get("because", {})
     return reasons
 
 
 class Benchmark:
-    """A run over engines and problems; what an earlier one wrote for the same version is not asked again."""
+    """A run over engines and problems; what an earlier one was answered by the same version is not asked again."""
 
     def __init__(
         self, engines: Iterable[Entry], reasons: Mapping[str, str], problems: Iterable[str], out: Path
     ) -> None:
         self.engines, self.reasons, self.out = list(engines), reasons, out
         self.problems = {name: read_problem(PROBLEMS / f"{name}.json") for name in problems}
-        self.outcomes: dict[str, dict[str, Outcome]] = {}
-        """Outcomes by engine and problem."""
-        self.versions: dict[str, str] = {}
-        self.rows: list[list[Any]] = []
+        self.rows: dict[str, MatrixRow] = {}
 
     def run(self, seconds: float) -> None:
         """Ask every engine every problem, each question within its limit of time."""
-        for engine in self.engines:
+        for entry in self.engines:
             try:
-                running = Running(prepare_program(engine, seconds))
+                running = Running(prepare_program(entry, seconds))
             except (DependencyError, InputError) as error:
-                self._leave_out(engine, str(error))
+                self._leave_out(entry, str(error))
                 continue
             try:
-                self._ask_engine(engine, running)
+                hello = running.ask_again(HELLO, 0)
+                if "error" in hello:
+                    raise EngineError(str(hello["error"]))
+                for setting in [entry.setting] if entry.setting else hello.get("settings") or [""]:
+                    self._ask_engine(entry, hello, setting, running)
+            except EngineError as error:
+                self._leave_out(entry, str(error))
             finally:
                 running.end()
 
-    def _leave_out(self, engine: Entry, reason: str) -> None:
+    def _leave_out(self, entry: Entry, reason: str) -> None:
+        row = self.rows.setdefault(KIND.sub("", entry.name), MatrixRow(entry))
         for problem in self.problems:
-            self._add(engine, "", problem, None, f"not run: {reason}")
+            row.cells.setdefault(problem, MatrixCell(reason=f"not run: {write_one_line(reason)}"))
 
-    def _ask_engine(self, engine: Entry, running: Running) -> None:
-        try:
-            hello = running.ask_again(HELLO, 0)
-        except EngineError as error:
-            self._leave_out(engine, str(error))
-            return
-        version = write_one_line(str(hello.get("version", "")))
+    def _ask_engine(self, entry: Entry, hello: dict[str, Any], setting: str, running: Running) -> None:
+        """Ask an engine in one setting every problem."""
+        way = "" if entry.setting else setting
+        joint = ", " if ":" in entry.name else ": "
+        label = KIND.sub("", entry.name) + (f"{joint}{way}" if way else "")
+        row = self.rows.setdefault(label, MatrixRow(entry))
+        row.hello = hello
         for name, problem in self.problems.items():
+            cell = MatrixCell(script=entry.adapter or shlex.join(entry.command))
             lacking = sorted(_list_needs(problem) - set(hello.get("effects", [])))
             if problem["mechanism"] not in hello.get("mechanisms", ["four-bar"]):
                 lacking = [problem["mechanism"]]
             if lacking:
-                self._add(engine, version, name, None, f"refused: it does not take {', '.join(lacking)}")
-                continue
-            file = self.out / "results" / engine.name / f"{name}.json"
-            result = _read_earlier(file, version)
-            if result is None:
-                result = {"schema": RESULT, "problem": name, "engine": engine.name, "version": version}
-                result |= _ask_problem(running, problem)
-                file.parent.mkdir(parents=True, exist_ok=True)
-                write_text(file, json.dumps(result))
-            self._add(engine, version, name, result, result.get("reason", ""))
+                cell.letters, cell.reason = REFUSED, f"refused: it does not take {', '.join(lacking)}"
+            else:
+                for result in self._ask_problem(row, setting, label, problem, running):
+                    row.changed = row.changed or str(result.get("shared", ""))
+                    self._judge(problem, result, cell)
+            if cell.letters not in ("AA", REFUSED):
+                cell.reason = cell.reason or self._explain(label)
+            if cell.letters != REFUSED or name not in row.cells:  # another kind of this row may have answered
+                row.cells[name] = cell
+        if DIFFERENTIATED in self.problems and not row.slopes:
+            problem = self.problems[DIFFERENTIATED]
+            question = {"ask": "slopes", "scene": problem["scene"], "command": problem["command"]}
+            result = self._take_or_ask(row, label, "slopes", {"problem": DIFFERENTIATED}, question, running)
+            row.slopes = compare_slopes(problem, result.get("slopes", []))
 
-    def _add(self, engine: Entry, version: str, name: str, result: dict[str, Any] | None, reason: str) -> None:
-        """Judge one result."""
-        setting, numbers, letters = "", list[tuple[str, str, str]](), MISSING
-        seconds = 0.0 if result is None else float(result["seconds"])
-        if result is not None and "answers" in result:
-            setting = str(result.get("setting", "exact"))
-            try:
-                judged = judge(self.problems[name], result)
-            except InputError as error:
-                judged, reason = [], f"no answer that can be judged: {error}"
-            levels = find_levels(judged)
-            other = "torque" if "torque" in levels else "motion"
-            letters = levels.get("reactions", MISSING) + levels.get(other, MISSING) if levels else MISSING
-            numbers = [(row.quantity, f"{row.error:.1e}", row.level) for row in judged]
-            reason = reason or ("" if set(letters) == {"A"} else self.reasons.get(engine.name, ""))
-        elif reason.startswith("refused"):
-            letters = REFUSED
-        self.versions[engine.name] = version
-        script = engine.adapter or shlex.join(engine.command)
-        self.outcomes.setdefault(engine.name, {})[name] = Outcome(
-            letters, numbers, reason, setting, seconds, script, engine.name
-        )
-        quantities = [(*row, reason if row[2] != "A" else "") for row in numbers] or [("all", "", letters, reason)]
-        for quantity, size, level, why in quantities:
-            self.rows.append([name, engine.name, version, setting, quantity, size, level, f"{seconds:.3g}", why])
+    def _ask_problem(
+        self, row: MatrixRow, setting: str, label: str, problem: dict[str, Any], running: Running
+    ) -> Iterator[dict[str, Any]]:
+        """Ask one problem, at each number of steps."""
+        question: dict[str, Any] = {key: problem[key] for key in ("ask", "scene", "command", "times") if key in problem}
+        entry, name = row.entry, problem["problem"]
+        for steps in entry.steps if problem["ask"] == "answer" and entry.steps else (None,):
+            asked: dict[str, Any] = {"name": setting} if setting else {}
+            asked |= {} if steps is None else {"steps_per_turn": steps}
+            stem = name if steps is None else f"{name}-{steps}"
+            full = question | ({"setting": asked} if asked else {})
+            yield self._take_or_ask(row, label, stem, {"schema": RESULT, "problem": name}, full, running)
 
-    def _label(self, name: str) -> str:
-        """Name an engine with its version."""
-        version = self.versions[name]
-        return name if version in name else f"{name} {version}"
+    def _take_or_ask(
+        self, row: MatrixRow, label: str, stem: str, stated: dict[str, Any], question: dict[str, Any], running: Running
+    ) -> dict[str, Any]:
+        """Take the result of an earlier run by the same version, unless it broke down, or ask and store it."""
+        file = self.out / "results" / re.sub(r"[^\w.-]+", "-", label) / f"{stem}.json"
+        result = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+        if result.get("version") != row.text("version") or result.get("reason", "").startswith("broke down"):
+            result = {**stated, "engine": label, "version": row.text("version"), **_ask(running, question)}
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_text(file, json.dumps(result))
+        return {**result, "file": file.relative_to(self.out)}
+
+    def _judge(self, problem: dict[str, Any], result: dict[str, Any], cell: MatrixCell) -> None:
+        """Judge one result; of several timesteps the finest that is answered stands."""
+        if "answers" not in result:
+            refused = result["reason"].startswith("refused")
+            cell.reason = cell.reason if cell.runs else result["reason"]
+            cell.letters = cell.letters if cell.runs else REFUSED if refused else MISSING
+            return
+        try:
+            judged = judge(problem, result)
+        except InputError as error:
+            cell.letters, cell.reason = MISSING, f"no answer that can be judged: {error}"
+            return
+        levels = find_levels([row for row in judged if row.level != MISSING])
+        reactions, drive = (levels.get(name, MISSING) for name in ("reactions", "torque"))
+        cell.letters = reactions + (drive if "torque" in find_levels(judged) else levels.get("motion", MISSING))
+        cell.reason, cell.file = "", str(result["file"])
+        numbers = [(row.quantity, f"{row.error:.1e}", row.level) for row in judged]
+        gap = result.get("evidence", {}).get("gap")
+        numbers += [] if gap is None else [("gap at B", f"{gap:.1e}", "")]
+        seconds = float(result.get("seconds", result["asked_for"]))
+        cell.runs.append(Run(str(result.get("setting", "exact")), seconds, numbers))
+        cell.order = _find_order(cell.runs)
+
+    def _explain(self, label: str) -> str:
+        """Find the sentence for a row's letters: the longest name that the row begins with."""
+        names = [name for name in self.reasons if label.startswith(name)]
+        return self.reasons[max(names, key=len)] if names else ""
+
+    def list_rows(self) -> list[list[Any]]:
+        """List the rows of the table, problem by problem; of coarser timesteps without a level."""
+        table: list[list[Any]] = []
+        for problem in self.problems:
+            for label, row in self.rows.items():
+                cell, version = row.cells[problem], row.text("version")
+                if not cell.runs:
+                    line = [problem, label, version, "", "all", "", cell.letters, cell.letters, "", cell.reason]
+                    table.append(line)
+                for run in cell.runs:
+                    finest = run is cell.runs[-1]
+                    for quantity, error, level in run.numbers:
+                        reason = cell.reason if finest and level not in ("A", "") else ""
+                        reason = "not read" if level == MISSING else reason
+                        table.append([problem, label, version, run.setting, quantity, error, level if finest else "",
+                                      cell.letters if finest else "", f"{run.seconds:.3g}", reason])  # fmt: skip
+                if problem == DIFFERENTIATED:
+                    table += [[problem, label, version, how, f"d torque / d {key}", error, "", "", "", ""]
+                              for how, errors in row.slopes for key, error in errors.items()]  # fmt: skip
+        return table
 
     def write(self) -> None:
         """Write the table and the page."""
-        cells = {self._label(name): list(row.items()) for name, row in self.outcomes.items()}
-        requires = [", ".join(engine.requires) for engine in self.engines]
-        write_text(self.out / "benchmark.csv", write_csv(COLUMNS, sorted(self.rows)))
-        page = {"machine": name_machine(), "problems": self.problems, "cells": cells,
-                "requires": dict(zip(cells, requires, strict=True))}  # fmt: skip
-        for ending in ("html", "md"):
-            write_text(self.out / f"benchmark.{ending}", render("fourbar_lab", f"benchmark.{ending}.j2", **page))
+        write_text(self.out / "benchmark.csv", write_csv(COLUMNS, self.list_rows()))
+        rows = {name_row(label, row.text("version")): row for label, row in self.rows.items()}
+        chart = draw_work_precision(rows) if DIFFERENTIATED in self.problems else ""
+        page = {"machine": name_machine(), "problems": self.problems, "rows": rows, "chart": shrink_svg(chart)}
+        if chart:
+            write_text(self.out / "benchmark.svg", chart)
+        write_text(self.out / "benchmark.html", render("fourbar_lab", "benchmark.html.j2", **page))
+
+
+def draw_work_precision(rows: Mapping[str, MatrixRow]) -> str:
+    """Draw the worst error of torque and pin forces over processor time, a line an engine, as SVG; "" if none ran."""
+    from matplotlib import colormaps
+    from matplotlib.figure import Figure
+
+    lines: dict[str, list[tuple[float, float]]] = {}
+    for name, row in rows.items():
+        for run in row.cells[DIFFERENTIATED].runs:
+            errors = [float(error) for quantity, error, _ in run.numbers if quantity in ("torque", *PIN_FORCES)]
+            if run.setting.endswith("/rev") and run.seconds > 0.0:
+                lines.setdefault(name, []).append((run.seconds, float(np.nanmax(errors))))
+    if not lines:
+        return ""
+    figure = Figure(figsize=(4.8, 8.2), layout="constrained")
+    axes = figure.add_subplot()
+    for number, (name, points) in enumerate(lines.items()):
+        colour = [0.8 * part for part in colormaps["turbo"]((number + 0.5) / len(lines))[:3]]
+        look = {"marker": "osD^vP*Xh<>"[number % 11], "linestyle": ("-", "--", ":", "-.")[number % 4], "color": colour}
+        axes.loglog(*zip(*points, strict=True), label=name, markersize=4, linewidth=1, **look)
+    axes.set_xlabel("processor time of the run, s")
+    axes.set_ylabel("greatest error of torque and pin forces")
+    axes.grid(alpha=0.3)
+    figure.legend(loc="outside lower center", fontsize=7, frameon=False)
+    return draw_svg(figure, "benchmark")
 
 
 def _list_needs(problem: dict[str, Any]) -> set[str]:
@@ -154,28 +276,56 @@ def _list_needs(problem: dict[str, Any]) -> set[str]:
     return needs | ({"release"} if problem["ask"] == "release" else set())
 
 
-def _read_earlier(file: Path, version: str) -> dict[str, Any] | None:
-    """Return what an earlier run was answered, unless by another version or not at all."""
-    if not file.is_file():
-        return None
-    result: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    return result if result.get("version") == version and ("answers" in result or "reason" in result) else None
-
-
-def _ask_problem(running: Running, problem: dict[str, Any]) -> dict[str, Any]:
-    """Ask one problem; what came of it as entries of a result."""
-    question: dict[str, Any] = {key: problem[key] for key in ("ask", "scene", "command", "times") if key in problem}
-    positions = len(problem.get("times", problem["command"].get("theta_2", [])))
+def _ask(running: Running, question: dict[str, Any]) -> dict[str, Any]:
+    """Ask one question; what came of it as entries of a result."""
+    positions = len(question.get("times", question["command"].get("theta_2", [])))
     began = time.perf_counter()
     try:
         reply = running.ask_again(question, positions)
     except EngineError as error:
         reply = {"error": str(error)}
-    spent = {"seconds": time.perf_counter() - began}
-    if "answers" in reply:
-        return {key: reply[key] for key in ("answers", "at", "setting") if key in reply} | spent
+    spent = {"asked_for": time.perf_counter() - began}
+    if "answers" in reply or "slopes" in reply:
+        kept = ("answers", "at", "setting", "evidence", "shared", "seconds", "slopes")
+        return {key: reply[key] for key in kept if key in reply} | spent
     word, text = ("refused", reply["refusal"]) if "refusal" in reply else ("broke down", reply.get("error", ""))
     return {"reason": f"{word}: {write_one_line(str(text))}", **spent}
+
+
+def compare_slopes(problem: dict[str, Any], slopes: Iterable[Any]) -> list[tuple[str, dict[str, str]]]:
+    """Compare derivatives of the torque with the formulas' at the state that the engine took: relative errors."""
+    scene, _ = protocol.command_from_json(protocol.scene_from_json(problem["scene"]), problem["command"])
+    compared = []
+    try:
+        for way in slopes:
+            errors = {}
+            if "by" in way:
+                angle, speed, acceleration = (float(way[key]) for key in scene.motion.names)
+                motion = scene.motion.replace(angle=angle, speed=speed, acceleration=acceleration)
+                ours = sensitivity(replace(scene, motion=motion))
+                pairs = {"torque": (way["torque"], ours.value("torque"))}
+                pairs |= {key: (theirs, ours.of("torque", key)) for key, theirs in way["by"].items()}
+                errors = {
+                    key: "zero" if theirs == 0.0 else f"{abs(theirs / float(np.ravel(value)[0]) - 1.0):.1e}"
+                    for key, (theirs, value) in pairs.items()
+                }
+            compared.append((write_one_line(str(way["how"])), errors))
+    except (AttributeError, KeyError, TypeError, ValueError, FourBarError) as error:
+        compared.append((f"no derivatives that can be read: {say_error(error)}", {}))
+    return compared
+
+
+def _find_order(runs: list[Run]) -> float | None:
+    """Return the order of the torque's error in the timestep, from the last two runs; None where there is none."""
+    if len(runs) < 2:
+        return None
+    errors, steps = [], []
+    for run in runs[-2:]:
+        errors += [float(error) for quantity, error, _ in run.numbers if quantity == "torque"]
+        steps += [float(number) for number in re.findall(r"(\d+)/rev$", run.setting)]
+    if len(errors) < 2 or len(steps) < 2 or not all(0.0 < error < math.inf for error in errors) or steps[0] == steps[1]:
+        return None
+    return math.log(errors[0] / errors[1]) / math.log(steps[1] / steps[0])
 
 
 @click.command()
@@ -188,15 +338,16 @@ def _ask_problem(running: Running, problem: dict[str, Any]) -> dict[str, Any]:
 def command(engines: Path | None, problems: tuple[str, ...], out: Path, time_limit: float) -> None:
     """Ask every engine every problem of models/problems, and write benchmark.csv and one page.
 
-    Each engine runs in its environment, which pip makes once. What was answered before is not asked again.
+    Each engine runs in its environment, which pip makes once. An engine that runs through time is asked at each of its
+    numbers of steps. What was answered before is not asked again.
     """
     find_checkout("benchmark")
     for name in problems:
         if name not in list_problems():
             raise InputError("--problem", name, f"must be one of {', '.join(list_problems())}")
-    entries = read_engines([ENGINES.parent]) if engines is None else read_engines_of(engines)
+    entries = read_engines_of(engines or ENGINES)
     out.mkdir(parents=True, exist_ok=True)
-    made = Benchmark(entries.values(), read_reasons([engines or ENGINES]), problems or list_problems(), out)
-    made.run(time_limit)
-    made.write()
-    click.echo(f"wrote {out}/benchmark.csv, .html, .md: {len(made.outcomes)} engines, {len(made.problems)} problems")
+    benchmark = Benchmark(entries.values(), read_reasons(engines or ENGINES), problems or list_problems(), out)
+    benchmark.run(time_limit)
+    benchmark.write()
+    click.echo(f"wrote {out}/benchmark.csv, .html: {len(benchmark.rows)} engines, {len(benchmark.problems)} problems")

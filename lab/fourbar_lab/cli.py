@@ -18,7 +18,6 @@ COMMANDS = {
     "fuzz-files": "fourbar_lab.fuzz_files:fuzz_files",
     "faults": "fourbar_lab.faults:command",
     "mutants": "fourbar_lab.mutants:command",
-    "standing": "fourbar_lab.simulators.standing:command",
     "findings": "fourbar_lab.simulators.findings:command",
     "write": "fourbar_lab.write:command",
     "problems": "fourbar_lab.simulators.problems:command",

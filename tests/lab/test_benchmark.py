@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from fourbar_lab.benchmark import ENGINES, REFUSED, read_reasons
+from fourbar_lab.benchmark import ENGINES, REFUSED, name_row, read_reasons
 from fourbar_lab.cli import status
 from fourbar_lab.simulators.problems import PROBLEMS
 from fourbar_validation.check.problem import judge, read_problem, read_result
-from fourbar_validation.engines.environments import read_engines
+from fourbar_validation.compare.rows import read_cell_text
+from fourbar_validation.engines.environments import read_engines, read_engines_of
 from tests.whole.test_imports import ROOT
 
 PROBLEMS_ASKED = ("crank_rocker", "slider_crank", "sprung")
@@ -34,15 +35,12 @@ def folder(tmp_path: Path) -> Path:
 
 
 def run(folder: Path, *problems: str) -> dict[tuple[str, str], str]:
-    """The letters of a run, by engine and problem, as they stand in the page's text."""
+    """The letters of a run, by engine and problem."""
     options = [option for name in problems or PROBLEMS_ASKED for option in ("--problem", name)]
     line = ["benchmark", "--engines", str(folder / "engines.toml"), "-o", str(folder / "out"), "--time-limit", "60"]
     assert status([*line, *options]) == 0
-    rows = [line.strip("| ").split(" | ") for line in (folder / "out" / "benchmark.md").read_text().splitlines()
-            if line.startswith("|") and "---" not in line]  # fmt: skip
-    _, *problems = rows[0]
-    return {(row[0].replace("\\", "").partition(" ")[0], name.replace("\\", "")): letters
-            for row in rows[1:] for name, letters in zip(problems, row[1:], strict=True)}  # fmt: skip
+    table = list(csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines()))
+    return {(row["engine"], row["problem"]): read_cell_text(row["letters"]) for row in table if row["letters"]}
 
 
 def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(folder: Path) -> None:
@@ -75,9 +73,17 @@ def test_what_was_answered_is_not_asked_again(folder: Path) -> None:
     assert run(folder, "crank_rocker")["mine", "crank_rocker"] == "-"
 
 
-def test_the_engines_of_the_lab_are_entries_that_can_be_read() -> None:
-    engines, reasons = read_engines([ENGINES.parent]), read_reasons([ENGINES])
-    assert len(engines) >= 15 and reasons.keys() <= engines.keys()
+def test_the_engines_of_the_lab_are_entries_that_a_run_finds_too() -> None:
+    engines, reasons = read_engines_of(ENGINES), read_reasons(ENGINES)
+    assert len(engines) >= 25 and engines.items() <= read_engines([]).items()
+    assert not [name for name in engines if "," in name], "`run --engines` takes a comma-separated list"
+    rows = {name.partition(":")[0] for name in engines}
+    assert all(any(reason.startswith(row) for row in rows) for reason in reasons)
+
+
+def test_a_row_names_its_version_before_its_way() -> None:
+    assert name_row("MuJoCo: simulated", "4.0.0") == "MuJoCo 4.0.0: simulated"
+    assert name_row("mujoco 3.3.7", "3.3.7") == "mujoco 3.3.7" and name_row("mine", "") == "mine"
 
 
 @pytest.mark.parametrize(
@@ -101,20 +107,68 @@ def test_an_engine_answers_the_slider_cranks(library: str, folder: Path) -> None
     assert sorted(letters.values()) == ["AA", "AA", REFUSED]
 
 
+SLOW = """
+import json, sys
+text = open({path!r}).read().split("for question in")[0]
+exec(text)
+for question in map(json.loads, sys.stdin):
+    reply = {{"engine": "slow", "version": "2", "answers": NAMES, "effects": ["gravity"], "settings": ["good", "bad"]}}
+    if question["ask"] == "answer":
+        steps, rows = question["setting"]["steps_per_turn"], []
+        if steps == 9:
+            print(json.dumps({{"id": question["id"], "error": "too coarse"}}), flush=True)
+            continue
+        told = question["command"]
+        for theta in told["theta_2"]:
+            rows.append(solve(question["scene"], theta, told["omega_2"], 0.0, told["branch"]))
+            rows[-1]["torque"] *= 1.0 + 100.0 / steps**2 * (question["setting"]["name"] == "bad")
+        reply = {{"answers": {{name: [row[name] for row in rows] for name in NAMES}}, "setting": f"RK4 {{steps}}/rev"}}
+        if question["setting"]["name"] == "good":
+            del reply["answers"]["F43"]
+    elif question["ask"] == "slopes":
+        reply = {{"slopes": [{{"how": "by hand"}}]}}
+    print(json.dumps({{"id": question["id"], **reply}}), flush=True)
+"""
+
+
+def test_of_several_timesteps_the_finest_is_judged_and_each_setting_is_a_row(folder: Path) -> None:
+    (folder / "slow.py").write_text(SLOW.format(path=str(folder / "mine.py")))
+    (folder / "engines.toml").write_text(
+        f'[[engine]]\nname = "slow"\ncommand = ["python", "{folder / "slow.py"}"]\nsteps = [9, 100, 1000]\n'
+        '[because]\n"slow: bad" = "its torque is wrong on purpose"\n"slow" = "another reason"\n'
+    )
+    letters = run(folder, "crank_rocker", "sprung")
+    assert letters["slow: good", "crank_rocker"] == "AA" and letters["slow: bad", "crank_rocker"] == "AC"
+    assert letters["slow: bad", "sprung"] == REFUSED
+    table = list(csv.DictReader((folder / "out" / "benchmark.csv").read_text().splitlines()))
+    torque = {row["setting"]: row for row in table if row["engine"] == "slow: bad" and row["quantity"] == "torque"}
+    assert {setting: row["level"] for setting, row in torque.items()} == {"RK4 100/rev": "", "RK4 1000/rev": "C"}
+    assert torque["RK4 1000/rev"]["reason"] == "its torque is wrong on purpose"
+    missing = [row for row in table if row["engine"] == "slow: good" and row["quantity"] == "F43" and row["level"]]
+    assert [(row["level"], row["reason"]) for row in missing] == [("-", "not read")]
+    page = (folder / "out" / "benchmark.html").read_text()
+    assert "order 2.0" in page and "Derivatives of the torque, by hand" in page and "slow 2: bad" in page
+
+
 def test_a_simulator_answers_single_states_at_its_own_motion(folder: Path) -> None:
     pytest.importorskip("mujoco")
-    program = ["python", "-m", "fourbar_lab.simulators.states", "mujoco_c", "generated file"]
-    (folder / "engines.toml").write_text(f'[[engine]]\nname = "it"\ncommand = {json.dumps(program)}\n')
+    adapter = "fourbar_lab.simulators.mujoco_c:MujocoFile"
+    (folder / "engines.toml").write_text(
+        f'[[engine]]\nname = "it"\nadapter = "{adapter}"\nsetting = "generated file"\n'
+    )
     letters = run(folder, "crank_rocker", "sprung", "change_point", "second_on_the_crank")
     assert sorted(letters.values()) == ["AA", REFUSED, REFUSED, REFUSED]
     (file,) = (folder / "out" / "results").glob("*/crank_rocker.json")
     assert "at" in json.loads(file.read_text())
 
 
-def test_what_integrates_released_motions_alone_refuses_positions(folder: Path) -> None:
+def test_an_entry_of_one_kind_of_problem_answers_in_the_row_of_another(folder: Path) -> None:
     pytest.importorskip("pinocchio")
-    adapter = "fourbar_validation.engines.pinocchio:PinocchioReleased"
-    (folder / "engines.toml").write_text(f'[[engine]]\nname = "it"\nadapter = "{adapter}"\n')
-    letters = run(folder, "crank_rocker", "gz_physics_987")
-    assert letters["it", "crank_rocker"] == REFUSED
+    released = "fourbar_validation.engines.pinocchio:PinocchioReleased"
+    (folder / "engines.toml").write_text(
+        '[[engine]]\nname = "it"\nadapter = "pinocchio-inverse"\n'
+        f'[[engine]]\nname = "it (released)"\nadapter = "{released}"\n'
+    )
+    letters = run(folder, "crank_rocker", "gz_physics_987", "slider_crank")
+    assert letters["it", "crank_rocker"] == "AA" and letters["it", "slider_crank"] == REFUSED
     assert letters["it", "gz_physics_987"][:1] == "-" and letters["it", "gz_physics_987"][1:] in "AB"

@@ -284,7 +284,6 @@ PROCESSES = [
     ("fourbar", f"usd {NO_FILE} -o a.usda", BAD_INPUT),
     ("fourbar_lab", "problems --no-such-option", BAD_INPUT),
     ("fourbar_lab", "benchmark --no-such-option", BAD_INPUT),
-    ("fourbar_lab", "standing --no-such-option", BAD_INPUT),
     ("fourbar_lab", "findings --release 1.0", BAD_INPUT),
     ("validation", f"accept {NO_FILE}", BAD_INPUT),
     ("validation", f"compare accepted {ROOT / 'validation/fourbar_validation/regression/accepted'}", HOLDS),

@@ -70,12 +70,12 @@ JUDGED_BY = {
     "validation/cost/test_cost.py": "validation/cost: series formulas laws pictures study; "
     "validation/advise: worst_errors; validation/engines/mujoco: one_state",
     "validation/advise/test_advise.py": "validation/advise: matters; validation/engines/mujoco: required_error trial",
-    "lab/test_benchmark.py": "lab/simulators: slider_engines slider_mujoco slider_pinocchio states",
+    "lab/test_benchmark.py": "lab/simulators: slider_engines slider_mujoco slider_pinocchio",
     "lab/simulators/test_problems.py": "lab/simulators: slider_crank; validation/check: problem",
     # simulators that need not be there: their scripts run where they are installed
-    "lab/simulators/test_simulators.py": "lab/simulators: drake_sap examine exudyn_simulated "
+    "lab/simulators/test_simulators.py": "lab/simulators: dart drake_sap exudyn_simulated "
     "genesis_rigid gradients motion mujoco_c mujoco_mjx mujoco_warp newton_kamino newton_mujoco "
-    "pinocchio_simulated pybullet standing work",
+    "pinocchio_simulated pybullet",
 }
 """Modules without a test of their name, folder by folder, and the test that says when one of them is wrong."""
 

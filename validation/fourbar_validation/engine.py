@@ -109,7 +109,7 @@ def hash_code(module: str) -> str:
     if file := sys.modules[module].__file__:
         files |= {str(path) for path in Path(file).parent.glob("*.py")}
     digest = hashlib.sha256()
-    for path in sorted(filter(None, files)):
+    for path in sorted(file for file in files if file and os.path.isfile(file)):  # modules made by code may name none
         digest.update(f"{path} ".encode() + hashlib.sha256(Path(path).read_bytes()).digest())
     digest.update(repr(sorted(f"{each.name} {each.version}" for each in distributions())).encode())
     return digest.hexdigest()[:16]

@@ -1,75 +1,81 @@
 """Drake's own simulation of the SDF file: a discrete plant, its SAP solver, the loop closed in two ways."""
 
 from importlib.metadata import version
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
-from pydrake.systems.analysis import Simulator
+from pydrake.systems import analysis
 
 from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_sdf
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import Instant, Readings, find_gravity, run_through, start, turn
+from fourbar_lab.simulators.motion import LIGHT, Course, Instant, Readings, Simulator, find_gravity, run_through, start
 from fourbar_validation.engines.description import FIRST_PIN, rotate
 
-VERSION = version("drake")
-STEPS = (628, 2512)
-CHANGED = (
-    "a flywheel is the rotor of an actuator; by default a loop of four joints is refused, so a ball constraint stands "
-    "in for the fourth (its force is not offered in Python); SetEnableLoopTopology(True) takes the SDF of four joints"
-)
-SETTINGS = {"ball constraint at B": "drake"}
-if hasattr(MultibodyPlant, "SetEnableLoopTopology"):  # from Drake 1.57 on, marked as internal
-    SETTINGS["four joints, SetEnableLoopTopology"] = "gazebo"
-"""Simulator for which the SDF is written, by setting; Gazebo's SDF has the fourth joint."""
 
+class DrakeSap(Simulator):
+    """Drake's discrete plant with the SAP solver."""
 
-def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """Simulate a turn in so many steps, carried by a flywheel, the rotor of an actuator on O2."""
-    timestep, _ = turn(scene, steps)
-    begin, inertia = start(scene), size_flywheel(scene)
-    plant = MultibodyPlant(timestep)
-    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
-    if SETTINGS[setting] == "gazebo":
-        plant.SetEnableLoopTopology(True)
-    Parser(plant).AddModelsFromString(write_sdf(scene, SETTINGS[setting], begin), "sdf")
-    plant.mutable_gravity_field().set_gravity_vector(find_gravity(scene))
-    joints = [plant.GetJointByName(name) for name in FIRST_PIN.values()]
-    actuator = plant.AddJointActuator("drive", joints[0])
-    actuator.set_default_rotor_inertia(inertia)
-    actuator.set_default_gear_ratio(1.0)
-    plant.Finalize()
-    context = plant.CreateDefaultContext()
-    plant.get_actuation_input_port().FixValue(context, np.zeros(plant.num_actuators()))  # also one of every other joint
-    for joint, speed in zip(joints, begin.qvel, strict=True):
-        joint.set_angular_rate(context, speed)
-    closing = plant.GetJointByName("B") if SETTINGS[setting] == "gazebo" else None  # bar 3 on bar 4
-    if closing is not None:
-        closing.set_angular_rate(context, begin.qvel[0] + begin.qvel[1] - begin.qvel[2])
-    simulator = Simulator(plant, context)
-    done = 0
+    name, version = "Drake, SAP", version("drake")
+    changed = (
+        "a flywheel is the rotor of an actuator; by default a loop of four joints is refused, so a ball constraint "
+        "stands in for the fourth (its force is not offered in Python); SetEnableLoopTopology(True), from 1.57 on, "
+        "takes the SDF of four joints"
+    )
+    settings: ClassVar[dict[str, str]] = {
+        "ball constraint": "drake",
+        **({"four joints": "gazebo"} if hasattr(MultibodyPlant, "SetEnableLoopTopology") else {}),
+    }
+    """Simulator for which the SDF is written; Gazebo's SDF has the fourth joint."""
 
-    def advance(n: int) -> tuple[list[float], float, dict[str, Any]]:
-        nonlocal done
-        simulator.AdvanceTo((done + n - 1) * timestep)
-        angles = [joint.get_angle(context) + q for joint, q in zip(joints, begin.qpos, strict=True)]
-        theta, speed = [angles[0], angles[0] + angles[1], angles[2]], joints[0].get_angular_rate(context)
-        reactions = plant.get_reaction_forces_output_port().Eval(context)
-        on_child = (reactions[int(joint.index())].translational()[:2] for joint in joints)
-        O2, A, O4 = (np.array(rotate(angle, *force)) for angle, force in zip(theta, on_child, strict=True))
-        forces = {"F12": O2, "F32": -A, "F14": O4}
+    def through(self, scene: Scene, course: Course) -> Readings:
+        """Run through a course, carried by a flywheel, the rotor of an actuator on O2."""
+        timestep, written_for = course.timestep, self.settings[self.setting]
+        begin, inertia = start(scene), size_flywheel(scene, LIGHT)
+        plant = MultibodyPlant(timestep)
+        plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
+        if written_for == "gazebo":
+            plant.SetEnableLoopTopology(True)
+        Parser(plant).AddModelsFromString(write_sdf(scene, written_for, begin), "sdf")
+        plant.mutable_gravity_field().set_gravity_vector(find_gravity(scene))
+        joints = [plant.GetJointByName(name) for name in FIRST_PIN.values()]
+        actuator = plant.AddJointActuator("drive", joints[0])
+        actuator.set_default_rotor_inertia(inertia)
+        actuator.set_default_gear_ratio(1.0)
+        plant.Finalize()
+        context = plant.CreateDefaultContext()
+        plant.get_actuation_input_port().FixValue(
+            context, np.zeros(plant.num_actuators())
+        )  # also one of every other joint
+        for joint, speed in zip(joints, begin.qvel, strict=True):
+            joint.set_angular_rate(context, speed)
+        closing = plant.GetJointByName("B") if written_for == "gazebo" else None  # bar 3 on bar 4
         if closing is not None:
-            on_coupler = reactions[int(closing.index())].translational()[:2]
-            forces["F43"] = np.array(rotate(theta[1], *on_coupler))
-        done += n
-        simulator.AdvanceTo(done * timestep)
-        return theta, speed, forces
+            closing.set_angular_rate(context, begin.qvel[0] + begin.qvel[1] - begin.qvel[2])
+        simulator = analysis.Simulator(plant, context)
+        done = 0
 
-    def read(before: tuple[list[float], float, dict[str, Any]]) -> Instant:
-        theta, speed, forces = before
-        alpha = (joints[0].get_angular_rate(context) - speed) / timestep
-        return Instant(theta, speed, alpha, -inertia * alpha, forces)
+        def advance(steps: int) -> tuple[list[float], float, dict[str, Any]]:
+            nonlocal done
+            simulator.AdvanceTo((done + steps - 1) * timestep)
+            angles = [joint.get_angle(context) + q for joint, q in zip(joints, begin.qpos, strict=True)]
+            theta, speed = [angles[0], angles[0] + angles[1], angles[2]], joints[0].get_angular_rate(context)
+            reactions = plant.get_reaction_forces_output_port().Eval(context)
+            on_child = (reactions[int(joint.index())].translational()[:2] for joint in joints)
+            O2, A, O4 = (np.array(rotate(angle, *force)) for angle, force in zip(theta, on_child, strict=True))
+            forces = {"F12": O2, "F32": -A, "F14": O4}
+            if closing is not None:
+                on_coupler = reactions[int(closing.index())].translational()[:2]
+                forces["F43"] = np.array(rotate(theta[1], *on_coupler))
+            done += steps
+            simulator.AdvanceTo(done * timestep)
+            return theta, speed, forces
 
-    return run_through(scene, steps, setting, advance, read)
+        def read(before: tuple[list[float], float, dict[str, Any]]) -> Instant:
+            theta, speed, forces = before
+            alpha = (joints[0].get_angular_rate(context) - speed) / timestep
+            return Instant(theta, speed, alpha, -inertia * alpha, forces)
+
+        return run_through(scene, course, advance, read)

@@ -1,9 +1,9 @@
-"""`findings`: each finding's script where its simulator is, in an environment that has it."""
+"""`findings`: each finding's script in an environment of engines.toml that has its simulator."""
 
 import ast
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import dedent
@@ -11,13 +11,15 @@ from textwrap import dedent
 import click
 
 from fourbar.errors import DependencyError, InputError
-from fourbar_lab.simulators.examine import LOOK
+from fourbar_validation.engines.environments import make_environment, read_engines
 from fourbar_validation.engines.processes import Ended, run_to_end
 from fourbar_validation.places import CHECKOUT
 
 FOLDER = None if CHECKOUT is None else CHECKOUT / "docs" / "findings"
 FIELDS = ("Engine", "With", "Expected", "Found", "Since", "Until", "Reported")
 """Fields of a script's docstring, after its first sentence; Engine: the name for pip, in brackets what is imported."""
+LOOK = "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or sys.exit(1)"
+"""Program for a Python interpreter that fails if a module is not installed."""
 MENDED = "mended"
 """Word that a script prints at its end, with exit status 1, if the finding no longer holds."""
 
@@ -36,7 +38,7 @@ class Reproduction:
         name, _, module = self.fields["Engine"].partition(" ")
         return name, module.strip("()")
 
-    def run(self, python: Path, seconds: float) -> str:
+    def run(self, python: str | Path, seconds: float) -> str:
         """Run the script: "holds", "mended" or why it could not run."""
         return read_outcome(run_to_end([python, self.script], seconds=seconds))
 
@@ -60,10 +62,10 @@ def read_findings() -> list[Reproduction]:
     return [read(path) for path in sorted(FOLDER.glob("*.py") if FOLDER else ())]
 
 
-def find_interpreter(finding: Reproduction, pythons: Sequence[Path]) -> tuple[Path, str] | None:
+def find_interpreter(finding: Reproduction) -> tuple[str, str] | None:
     """Find the first interpreter that has the engine, and its version there."""
     name, module = finding.engine
-    for python in pythons:
+    for python in _list_interpreters(name):
         look = f"{LOOK.format(module)}; print(importlib.metadata.version({name!r}), sys.version.split()[0])"
         done = run_to_end([python, "-c", look])
         if not done.failed:
@@ -72,32 +74,40 @@ def find_interpreter(finding: Reproduction, pythons: Sequence[Path]) -> tuple[Pa
     return None
 
 
-def run_findings(pythons: Sequence[Path], seconds: float) -> list[tuple[Reproduction, str]]:
+def _list_interpreters(name: str) -> Iterator[str]:
+    """List this interpreter, and those of the engines that require a package, which pip installs for the first."""
+    yield sys.executable
+    for entry in read_engines([]).values():
+        if any(re.match(r"[\w.-]+", requirement)[0] == name for requirement in entry.requires):  # type: ignore[index]
+            try:
+                yield make_environment(entry)
+            except DependencyError as error:
+                click.echo(str(error), err=True)
+
+
+def run_findings(findings: list[Reproduction], seconds: float) -> list[tuple[Reproduction, str]]:
     """Run each finding where its engine is: what came of it, in words."""
-    made = []
-    for finding in read_findings():
-        place = find_interpreter(finding, pythons)
+    outcomes = []
+    for finding in findings:
+        place = find_interpreter(finding)
         if place is None:
-            made.append((finding, f"not run: {finding.engine[0]} is not installed under any --python"))
+            outcomes.append((finding, f"not run: {finding.engine[0]} is not installed, and no engine requires it"))
         else:
-            made.append((finding, f"{finding.run(place[0], seconds)} in {place[1]}"))
-    return made
+            outcomes.append((finding, f"{finding.run(place[0], seconds)} in {place[1]}"))
+    return outcomes
 
 
 @click.command()
 @click.argument("scripts", nargs=-1, type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--python", "pythons", type=click.Path(path_type=Path), multiple=True, help="An environment (repeat).")
 @click.option("--time-limit", default=600.0, show_default=True, help="Seconds for each script.")
-def command(scripts: tuple[Path, ...], pythons: tuple[Path, ...], time_limit: float) -> None:
-    """Run the scripts of docs/findings where their simulators are."""
-    chosen = [read(script) for script in scripts]
+def command(scripts: tuple[Path, ...], time_limit: float) -> None:
+    """Run the scripts of docs/findings where their simulators are: here, or in environments of engines.toml."""
+    chosen = [read(script) for script in scripts] or read_findings()
     for finding in chosen:
         if "Engine" not in finding.fields:
             raise InputError("SCRIPT", str(finding.script), "has no line 'Engine: NAME (MODULE)' in its docstring")
-    found = run_findings([Path(sys.executable), *(path.absolute() for path in pythons)], time_limit)
-    wanted = {finding.script.resolve() for finding in chosen} or {each.script for each, _ in found}
-    for finding, state in found:
-        if finding.script in wanted:
-            click.echo(f"{finding.script.name}: {state}")
-    if all(state.startswith("not run") for _, state in found):
-        raise DependencyError("no finding's simulator is installed here or under a --python")
+    outcomes = run_findings(chosen, time_limit)
+    for finding, state in outcomes:
+        click.echo(f"{finding.script.name}: {state}")
+    if all(state.startswith("not run") for _, state in outcomes):
+        raise DependencyError("no finding's simulator is installed here or required by an engine of engines.toml")

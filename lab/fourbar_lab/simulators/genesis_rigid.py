@@ -1,7 +1,7 @@
 """Genesis' rigid solver in double precision, from the MJCF file."""
 
 from importlib.metadata import version
-from typing import Any
+from typing import Any, ClassVar
 
 import genesis
 import numpy as np
@@ -9,63 +9,67 @@ import torch
 
 from fourbar.scene import Scene
 from fourbar_lab.simulators.motion import (
+    Course,
     Instant,
     Readings,
+    Simulator,
     find_gravity,
     run_through,
     start,
-    turn,
     write_temp,
 )
 from fourbar_lab.simulators.mujoco_c import text
 
-VERSION = version("genesis-world")
-DEVICE = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"
-STEPS = (314, 628)
-CHANGED = (
-    "precision 64; timestep, gravity and the keyframe's speeds given by hand; its default armature of 0.1 kg m^2 is "
-    "deliberate, and documented"
-)
-SETTINGS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
-    "enable_mujoco_compatibility": ({}, {"enable_mujoco_compatibility": True}),
-    "default_armature=None": ({"default_armature": None}, {}),
-    "its defaults": ({}, {}),
-}
-"""Arguments of the MJCF morph and of the rigid solver's options, by setting."""
+FLYWHEEL = 1e5
+"""Inertia of the flywheel relative to the linkage's; beside 1e8 its solver leaves gravity to itself unless it is set to
+MuJoCo's tolerance."""
 genesis.init(backend=genesis.gpu if torch.cuda.is_available() else genesis.cpu, precision="64", logging_level="error")
 
 
-def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """Simulate a turn; torque and force are those with which the step began."""
-    timestep, _ = turn(scene, steps)
-    of_morph, of_solver = SETTINGS[setting]
-    common: dict[str, Any] = {"dt": timestep, "gravity": find_gravity(scene)}
-    world = genesis.Scene(
-        sim_options=genesis.options.SimOptions(**common),
-        rigid_options=genesis.options.RigidOptions(
-            **common, enable_collision=False, enable_joint_limit=False, **of_solver
-        ),
-        show_viewer=False,
-    )
-    with write_temp(text(scene, steps, "genesis"), "four_bar.xml") as file:
-        bars = world.add_entity(genesis.morphs.MJCF(file=file, **of_morph))
-        world.build()
-    world.step()  # compiled before the clock runs
-    world.reset()
-    bars.set_dofs_velocity(np.array(start(scene).qvel))
-    armature, solver = float(bars.get_dofs_armature()[0]), world.sim.rigid_solver
+class GenesisRigid(Simulator):
+    """Genesis' rigid solver; it reports no pin force but the closing one."""
 
-    def advance(n: int) -> tuple[Any, float]:
-        for _ in range(n - 1):
+    name, version = "Genesis", version("genesis-world")
+    device = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"
+    changed = "precision 64; timestep, gravity and the keyframe's speeds are set by hand; a lighter flywheel"
+    quantities = ("theta_3", "theta_4", "torque", "F43")
+    settings: ClassVar[dict[str, tuple[dict[str, Any], dict[str, Any]]]] = {
+        "enable_mujoco_compatibility": ({}, {"enable_mujoco_compatibility": True}),
+        "default_armature=None": ({"default_armature": None}, {}),
+        "its defaults": ({}, {}),
+    }
+    """Arguments of the MJCF morph and of the rigid solver's options."""
+
+    def through(self, scene: Scene, course: Course) -> Readings:
+        """Run through a course; torque and force are those with which the step began."""
+        of_morph, of_solver = self.settings[self.setting]
+        common: dict[str, Any] = {"dt": course.timestep, "gravity": find_gravity(scene)}
+        world = genesis.Scene(
+            sim_options=genesis.options.SimOptions(**common),
+            rigid_options=genesis.options.RigidOptions(
+                **common, enable_collision=False, enable_joint_limit=False, **of_solver
+            ),
+            show_viewer=False,
+        )
+        with write_temp(text(scene, course.steps, "genesis", flywheel=FLYWHEEL), "four_bar.xml") as file:
+            bars = world.add_entity(genesis.morphs.MJCF(file=file, **of_morph))
+            world.build()
+        world.step()  # compiled before the clock runs
+        world.reset()
+        bars.set_dofs_velocity(np.array(start(scene).qvel))
+        armature, solver = float(bars.get_dofs_armature()[0]), world.sim.rigid_solver
+
+        def advance(steps: int) -> tuple[Any, float]:
+            for _ in range(steps - 1):
+                world.step()
+            q, speed = bars.get_qpos().cpu().numpy().copy(), float(bars.get_dofs_velocity()[0])
             world.step()
-        q, speed = bars.get_qpos().cpu().numpy().copy(), float(bars.get_dofs_velocity()[0])
-        world.step()
-        return q, speed
+            return q, speed
 
-    def read(before: tuple[Any, float]) -> Instant:
-        q, speed = before
-        alpha = float(solver.get_dofs_acc().cpu().numpy().ravel()[0])
-        closing = solver.constraint_solver.efc_force.to_numpy()[:2].ravel()
-        return Instant((q[0], q[0] + q[1], q[2]), speed, alpha, -armature * alpha, {"F43": closing})
+        def read(before: tuple[Any, float]) -> Instant:
+            q, speed = before
+            alpha = float(solver.get_dofs_acc().cpu().numpy().ravel()[0])
+            closing = solver.constraint_solver.efc_force.to_numpy()[:2].ravel()
+            return Instant((q[0], q[0] + q[1], q[2]), speed, alpha, -armature * alpha, {"F43": closing})
 
-    return run_through(scene, steps, setting, advance, read)
+        return run_through(scene, course, advance, read)

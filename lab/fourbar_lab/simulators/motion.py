@@ -1,27 +1,38 @@
-"""Read what a simulator answers: numbers of a turn that it ran through, or of states that it was given."""
+"""Simulators as engines of the protocol: a command is run through in time, or each of its positions set as a state."""
 
+import copy
 import math
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
-from fourbar.errors import LimitError, NotAssembledError
-from fourbar.mjcf.document import Start
-from fourbar.mjcf.document import choose_run as window
-from fourbar.scene import Scene, command
-from fourbar_validation.engines.description import find_field as field_of
+from fourbar.errors import InputError, LimitError, NotAssembledError
+from fourbar.mjcf.document import Start, choose_run
+from fourbar.mjcf.settings import RECIPE
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command, Scene, command
+from fourbar_validation.compare.answer import Answer, Array
+from fourbar_validation.engines.description import find_field, list_speeds
 from fourbar_validation.engines.free_body import move
 from fourbar_validation.engines.free_body_closure import close
 
-SAMPLES = 12
-"""Readings in a turn; the first quarter, in which a closure settles, is not read."""
+STEPS = 628
+"""Steps in a turn where no setting states them."""
+LIGHT = replace(RECIPE, flywheel=30.0)
+"""Recipe for accelerations that are differences of speeds: of a heavier flywheel's they keep no digits, and solvers
+that end at a part of all momentum leave the loop to itself beside it."""
+LEADS = tuple(np.pi / 2.0**power for power in range(1, 6))
+"""rad; a run begins so far before its first position, where the linkage closes there, so that its closure settles."""
+FROM_TOGGLE = 0.1
+"""Least |sin(theta_4 - theta_3)| on the way to the first position."""
 
 
 class Instant(NamedTuple):
@@ -31,76 +42,167 @@ class Instant(NamedTuple):
     """theta_2, theta_3, theta_4, of the simulator itself, rad."""
     omega_2: float
     alpha_2: float
-    torque: float | None
+    torque: float
     forces: dict[str, Any]
     """Forces of the pins that can be read, N."""
 
 
+class Course(NamedTuple):
+    """One run of a simulator through the positions of a command."""
+
+    timestep: float
+    """s."""
+    steps: int
+    """Steps in a turn."""
+    stops: list[int]
+    """Numbers of steps after which the simulator is read, rising."""
+    rows: NDArray[np.intp]
+    """Stop of each position, (n,)."""
+
+
 @dataclass(slots=True)
 class Readings:
-    """One simulator under one setting; each list has one entry a reading, SI units."""
+    """Instants of one simulator, in the order in which they were read."""
 
-    setting: str
-    steps: int | None = None
-    """Steps in a turn; None for single states."""
-    theta: list[tuple[float, float, float]] = field(default_factory=list)
-    omega_2: list[float] = field(default_factory=list)
-    alpha_2: list[float] = field(default_factory=list)
-    torque: list[float] = field(default_factory=list)
-    forces: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    instants: list[Instant] = field(default_factory=list)
     gap: float = 0.0
-    """The greatest distance of B on bar 3 from B on bar 4, m."""
+    """Greatest distance of B on bar 3 from B on bar 4, m."""
     seconds: float = 0.0
     """Processor time of the steps alone, s."""
 
     def read(self, scene: Scene, now: Instant) -> None:
-        """Add a reading."""
+        """Add a reading, as a copy: a simulator may hand out views of its state."""
         theta = (float(now.theta[0]), float(now.theta[1]), float(now.theta[2]))
-        self.theta.append(theta)
-        self.omega_2.append(float(now.omega_2))
-        self.alpha_2.append(float(now.alpha_2))
-        if now.torque is not None:
-            self.torque.append(float(now.torque))
-        for name, force in now.forces.items():
-            self.forces.setdefault(name, []).append((float(force[0]), float(force[1])))
-        self.gap = float(np.maximum(self.gap, compute_gap(scene, theta)))  # NaN stays NaN
-
-    def plain(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return asdict(self)
+        forces = {name: np.array(force[:2], float) for name, force in now.forces.items()}
+        self.instants.append(Instant(theta, float(now.omega_2), float(now.alpha_2), float(now.torque), forces))
+        gap = compute_gap(scene, theta)
+        self.gap = float(np.maximum(self.gap, gap))  # NaN stays NaN
 
 
-def turn(scene: Scene, steps: int) -> tuple[float, list[int]]:
-    """Compute the timestep (s) of one turn of the input in so many steps, and the steps after which to read."""
-    if not scene.motion.omega_2 or scene.motion.alpha_2 or scene.loads:
-        raise LimitError("simulators run through a turn at constant omega_2 without loads")
-    first = steps // 4
-    return math.tau / abs(scene.motion.omega_2) / steps, [
-        first + round(k * (steps - first) / (SAMPLES - 1)) for k in range(SAMPLES)
-    ]
+class Simulator:
+    """Base of the simulators: chooses a setting, asks for a run or for single states, and states the motion made."""
+
+    name: str
+    version = ""
+    device = "CPU"
+    made_for = ""
+    changed = ""
+    """Changes to the simulator's input or defaults that were needed."""
+    quantities = ("theta_3", "theta_4", "torque", *PIN_FORCES)
+    effects: tuple[str, ...] = ("gravity",)
+    tolerance = (0.05, "a simulation whose error falls with its timestep")
+    settings: ClassVar[Mapping[str, Any]]
+    """Names of the settings, each with what it sets."""
+    single_states = False
+    """True if `states` evaluates positions that are set one by one."""
+
+    def __init__(self) -> None:
+        self.setting, self.steps = next(iter(self.settings)), None if self.single_states else STEPS
+
+    def at_setting(
+        self, name: str | None = None, steps_per_turn: int | None = None, error: float | None = None
+    ) -> "Simulator":
+        """Return the simulator with a setting, in so many steps a turn."""
+        if error is not None:
+            raise LimitError("it knows no law of its error: ask for steps_per_turn")
+        chosen = copy.copy(self)
+        chosen.setting, chosen.steps = name or self.setting, steps_per_turn or self.steps
+        return chosen
+
+    def through(self, scene: Scene, course: Course) -> Readings:
+        """Run through a course."""
+        raise NotImplementedError
+
+    def states(self, scene: Scene) -> Readings:
+        """Evaluate the scene's positions, each set by itself."""
+        raise NotImplementedError
+
+    def answer(self, scene: Scene, at: Command) -> Answer:
+        """Answer at the motion that was made."""
+        n = len(at.angle)
+        rows: NDArray[np.intp] = np.arange(n)
+        steps = self.steps
+        how = "single states" if steps is None else f"{steps}/rev"
+        setting = f"{self.setting}, {how}"
+        try:
+            if steps is None:
+                refuse_what_no_simulator_holds(scene, at)
+                readings = self.states(scene)
+            else:
+                led, course = lay_out(scene, at, steps)
+                rows, readings = course.rows, self.through(led, course)
+        except (InputError, LimitError) as limit:  # InputError: a scene that no file for this simulator can hold
+            return Answer(self.name, setting, refusal=str(limit))
+        if len(readings.instants) != len(set(rows.tolist())):
+            raise NotAssembledError(f"{len(readings.instants)} of {len(set(rows.tolist()))} positions were read")
+        read = [readings.instants[row] for row in rows]
+        theta = np.array([instant.theta for instant in read])
+        moved = [np.array([getattr(instant, name) for instant in read]) for name in ("omega_2", "alpha_2")]
+        if not (np.isfinite(theta).all() and np.isfinite(moved).all()):
+            raise ArithmeticError("the simulation diverged")
+        values = {"theta_3": theta[:, 1], "theta_4": theta[:, 2]}
+        values["torque"] = np.array([instant.torque for instant in read])
+        values |= {name: np.array([instant.forces[name] for instant in read]) for name in read[0].forces}
+        turned = np.remainder(theta[:, 0] - at.theta_2 + np.pi, 2.0 * np.pi) - np.pi
+        made = Command(at.theta_2 + turned, at.branch, moved[0], moved[1])
+        gap = readings.gap / max(scene.linkage.lengths)
+        return Answer(self.name, setting, made, np.ones(n, bool), values, evidence={"gap": gap},
+                      shared=self.changed, seconds=readings.seconds)  # fmt: skip
+
+
+def refuse_what_no_simulator_holds(scene: Scene, at: Command) -> None:
+    """Raise LimitError for a motion other than omega_2 on one branch, and for loads."""
+    speed, acceleration = list_speeds(at)
+    steady = at.speed is not None and speed[0] != 0.0 and np.ptp(speed) == 0.0 and not acceleration.any()
+    if not steady or scene.loads or scene.motion.through != "sign":
+        raise LimitError("a simulator runs at one speed omega_2, without loads, on one branch")
+
+
+def lay_out(scene: Scene, at: Command, steps: int) -> tuple[Scene, Course]:
+    """Lay out a run through the positions of a command; the scene's motion begins before them, so that it settles."""
+    refuse_what_no_simulator_holds(scene, at)
+    sense = math.copysign(1.0, scene.motion.omega_2 or 0.0)
+    first = float((sense * at.theta_2).min()) * sense
+    lead = next((lead for lead in LEADS if _closes(scene, np.linspace(first - sense * lead, first, 50))), 0.0)
+    progress = sense * (at.theta_2 - first) + lead
+    stops, rows = np.unique(np.maximum(1, np.rint(progress / math.tau * steps).astype(int)), return_inverse=True)
+    if len(stops) < len(np.unique(progress)):
+        raise LimitError("its positions lie closer together than the steps")
+    motion = scene.motion.replace(angle=np.array([first - sense * lead, *at.theta_2]))
+    return replace(scene, motion=motion), Course(find_timestep(scene, steps), steps, stops.tolist(), rows)
+
+
+def _closes(scene: Scene, theta_2: Array) -> bool:
+    """Tell whether the linkage closes at all these angles, and far from a toggle."""
+    closed = close(scene.linkage, theta_2, np.full(len(theta_2), scene.motion.branch, dtype=np.int8))
+    return bool(closed.assembled.all() and np.abs(np.sin(closed.theta[1] - closed.theta[0])).min() > FROM_TOGGLE)
+
+
+def find_timestep(scene: Scene, steps: int) -> float:
+    """Return the timestep of a turn in so many steps, s."""
+    return math.tau / abs(float(scene.motion.omega_2 or math.nan)) / steps
 
 
 def run_through(
     scene: Scene,
-    steps: int,
-    setting: str,
+    course: Course,
     advance: Callable[[int], Any],
     read: Callable[[Any], Instant],
     clock: Callable[[], float] = time.process_time,
 ) -> Readings:
-    """Simulate a turn in so many steps.
+    """Run through a course.
 
     `advance`: so many steps further, by the clock; what it returns is read.
     `clock`: of the processor; of a GPU that of the wall.
     """
-    found, done = Readings(setting, steps), 0
-    for stop in turn(scene, steps)[1]:
+    readings, done = Readings(), 0
+    for stop in course.stops:
         began = clock()
         reached = advance(stop - done)
-        found.seconds += clock() - began
+        readings.seconds += clock() - began
         done = stop
-        found.read(scene, read(reached))
-    return found
+        readings.read(scene, read(reached))
+    return readings
 
 
 def start(scene: Scene) -> Start:
@@ -118,12 +220,12 @@ def start(scene: Scene) -> Start:
     theta = (at.theta_2[first], *closed.theta[:, first])
     omega = move(scene.linkage, theta[0], np.array([omega_2]), np.zeros(1), *theta[1:]).omega
     q, v = [float(x[0]) for x in theta], [float(omega[bar][0]) for bar in (2, 3, 4)]
-    return Start((q[0], q[1] - q[0], q[2]), (v[0], v[1] - v[0], v[2]), window(theta_2, omega_2, 0.0))
+    return Start((q[0], q[1] - q[0], q[2]), (v[0], v[1] - v[0], v[2]), choose_run(theta_2, omega_2, 0.0))
 
 
 def find_gravity(scene: Scene) -> tuple[float, float, float]:
     """Return the field of gravity, m/s^2."""
-    fields = [field_of(effect) for effect in scene.effects if isinstance(effect, Gravity)]
+    fields = [find_field(effect) for effect in scene.effects if isinstance(effect, Gravity)]
     return (*fields[0], 0.0) if fields else (0.0, 0.0, 0.0)
 
 

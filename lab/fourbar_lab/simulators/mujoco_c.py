@@ -2,34 +2,30 @@
 
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import mujoco
 
 from fourbar.mjcf import SIMULATORS, write_mjcf
 from fourbar.scene import Scene, command
-from fourbar_lab.simulators.motion import Instant, Readings, run_through, start, turn
+from fourbar_lab.simulators.motion import STEPS, Course, Instant, Readings, Simulator, find_timestep, run_through, start
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
 from fourbar_validation.engines.mujoco.drives import remove_attributes
 
-VERSION = mujoco.__version__
-STEPS = (157, 314, 628, 1256)
-CHANGED = "nothing; the softness of its default constraints is deliberate, and documented"
-SETTINGS = {"generated file": "mujoco", "its defaults": None}
 BY_DEFAULT = {"option": ("integrator", "solver", "tolerance", "iterations"), "equality/connect": ("solref", "solimp")}
 """Attributes that "its defaults" leaves to MuJoCo."""
 
 
-def text(scene: Scene, steps: int, simulator: str | None) -> str:
+def text(scene: Scene, steps: int, simulator: str | None, **settings: Any) -> str:
     """Write the MJCF, opening in the simulators' common start, with so many steps a turn.
 
-    Without a simulator's name all that the solver is set to goes.
+    Without a simulator's name all that the solver is set to goes; `settings`: others than those of the simulator.
     """
-    timestep, _ = turn(scene, steps)
     reader = simulator or "warp"  # without pads
-    written = write_mjcf(scene, replace(SIMULATORS[reader], timestep=timestep), reader, start=start(scene))
+    changed = replace(SIMULATORS[reader], timestep=find_timestep(scene, steps), **settings)
+    written = write_mjcf(scene, changed, reader, start=start(scene))
     return written if simulator is not None else remove_attributes(written, BY_DEFAULT)
 
 
@@ -48,32 +44,39 @@ def find_bars(model: Any) -> list[int]:
     return [model.body(bar).id for bar in ("input", "coupler", "output")]
 
 
-def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """Simulate a turn in so many steps."""
-    model, data = open_model(text(scene, steps, SETTINGS[setting]))
-    advance = partial(mujoco.mj_step, model, data)
-    return run_through(scene, steps, setting, advance, lambda _: _evaluated(model, data))
-
-
-def states(scene: Scene, setting: str) -> Readings:
-    """Evaluate single states, each set by itself."""
-    written = text(scene, 628, SETTINGS[setting])
-    (model, data), found = open_model(written), Readings(setting)
-    for q, v in states_of(written, scene):
-        data.qpos[:], data.qvel[:] = q, v
-        found.read(scene, _evaluated(model, data))
-    return found
-
-
 def states_of(written: str, scene: Scene) -> list[tuple[Array, Array]]:
     """Assemble the scene's positions by MuJoCo's own kinematics: Newton on the gap, speeds by its Jacobian."""
-    loop, made = ClosedLoop(written), []
+    loop, states = ClosedLoop(written), []
     position = Assembler(loop)
     for theta_2 in command(scene).theta_2.tolist():
         if (q := position.find(theta_2, scene.motion.branch)) is not None:
             loop.set_state(q, scene.motion.omega_2 or 0.0)
-            made.append((loop.data.qpos.copy(), loop.data.qvel.copy()))
-    return made
+            states.append((loop.data.qpos.copy(), loop.data.qvel.copy()))
+    return states
+
+
+class MujocoFile(Simulator):
+    """MuJoCo with the generated file."""
+
+    name, version = "MuJoCo", mujoco.__version__
+    changed = "nothing; the softness of its default constraints is deliberate, and documented"
+    settings: ClassVar[dict[str, str | None]] = {"generated file": "mujoco", "its defaults": None}
+    single_states = True
+
+    def through(self, scene: Scene, course: Course) -> Readings:
+        """Run through a course."""
+        model, data = open_model(text(scene, course.steps, self.settings[self.setting]))
+        advance = partial(mujoco.mj_step, model, data)
+        return run_through(scene, course, advance, lambda _: _evaluated(model, data))
+
+    def states(self, scene: Scene) -> Readings:
+        """Evaluate single states, each set by itself."""
+        written = text(scene, STEPS, self.settings[self.setting])
+        (model, data), readings = open_model(written), Readings()
+        for q, v in states_of(written, scene):
+            data.qpos[:], data.qvel[:] = q, v
+            readings.read(scene, _evaluated(model, data))
+        return readings
 
 
 def _evaluated(model: Any, data: Any) -> Instant:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 from importlib.metadata import version
-from typing import Any
+from typing import Any, ClassVar
 
 import jax
 import numpy as np
@@ -11,18 +11,10 @@ from mujoco import mjx
 
 from fourbar.scene import Scene
 from fourbar_lab.simulators import gradients
-from fourbar_lab.simulators.motion import Instant, Readings, run_through
+from fourbar_lab.simulators.motion import STEPS, Course, Instant, Readings, Simulator, run_through
 from fourbar_lab.simulators.mujoco_c import find_bars, reading, states_of, text
 from fourbar_validation.engines.mujoco.closed_loop import open_model
 
-VERSION = version("mujoco-mjx")
-DEVICE = "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
-"""JAX takes a GPU where it has one."""
-STEPS = (157, 314, 628)
-CHANGED = "a closure of two timesteps (--for mjx), and jax_enable_x64"
-SETTINGS = {"written for MJX": "mjx", "as for MuJoCo": "mujoco"}
-APART = {"as for MuJoCo": "a closure of ten timesteps, not meant for MJX"}
-"""The one written for MJX yields within two timesteps and so makes up for the term that MJX leaves out."""
 jax.config.update("jax_enable_x64", True)
 
 
@@ -38,29 +30,52 @@ def advance(model: Any, state: Any, steps: int) -> Any:
     return jax.lax.fori_loop(0, steps, lambda _, now: mjx.step(model, now), state)
 
 
-def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """Simulate a turn in so many steps."""
-    model, data = open_model(text(scene, steps, SETTINGS[setting]))
-    theirs, state = mjx.put_model(model), mjx.put_data(model, data)
-    jax.block_until_ready(advance(theirs, state, 1))  # compiled before the clock runs
+class MujocoMjx(Simulator):
+    """MJX in JAX, which takes a GPU where it has one."""
 
-    def further(n: int) -> Any:
-        nonlocal state
-        state = jax.block_until_ready(advance(theirs, state, n))
-        return state
+    name, version = "MJX-JAX", version("mujoco-mjx")
+    device = "CPU" if jax.default_backend() == "cpu" else str(jax.devices()[0].device_kind)
+    changed = "a closure of two timesteps (--for mjx), and jax_enable_x64"
+    settings: ClassVar[dict[str, str]] = {"written for MJX": "mjx", "as for MuJoCo": "mujoco"}
+    """The file written for MJX yields within two timesteps, which makes up for the term that MJX leaves out."""
+    single_states = True
 
-    return run_through(scene, steps, setting, further, lambda now: _evaluated(model, forward(theirs, now)))
+    def through(self, scene: Scene, course: Course) -> Readings:
+        """Run through a course."""
+        model, data = open_model(text(scene, course.steps, self.settings[self.setting]))
+        theirs, state = mjx.put_model(model), mjx.put_data(model, data)
+        jax.block_until_ready(advance(theirs, state, 1))  # compiled before the clock runs
 
+        def further(steps: int) -> Any:
+            nonlocal state
+            state = jax.block_until_ready(advance(theirs, state, steps))
+            return state
 
-def states(scene: Scene, setting: str) -> Readings:
-    """Evaluate single states, each set by itself."""
-    written = text(scene, 628, SETTINGS[setting])
-    model, data = open_model(written)
-    theirs, state, found = mjx.put_model(model), mjx.put_data(model, data), Readings(setting)
-    for q, v in states_of(written, scene):
-        given = state.replace(qpos=jax.numpy.array(q), qvel=jax.numpy.array(v))
-        found.read(scene, _evaluated(model, forward(theirs, given)))
-    return found
+        return run_through(scene, course, further, lambda now: _evaluated(model, forward(theirs, now)))
+
+    def states(self, scene: Scene) -> Readings:
+        """Evaluate single states, each set by itself."""
+        written = text(scene, STEPS, self.settings[self.setting])
+        model, data = open_model(written)
+        theirs, state, readings = mjx.put_model(model), mjx.put_data(model, data), Readings()
+        for q, v in states_of(written, scene):
+            placed = state.replace(qpos=jax.numpy.array(q), qvel=jax.numpy.array(v))
+            readings.read(scene, _evaluated(model, forward(theirs, placed)))
+        return readings
+
+    def slopes(self, scene: Scene) -> list[dict[str, Any]]:
+        """Differentiate the driving torque forwards, at a set state and through a quarter turn, and backwards."""
+        begin, end = gradients.choose_quarter(scene)
+        ways = [("jax.jvp at a set state", end, 0), ("jax.jvp through a quarter turn", begin, gradients.STEPS // 4)]
+        ways_tried = [_slopes(scene, how, at, partial(_forwards, steps=steps)) for how, at, steps in ways]
+        try:
+            ways_tried.append(_slopes(scene, "jax.grad at a set state", end, _backwards))
+        except ValueError as error:
+            ways_tried.append({"how": f"jax.grad: {error}"})
+        return [
+            *ways_tried,
+            _slopes(scene, 'jax.grad at a set state, iterations="1"', end, partial(_backwards, iterations=1)),
+        ]
 
 
 def _evaluated(model: Any, state: Any) -> Instant:
@@ -68,18 +83,6 @@ def _evaluated(model: Any, state: Any) -> Instant:
     inner = getattr(state, "_impl", state)
     closing, on_bodies = np.array(inner.efc_force)[:2], np.array(inner.cfrc_int)
     return reading(model, q, v, a, drive[model.actuator("drive").id], closing, on_bodies[find_bars(model)])
-
-
-def slopes(scene: Scene) -> list[dict[str, Any]]:
-    """Differentiate the driving torque forwards, at a set state and through a quarter turn, and backwards."""
-    begin, end = gradients.choose_quarter(scene)
-    ways = [("jax.jvp at a set state", end, 0), ("jax.jvp through a quarter turn", begin, gradients.STEPS // 4)]
-    made = [_slopes(scene, how, at, partial(_forwards, steps=steps)) for how, at, steps in ways]
-    try:
-        made.append(_slopes(scene, "jax.grad at a set state", end, _backwards))
-    except ValueError as error:
-        made.append({"how": f"jax.grad: {error}"})
-    return [*made, _slopes(scene, 'jax.grad at a set state, iterations="1"', end, partial(_backwards, iterations=1))]
 
 
 def _slopes(scene: Scene, how: str, theta_2: float, differentiate: Callable[..., Any]) -> dict[str, Any]:

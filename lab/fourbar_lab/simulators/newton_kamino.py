@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from importlib.metadata import version
+from typing import Any, ClassVar
 
 import newton
 import numpy as np
@@ -12,70 +13,73 @@ from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_usd
 from fourbar.mjcf.document import SINGLE
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import Instant, Readings, run_through, start, turn, write_temp
+from fourbar_lab.simulators.motion import Course, Instant, Readings, Simulator, run_through, start, write_temp
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import rotate
 
-VERSION = version("newton")
-DEVICE = str(warp.get_preferred_device().name)
-STEPS = (157, 314)
 TOLERANCES = ("primal_tolerance", "dual_tolerance", "compl_tolerance")
-MADE_FOR = "many worlds at once on a GPU"
-CHANGED = "USD with a fourth revolute joint; a light flywheel on the input; multipliers from the solver's own data"
-SETTINGS: dict[str, dict[str, float]] = {
-    "its defaults": {},
-    "PADMM to 1e-9 in 2000 iterations": {"max_iterations": 2000, **dict.fromkeys(TOLERANCES, 1e-9)},
-}
-"""Settings given to the PADMM solver (200 iterations, 1e-6 by default)."""
 PARENTS = {"O2": None, "A": 0, "O4": None, "B": 2}
 """The body on which each joint's axes are fixed, in the order of the joints; None: the ground."""
 
 
-def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """Simulate a turn; forces are those of a step, with the state in which it began."""
-    timestep, _ = turn(scene, steps)
-    begin, inertia = start(scene), size_flywheel(scene, SINGLE)
-    carried = replace(scene, effects=(*scene.effects, Flywheel(inertia, 2)))
-    builder = newton.ModelBuilder()
-    with write_temp(write_usd(carried, begin), "four_bar.usda") as file:
-        builder.add_usd(file)
-    model = builder.finalize(device=warp.get_preferred_device())
-    config = newton.solvers.SolverKamino.Config()
-    for name, value in SETTINGS[setting].items():
-        setattr(config.padmm, name, value)
-    solver, control = newton.solvers.SolverKamino(model, config), model.control()
-    now, then = model.state(), model.state()
-    speeds = now.joint_qd.numpy()
-    speeds[:3] = begin.qvel
-    now.joint_qd.assign(speeds)
-    newton.eval_fk(model, now.joint_q, now.joint_qd, now)
-    newton.solvers.SolverKamino(model, config).step(
-        now, then, control, None, timestep
-    )  # compiled before the clock runs
-    t_2, t_32, t_4 = begin.qpos
-    laid = {"O2": t_2, "A": t_32, "O4": t_4, "B": t_2 + t_32 - t_4}
+class NewtonKamino(Simulator):
+    """Newton's SolverKamino."""
 
-    def advance(n: int) -> tuple[Array, float]:
-        nonlocal now, then
-        for _ in range(n - 1):
-            solver.step(now, then, control, None, timestep)
+    name, version = "Newton, Kamino", version("newton")
+    device = str(warp.get_preferred_device().name)
+    made_for = "many worlds at once on a GPU"
+    changed = "USD with a fourth revolute joint; a light flywheel on the input; multipliers from the solver's own data"
+    settings: ClassVar[dict[str, dict[str, Any]]] = {
+        "its defaults": {},
+        "PADMM to 1e-9 in 2000 iterations": {"max_iterations": 2000, **dict.fromkeys(TOLERANCES, 1e-9)},
+    }
+    """Settings of the PADMM solver (200 iterations, 1e-6 by default)."""
+    tolerance = (0.2, "single precision and first order in the timestep")
+
+    def through(self, scene: Scene, course: Course) -> Readings:
+        """Run through a course; forces are those of a step, with the state in which it began."""
+        begin, inertia = start(scene), size_flywheel(scene, SINGLE)
+        carried = replace(scene, effects=(*scene.effects, Flywheel(inertia, 2)))
+        builder = newton.ModelBuilder()
+        with write_temp(write_usd(carried, begin), "four_bar.usda") as file:
+            builder.add_usd(file)
+        model = builder.finalize(device=warp.get_preferred_device())
+        config = newton.solvers.SolverKamino.Config()
+        for name, value in self.settings[self.setting].items():
+            setattr(config.padmm, name, value)
+        solver, control = newton.solvers.SolverKamino(model, config), model.control()
+        now, then = model.state(), model.state()
+        speeds = now.joint_qd.numpy()
+        speeds[:3] = begin.qvel
+        now.joint_qd.assign(speeds)
+        newton.eval_fk(model, now.joint_q, now.joint_qd, now)
+        newton.solvers.SolverKamino(model, config).step(
+            now, then, control, None, course.timestep
+        )  # compiled before the clock runs
+        t_2, t_32, t_4 = begin.qpos
+        laid = {"O2": t_2, "A": t_32, "O4": t_4, "B": t_2 + t_32 - t_4}
+
+        def advance(steps: int) -> tuple[Array, float]:
+            nonlocal now, then
+            for _ in range(steps - 1):
+                solver.step(now, then, control, None, course.timestep)
+                now, then = then, now
+            theta, speed = directions(now), float(now.joint_qd.numpy()[0])
+            solver.step(now, then, control, None, course.timestep)
             now, then = then, now
-        theta, speed = directions(now), float(now.joint_qd.numpy()[0])
-        solver.step(now, then, control, None, timestep)
-        now, then = then, now
-        return theta, speed
+            return theta, speed
 
-    def read(before: tuple[Array, float]) -> Instant:
-        theta, speed = before
-        alpha = (float(now.joint_qd.numpy()[0]) - speed) / timestep
-        rows = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float).reshape(4, 5)[:, 1:3]
-        forces = {}
-        for row, (pin, parent) in zip(rows, PARENTS.items(), strict=True):
-            forces[pin] = np.array(rotate(laid[pin] + (0.0 if parent is None else theta[parent]), *row))
-        on_pins = {"F12": forces["O2"], "F32": -forces["A"], "F43": forces["B"], "F14": forces["O4"]}
-        return Instant(theta.tolist(), speed, alpha, -inertia * alpha, on_pins)
+        def read(before: tuple[Array, float]) -> Instant:
+            theta, speed = before
+            alpha = (float(now.joint_qd.numpy()[0]) - speed) / course.timestep
+            rows = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float).reshape(4, 5)[:, 1:3]
+            forces = {}
+            for row, (pin, parent) in zip(rows, PARENTS.items(), strict=True):
+                forces[pin] = np.array(rotate(laid[pin] + (0.0 if parent is None else theta[parent]), *row))
+            on_pins = {"F12": forces["O2"], "F32": -forces["A"], "F43": forces["B"], "F14": forces["O4"]}
+            return Instant(theta.tolist(), speed, alpha, -inertia * alpha, on_pins)
 
-    return run_through(scene, steps, setting, advance, read)
+        return run_through(scene, course, advance, read)
 
 
 def directions(state: newton.State) -> Array:

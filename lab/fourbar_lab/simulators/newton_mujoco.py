@@ -1,6 +1,7 @@
 """Newton's MuJoCo solver (MuJoCo Warp inside, single precision), from the MJCF file."""
 
 from importlib.metadata import version
+from typing import ClassVar
 
 import mujoco_warp as mjw
 import newton
@@ -8,54 +9,58 @@ import warp
 
 from fourbar.scene import Scene
 from fourbar_lab.simulators.motion import (
+    Course,
     Instant,
     Readings,
+    Simulator,
     find_gravity,
     run_through,
     start,
-    turn,
     write_temp,
 )
 from fourbar_lab.simulators.mujoco_c import reading, text
 
-VERSION = version("newton")
-DEVICE = str(warp.get_preferred_device().name)
-STEPS = (78, 157)
-MADE_FOR = "many worlds at once on a GPU"
-CHANGED = "add_mjcf takes neither timestep, gravity nor keyframe: all three given by hand; --for newton"
-SETTINGS = {"SolverMuJoCo": None}
 
+class NewtonMujoco(Simulator):
+    """Newton's SolverMuJoCo."""
 
-def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """Simulate a turn in so many steps."""
-    timestep, _ = turn(scene, steps)
-    builder = newton.ModelBuilder(gravity=find_gravity(scene))
-    with write_temp(text(scene, steps, "newton"), "four_bar.xml") as file:
-        builder.add_mjcf(file)
-    model = builder.finalize(device=warp.get_preferred_device())
-    solver, control = newton.solvers.SolverMuJoCo(model), model.control()
-    now, then = model.state(), model.state()
-    speeds = now.joint_qd.numpy()
-    speeds[:3] = start(scene).qvel
-    now.joint_qd.assign(speeds)
-    newton.solvers.SolverMuJoCo(model).step(now, then, control, None, timestep)  # compiled before the clock runs
-    names = [solver.mj_model.body(number).name for number in range(solver.mj_model.nbody)]
-    assert [name.rpartition("_")[2] for name in names[2:]] == ["input", "coupler", "output"]
+    name, version = "Newton, MuJoCo solver", version("newton")
+    device = str(warp.get_preferred_device().name)
+    made_for = "many worlds at once on a GPU"
+    changed = "add_mjcf takes neither timestep, gravity nor keyframe: all three are set by hand; --for newton"
+    settings: ClassVar[dict[str, None]] = {"SolverMuJoCo": None}
 
-    def advance(n: int) -> None:
-        nonlocal now, then
-        for _ in range(n):
-            solver.step(now, then, control, None, timestep)
-            now, then = then, now
+    def through(self, scene: Scene, course: Course) -> Readings:
+        """Run through a course."""
+        builder = newton.ModelBuilder(gravity=find_gravity(scene))
+        with write_temp(text(scene, course.steps, "newton"), "four_bar.xml") as file:
+            builder.add_mjcf(file)
+        model = builder.finalize(device=warp.get_preferred_device())
+        solver, control = newton.solvers.SolverMuJoCo(model), model.control()
+        now, then = model.state(), model.state()
+        speeds = now.joint_qd.numpy()
+        speeds[:3] = start(scene).qvel
+        now.joint_qd.assign(speeds)
+        newton.solvers.SolverMuJoCo(model).step(
+            now, then, control, None, course.timestep
+        )  # compiled before the clock runs
+        names = [solver.mj_model.body(number).name for number in range(solver.mj_model.nbody)]
+        assert [name.rpartition("_")[2] for name in names[2:]] == ["input", "coupler", "output"]
 
-    def read(_: None) -> Instant:
-        data = solver.mjw_data
-        for _again in range(2):
-            mjw.forward(solver.mjw_model, data)
-        mjw.rne_postconstraint(solver.mjw_model, data)
-        arrays = (data.qpos, data.qvel, data.qacc, data.actuator_force, data.cfrc_int)
-        q, v, a, drive, on_bodies = (x.numpy()[0].astype(float) for x in arrays)
-        closing = data.efc.force.numpy()[0, :2].astype(float)
-        return reading(solver.mj_model, q, v, a, drive[0], closing, on_bodies[2:5])
+        def advance(steps: int) -> None:
+            nonlocal now, then
+            for _ in range(steps):
+                solver.step(now, then, control, None, course.timestep)
+                now, then = then, now
 
-    return run_through(scene, steps, setting, advance, read)
+        def read(_: None) -> Instant:
+            data = solver.mjw_data
+            for _again in range(2):
+                mjw.forward(solver.mjw_model, data)
+            mjw.rne_postconstraint(solver.mjw_model, data)
+            arrays = (data.qpos, data.qvel, data.qacc, data.actuator_force, data.cfrc_int)
+            q, v, a, drive, on_bodies = (x.numpy()[0].astype(float) for x in arrays)
+            closing = data.efc.force.numpy()[0, :2].astype(float)
+            return reading(solver.mj_model, q, v, a, drive[0], closing, on_bodies[2:5])
+
+        return run_through(scene, course, advance, read)

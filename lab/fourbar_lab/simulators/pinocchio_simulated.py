@@ -1,24 +1,28 @@
 """Pinocchio's forward dynamics of the closed loop: its acceleration solvers under RK4, its impulse solvers of 4.1."""
 
-from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
 
+from fourbar.errors import LimitError
 from fourbar.mjcf import size_flywheel
-from fourbar.mjcf.settings import RECIPE
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import Instant, Readings, run_through, start, turn
+from fourbar.scene import command as list_positions
+from fourbar_lab.simulators.motion import (
+    LIGHT,
+    STEPS,
+    Course,
+    Instant,
+    Readings,
+    Simulator,
+    find_timestep,
+    run_through,
+    start,
+)
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.pinocchio import ClosedTree, PinocchioTree, make_step
 
-VERSION = pin.__version__
-STEPS = (314, 628, 1256)
-CHANGED = (
-    "the tree is built in Python; around its acceleration solvers (proximal settings 1e-14, 1e-8, 10) stands RK4, "
-    "around its impulse solvers (tolerances 1e-10) the semi-implicit Euler of its own example"
-)
 SOFTNESS_STEPS = 30.0
 """Time constant of Baumgarte's stabilisation, in steps of RK4."""
 PROXIMAL = 1e-10
@@ -26,8 +30,6 @@ PROXIMAL = 1e-10
 """
 ACCURATE = 1e-10
 """Accuracy asked of the impulse solvers in place of the example's 1e-6, absolute and relative."""
-LIGHT = replace(RECIPE, flywheel=1e5)
-"""Recipe for accelerations that are differences of speeds: with a heavier flywheel these keep no digits."""
 
 
 class LoopConstrained(ClosedTree):
@@ -84,62 +86,69 @@ class Impulses:
         return v + h * pin.aba(model, data, q, v, jacobian.T @ force), -self.tree.rotation(3) @ force[:2]
 
 
-SETTINGS: dict[str, Any] = {
-    "constraintDynamics (RigidConstraintModel), RK4": ClosedTree,
-    "lcaba, RK4": LoopConstrained,
-    "ADMM (PointAnchorConstraintModel), semi-implicit Euler": "ADMM",
-    "PGS (PointAnchorConstraintModel), semi-implicit Euler": "PGS",
-}
+class PinocchioSolvers(Simulator):
+    """Pinocchio's solvers of closed loops."""
 
+    name, version = "Pinocchio", pin.__version__
+    changed = (
+        "the tree is built in Python; around its acceleration solvers (proximal settings 1e-14, 1e-8, 10) stands RK4, "
+        "around its impulse solvers (tolerances 1e-10) the semi-implicit Euler of its own example"
+    )
+    settings: ClassVar[dict[str, Any]] = {
+        "constraintDynamics": ClosedTree,
+        "lcaba": LoopConstrained,
+        "ADMM": "ADMM",
+        "PGS": "PGS",
+    }
+    single_states = True
 
-def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """Simulate a turn in so many steps, carried by a flywheel."""
-    timestep, _ = turn(scene, steps)
-    made, begin, tree = SETTINGS[setting], start(scene), PinocchioTree(scene)
-    if isinstance(made, str):
-        return _by_impulses(scene, steps, setting, Impulses(tree, timestep, made))
-    q, v, inertia = np.array(begin.qpos), np.array(begin.qvel), size_flywheel(scene)
-    loop = made(tree, SOFTNESS_STEPS * timestep)
+    def through(self, scene: Scene, course: Course) -> Readings:
+        """Run through a course, carried by a flywheel."""
+        solver, begin, tree = self.settings[self.setting], start(scene), PinocchioTree(scene)
+        if isinstance(solver, str):
+            return _run_by_impulses(scene, course, Impulses(tree, course.timestep, solver))
+        q, v, inertia = np.array(begin.qpos), np.array(begin.qvel), size_flywheel(scene)
+        loop = solver(tree, SOFTNESS_STEPS * course.timestep)
 
-    def advance(n: int) -> tuple[Array, Array]:
-        nonlocal q, v
+        def advance(steps: int) -> tuple[Array, Array]:
+            nonlocal q, v
+            tree.model.armature = np.array([inertia, 0.0, 0.0])
+            for _ in range(steps):
+                q, v = make_step(lambda q, v: loop.acceleration(q, v, np.zeros(3)), q, v, course.timestep)
+            return q, v
+
+        return run_through(scene, course, advance, lambda state: _evaluated(tree, loop, inertia, *state))
+
+    def states(self, scene: Scene) -> Readings:
+        """Evaluate single states; the impulse solvers have none: a step sees (dJ/dt) v in the step before."""
+        solver = self.settings[self.setting]
+        if isinstance(solver, str):
+            raise LimitError("an impulse solver has no single states")
+        tree, readings, inertia = PinocchioTree(scene), Readings(), size_flywheel(scene)
+        loop = solver(tree, SOFTNESS_STEPS * find_timestep(scene, STEPS))
         tree.model.armature = np.array([inertia, 0.0, 0.0])
-        for _ in range(n):
-            q, v = make_step(lambda q, v: loop.acceleration(q, v, np.zeros(3)), q, v, timestep)
-        return q, v
+        for theta_2 in list_positions(scene).theta_2.tolist():
+            state = loop.start(theta_2, scene.motion.branch, scene.motion.omega_2 or 0.0)
+            if state is not None:
+                readings.read(scene, _evaluated(tree, loop, inertia, *state))
+        return readings
 
-    return run_through(scene, steps, setting, advance, lambda state: _evaluated(tree, loop, inertia, *state))
 
-
-def _by_impulses(scene: Scene, steps: int, setting: str, loop: Impulses) -> Readings:
+def _run_by_impulses(scene: Scene, course: Course, loop: Impulses) -> Readings:
     begin, inertia = start(scene), size_flywheel(scene, LIGHT)
     q, v = np.array(begin.qpos), np.array(begin.qvel)
 
-    def advance(n: int) -> tuple[Array, ...]:
+    def advance(steps: int) -> tuple[Array, ...]:
         """Return the state in which the last step began, its acceleration and force."""
         nonlocal q, v
         loop.model.armature = np.array([inertia, 0.0, 0.0])
-        for _ in range(n):
+        for _ in range(steps):
             before = q, v
             v, force = loop.step(q, v)
             q = q + loop.h * v
         return *before, (v - before[1]) / loop.h, force
 
-    return run_through(scene, steps, setting, advance, lambda ended: _read(loop.tree, inertia, *ended))
-
-
-def states(scene: Scene, setting: str) -> Readings | None:
-    """Evaluate single states; the impulse solvers have none: a step sees (dJ/dt) v in the step before."""
-    if isinstance(made := SETTINGS[setting], str):
-        return None
-    tree, found, inertia = PinocchioTree(scene), Readings(setting), size_flywheel(scene)
-    loop = made(tree, SOFTNESS_STEPS * turn(scene, STEPS[0])[0])
-    tree.model.armature = np.array([inertia, 0.0, 0.0])
-    for theta_2 in (start(scene).qpos[0] + np.linspace(0.0, 2.0 * np.pi, 25)).tolist():
-        state = loop.start(theta_2, scene.motion.branch, scene.motion.omega_2 or 0.0)
-        if state is not None:
-            found.read(scene, _evaluated(tree, loop, inertia, *state))
-    return found
+    return run_through(scene, course, advance, lambda ended: _read(loop.tree, inertia, *ended))
 
 
 def _evaluated(tree: PinocchioTree, loop: ClosedTree, inertia: float, q: Array, v: Array) -> Instant:

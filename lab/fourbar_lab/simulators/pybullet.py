@@ -1,30 +1,24 @@
 """PyBullet: an articulated body, a point constraint at B, and a velocity motor on O2."""
 
 from importlib.metadata import version
-from typing import Any
+from typing import Any, ClassVar
 
 import pybullet as bullet
 
 from fourbar.linkage import BAR_NAMES, FIRST_PIN
 from fourbar.scene import Scene
 from fourbar_lab.simulators.motion import (
+    Course,
     Instant,
     Readings,
+    Simulator,
     find_gravity,
     run_through,
     start,
-    turn,
     write_temp,
 )
 from fourbar_validation.engines.description import list_parts, rotate
 
-VERSION = version("pybullet")
-STEPS = (628, 2512, 10048)
-CHANGED = "built from URDF, which holds no loop, and a point constraint"
-SETTINGS: dict[str, dict[str, float]] = {
-    "its defaults": {},
-    "500 iterations, no residual": {"numSolverIterations": 500, "solverResidualThreshold": 0.0},
-}
 STRONG = 1e9
 """N and N m that constraint and motor may exert: no limit."""
 
@@ -44,46 +38,58 @@ def write_urdf(scene: Scene) -> str:
     return "".join([*links, "</robot>"])
 
 
-def through(scene: Scene, steps: int, setting: str) -> Readings:
-    """Simulate a turn; torque and force are those with which the step began."""
-    (timestep, _), begin = turn(scene, steps), start(scene)
-    client = bullet.connect(bullet.DIRECT)
-    try:
-        with write_temp(write_urdf(scene), "four_bar.urdf") as file:
-            flags = bullet.URDF_USE_INERTIA_FROM_FILE
-            body = bullet.loadURDF(file, useFixedBase=True, flags=flags, physicsClientId=client)
-        bullet.setPhysicsEngineParameter(fixedTimeStep=timestep, **SETTINGS[setting])
-        bullet.setGravity(*find_gravity(scene))
-        for joint, (angle, speed) in enumerate(zip(begin.qpos, begin.qvel, strict=True)):
-            bullet.changeDynamics(body, joint, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0)
-            bullet.resetJointState(body, joint, angle, speed)
-            bullet.setJointMotorControl2(body, joint, bullet.VELOCITY_CONTROL, force=0.0)
-            bullet.enableJointForceTorqueSensor(body, joint, True)
-        bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
-        drive = {"targetVelocity": begin.qvel[0], "force": STRONG}
-        bullet.setJointMotorControl2(body, 0, bullet.VELOCITY_CONTROL, **drive)
-        _, three, four = list_parts(scene.linkage)
-        frames = [[part.length - part.centre[0], -part.centre[1], 0.0] for part in (three, four)]
-        none = [0.0, 0.0, 0.0]
-        ball = bullet.createConstraint(body, 1, body, 2, bullet.JOINT_POINT2POINT, none, *frames)
-        bullet.changeConstraint(ball, maxForce=STRONG)
+class PyBullet(Simulator):
+    """Bullet through its Python interface."""
 
-        def advance(n: int) -> list[Any]:
-            for _ in range(n - 1):
+    name, version = "PyBullet", version("pybullet")
+    changed = "built from URDF, which holds no loop, and a point constraint"
+    settings: ClassVar[dict[str, dict[str, float]]] = {
+        "its defaults": {},
+        "500 iterations": {"numSolverIterations": 500, "solverResidualThreshold": 0.0},
+    }
+
+    def through(self, scene: Scene, course: Course) -> Readings:
+        """Run through a course; torque and forces are those with which the step began."""
+        begin = start(scene)
+        client = bullet.connect(bullet.DIRECT)
+        try:
+            with write_temp(write_urdf(scene), "four_bar.urdf") as file:
+                flags = bullet.URDF_USE_INERTIA_FROM_FILE
+                body = bullet.loadURDF(file, useFixedBase=True, flags=flags, physicsClientId=client)
+            bullet.setPhysicsEngineParameter(fixedTimeStep=course.timestep, **self.settings[self.setting])
+            bullet.setGravity(*find_gravity(scene))
+            for joint, (angle, speed) in enumerate(zip(begin.qpos, begin.qvel, strict=True)):
+                bullet.changeDynamics(body, joint, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0)
+                bullet.resetJointState(body, joint, angle, speed)
+                bullet.setJointMotorControl2(body, joint, bullet.VELOCITY_CONTROL, force=0.0)
+                bullet.enableJointForceTorqueSensor(body, joint, True)
+            bullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
+            drive = {"targetVelocity": begin.qvel[0], "force": STRONG}
+            bullet.setJointMotorControl2(body, 0, bullet.VELOCITY_CONTROL, **drive)
+            _, three, four = list_parts(scene.linkage)
+            frames = [[part.length - part.centre[0], -part.centre[1], 0.0] for part in (three, four)]
+            none = [0.0, 0.0, 0.0]
+            ball = bullet.createConstraint(body, 1, body, 2, bullet.JOINT_POINT2POINT, none, *frames)
+            bullet.changeConstraint(ball, maxForce=STRONG)
+
+            def advance(steps: int) -> list[Any]:
+                for _ in range(steps - 1):
+                    bullet.stepSimulation()
+                before = [bullet.getJointState(body, joint)[:2] for joint in range(3)]
                 bullet.stepSimulation()
-            before = [bullet.getJointState(body, joint)[:2] for joint in range(3)]
-            bullet.stepSimulation()
-            return before
+                return before
 
-        def read(before: list[Any]) -> Instant:
-            after, q, speed = bullet.getJointState(body, 0), [state[0] for state in before], before[0][1]
-            force = [-part for part in bullet.getConstraintState(ball)[:2]]  # it speaks of the force on the child
-            theta = (q[0], q[0] + q[1], q[2])
-            wrenches = [bullet.getJointState(body, joint)[2] for joint in range(3)]  # by the parent, in the link's axes
-            F12, F23, F14 = (rotate(angle, *wrench[:2]) for angle, wrench in zip(theta, wrenches, strict=True))
-            pins = {"F12": F12, "F32": (-F23[0], -F23[1]), "F43": force, "F14": F14}
-            return Instant(theta, speed, (after[1] - speed) / timestep, after[3], pins)
+            def read(before: list[Any]) -> Instant:
+                after, q, speed = bullet.getJointState(body, 0), [state[0] for state in before], before[0][1]
+                force = [-part for part in bullet.getConstraintState(ball)[:2]]  # it speaks of the force on the child
+                theta = (q[0], q[0] + q[1], q[2])
+                wrenches = [
+                    bullet.getJointState(body, joint)[2] for joint in range(3)
+                ]  # by the parent, in the link's axes
+                F12, F23, F14 = (rotate(angle, *wrench[:2]) for angle, wrench in zip(theta, wrenches, strict=True))
+                pins = {"F12": F12, "F32": (-F23[0], -F23[1]), "F43": force, "F14": F14}
+                return Instant(theta, speed, (after[1] - speed) / course.timestep, after[3], pins)
 
-        return run_through(scene, steps, setting, advance, read)
-    finally:
-        bullet.disconnect(client)
+            return run_through(scene, course, advance, read)
+        finally:
+            bullet.disconnect(client)

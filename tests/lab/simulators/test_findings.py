@@ -1,6 +1,5 @@
 """The findings: what each says of itself, its script where the engine is, and the list of them."""
 
-import os
 import re
 import sys
 from pathlib import Path
@@ -8,23 +7,21 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from fourbar.errors import DependencyError
 from fourbar_lab.cli import status
 from fourbar_lab.simulators import findings as module
 from fourbar_lab.simulators.findings import FIELDS, FOLDER, MENDED, find_interpreter, read, read_findings
+from fourbar_validation.engines.environments import Entry
 
 ALL = read_findings()
 SECONDS = 100.0
-
-
-OTHERS = [Path(python) for python in filter(None, os.environ.get("SIMULATORS", "").split(os.pathsep))]
-"""Interpreters of simulators that are not installed here."""
 
 
 @pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("finding", ALL, ids=lambda finding: finding.script.stem)
 def test_each_finding_holds_or_says_since_when_not(finding: module.Reproduction) -> None:
-    if (place := find_interpreter(finding, [Path(sys.executable), *OTHERS])) is None:
+    if (place := find_interpreter(finding)) is None:
         pytest.skip(f"not run: {finding.engine[0]} is not installed")
     state = finding.run(place[0], SECONDS)
     assert state == "holds" or (state == MENDED and not finding.fields["Until"].startswith("still")), state
@@ -62,10 +59,24 @@ def test_the_command_says_what_could_not_run(monkeypatch: pytest.MonkeyPatch, tm
     script.write_text('"""It is so.\n\nEngine: nothing-such (nothing_such)\nWith: also=={version}, more\n"""\n')
     monkeypatch.setattr(module, "FOLDER", tmp_path)
     done = CliRunner().invoke(module.command)
-    assert "one.py: not run: nothing-such is not installed under any --python" in done.output and done.exit_code == 1
+    assert "one.py: not run: nothing-such is not installed" in done.output and done.exit_code == 1
     script.write_text(script.read_text().replace("nothing-such (nothing_such)", "pytest (pytest)"))
     done = CliRunner().invoke(module.command)
     assert done.exit_code == 0 and f"one.py: holds in pytest {pytest.__version__}, Python" in done.output
+
+
+def test_a_simulator_is_sought_in_the_environments_of_engines(monkeypatch: pytest.MonkeyPatch) -> None:
+    packages = ("nothing", "nothing-such", "nothing-such")
+    entries = {f"{n}": Entry(f"{n}", "a:B", requires=(f"{name}[sim]>=1",)) for n, name in enumerate(packages)}
+
+    def make(entry: Entry) -> str:
+        if entry.name == "1":
+            raise DependencyError("no network")
+        return f"python of {entry.name}"
+
+    monkeypatch.setattr(module, "read_engines", lambda _: entries)
+    monkeypatch.setattr(module, "make_environment", make)
+    assert list(module._list_interpreters("nothing-such")) == [sys.executable, "python of 2"]
 
 
 @pytest.mark.parametrize("arguments", [[__file__], ["no_such.py"]])
