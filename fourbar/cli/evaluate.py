@@ -163,8 +163,7 @@ def analyze(
 def _write_solution(
     scene: Scene, solution: Solution, form: Form, units: Conversion, pressure: float | None, out: Path | None
 ) -> str:
-    from fourbar.show.block import write_block
-    from fourbar.show.summary import write_motor
+    from fourbar.show.block import write_block, write_motor
     from fourbar.show.tables import print_positions
     from fourbar.solution import write_csv, write_json
 

@@ -1,10 +1,17 @@
-"""Files that the workbench makes of a scene besides its own: exports, and the harness's report, in one folder."""
+"""What the workbench makes of a scene: the reply to a page, exports, and the harness's report.
+
+The frame of a reply: four bytes with the length of its JSON (little-endian), the JSON padded to a multiple of eight
+bytes, then columns of doubles one after the other, as the JSON lists them: writing these as text takes longer than
+solving.
+"""
 
 import asyncio
 import base64
 import importlib.util
+import json
 import os
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -12,8 +19,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fourbar.errors import DependencyError, InputError, say_install
+import numpy as np
+
+from fourbar.edit.dragging import list_handles
+from fourbar.errors import DependencyError, InputError, NotAssembledError, say_install
 from fourbar.scene import Scene
+from fourbar.show.animate import collect_live_data
+from fourbar.show.block import write_block
+from fourbar.show.studies import write_type
+from fourbar.show.units import COMMON
 from fourbar.solution import Conversion, write_csv
 from fourbar.solve import find_last_stage, solve
 from fourbar.writing import write_text
@@ -26,6 +40,49 @@ SHOWN = 30
 """Lines of what the harness prints."""
 TICK = 0.5
 """s, between two reports of progress."""
+
+
+def evaluate_scene(
+    scene: Scene, plain: dict[str, Any], units: Conversion, *, settled: bool = False, pressure: float | None = None
+) -> dict[str, Any]:
+    """Evaluate a scene for the page; `settled`: with error bars and summary, which cost more than the rest.
+
+    `pressure`: of a cylinder, Pa; the summary then has the bore that it needs.
+
+    Raises NotAssembledError where no position assembles, InputError as `solve` does.
+    """
+    stage = find_last_stage(scene) if settled else None
+    solution = solve(scene, stage)
+    if not solution.assembled.any():
+        raise NotAssembledError("motion.theta_2: the linkage assembles at none of the positions requested")
+    data = collect_live_data(scene, units, stage=stage, midway=True) | {
+        "tolerances": None,
+        "pictures": {},
+        "toml": None,
+    }
+    data["handles"] = [handle.drawn() for handle in list_handles(scene, plain)]
+    if settled:  # what `analyze` and `classify` print
+        block = write_block(scene, solution, {**COMMON, **units}, pressure=pressure)
+        data["summary"] = [*block, "", *write_type(scene.linkage, everything=True)]
+    return data
+
+
+def pack_frame(about: dict[str, Any]) -> bytes:
+    """Pack an answer: arrays in `about["data"]["branches"]` become columns."""
+    columns: list[tuple[str, str, int, int]] = []
+    arrays: list[bytes] = []
+    if "data" in about:
+        branches: dict[str, dict[str, Any]] = {}
+        for sign, table in about["data"]["branches"].items():
+            branches[sign] = {name: column for name, column in table.items() if not isinstance(column, np.ndarray)}
+            for name, column in table.items():
+                if isinstance(column, np.ndarray):
+                    columns.append((sign, name, len(column), column.ndim))
+                    arrays.append(np.ascontiguousarray(column, dtype="<f8").tobytes())
+        about = about | {"data": about["data"] | {"branches": branches}, "columns": columns}
+    text = json.dumps(about, allow_nan=False, separators=(",", ":")).encode()
+    text += b" " * (-(len(text) + 4) % 8)
+    return b"".join((struct.pack("<I", len(text)), text, *arrays))
 
 
 class Exports:

@@ -20,9 +20,8 @@ from tornado.iostream import IOStream
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
-from fourbar.edit.exports import HarnessRun
+from fourbar.edit.exports import HarnessRun, evaluate_scene, pack_frame
 from fourbar.edit.redirect import Redirect
-from fourbar.edit.reply import evaluate_scene, pack_frame
 from fourbar.edit.session import SceneState, Session
 from fourbar.errors import FourBarError, InputError
 from fourbar.show.animate import write_page

@@ -17,8 +17,7 @@ import numpy as np
 
 from fourbar.edit.document import SceneDocument, list_offers, name_entry
 from fourbar.edit.dragging import Dragged, drag, parse_place, put_place, write_rounded
-from fourbar.edit.exports import Exports
-from fourbar.edit.reply import evaluate_scene
+from fourbar.edit.exports import Exports, evaluate_scene
 from fourbar.errors import FourBarError, InputError
 from fourbar.files import loads, read_text
 from fourbar.files.fields import Reader

@@ -1,20 +1,21 @@
-"""Output of `analyze`: one block of aligned lines, at most 80 columns wide."""
+"""Output of `analyze`: one block of aligned lines, at most 80 columns wide; and the duty in its JSON."""
 
 import math
 from textwrap import wrap
+from typing import Any
 
 import numpy as np
 
 from fourbar.errors import clean_line
 from fourbar.formulas.mobility import classify
-from fourbar.linkage import BAR_NAMES
+from fourbar.linkage import BAR_NAMES, PIN_FORCE
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.duty import describe_drive
-from fourbar.show.summary import Facts, summarize
+from fourbar.show.duty import DUTY_UNITS, bearing_load, describe_drive, motor_duty
+from fourbar.show.summary import Facts, locate_between, summarize
 from fourbar.show.units import COMMON, choose_unit, write_digits, write_short
-from fourbar.solution import Conversion, Solution
+from fourbar.solution import Conversion, Solution, find_unit_in
 
 WIDTH = 80
 TIED = "\u00a0"
@@ -359,3 +360,28 @@ def explain_static(scene: Scene) -> str:
     """Say what asks for forces where a scene states positions alone."""
     unit, what = ("rad/s", "torque") if scene.motion.stroke is None else ("m/s", "force")
     return f'{scene.motion.names[1]} = "0 {unit}" gives the static {what} and pin forces'
+
+
+def write_motor(scene: Scene, solution: Solution, units: Conversion) -> dict[str, Any] | None:
+    """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
+    if motor_duty(solution) is None:
+        return None
+    between = locate_between(scene, solution)
+    duty = motor_duty(solution, between.drive)
+    assert duty is not None
+    si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
+    shown = {name: find_unit_in(unit, units) for name, unit in si.items()}
+    numbers = {name: getattr(duty, name) for name in si}
+    force, angle = find_unit_in("N", units)[1], find_unit_in("rad", units)[1]
+    loads = {
+        pin: (bearing_load(between.bounded(name), pin), bearing_load(solution, pin)) for pin, name in PIN_FORCE.items()
+    }
+    return {
+        "closed": duty.closed,
+        **{name: None if number is None else number * shown[name][1] for name, number in numbers.items()},
+        "pins": {
+            pin: {"peak": peak.largest * force, "rms": load.rms * force, "theta_2": peak.where * angle}
+            for pin, (peak, load) in loads.items()
+        },
+        "units": {name: unit for name, (unit, _) in shown.items()},
+    }

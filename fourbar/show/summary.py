@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,8 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import COUPLE, LINE, OK, PIN_FORCES, STATUS_NAMES
 from fourbar.scene import Scene, command_at
 from fourbar.scene.motion import Motion
-from fourbar.show.duty import DUTY_UNITS, Driving, MotorDuty, bearing_load, is_once_round, motor_duty, read_drive
-from fourbar.solution import Array, Conversion, Solution, find_unit_in
+from fourbar.show.duty import Driving, MotorDuty, bearing_load, is_once_round, motor_duty, read_drive
+from fourbar.solution import Array, Solution
 from fourbar.solve import solve
 from fourbar.studies.internal_forces import Bending, internal_forces
 
@@ -35,6 +35,14 @@ GROWING = 1e-3
 """Part of itself by which what has a largest value grows no more in the last two calls; towards a pole it grows on."""
 AT_REST = 1e-12
 """Part of its largest slip below which a pin is at rest at a position."""
+FINE = 7200
+"""Positions at which ranges are looked for, by the position formula alone."""
+INSET = 1e-9
+"""Part of a range that is left out at its limit positions, which may not assemble as doubles."""
+END_ROUNDS = 9
+"""Rounds of cutting the interval in which the assembly ends by 40: down to the last digits of a double."""
+IN_LINE = 1e-6
+"""rad. Transmission angle that is zero: at a limit, a place in its last digits leaves some 1e-8."""
 Branch = NDArray[np.int8]
 At = Callable[[Array, Branch, str], Solution]
 """Solve at places (of what is commanded, or of a motion law the time) and branches, up to a stage."""
@@ -227,41 +235,6 @@ def _find_largest(
     growing = reached[-1] > (1.0 + GROWING) * reached[-3] if len(peaks) else rows > 0
     kept = ~growing & (reached[-1] > reached[0]) & ~opens  # beside a gap others grow
     return places[kept], branch[top][kept], {name for name, grows in zip(names, growing, strict=True) if grows}
-
-
-def write_motor(scene: Scene, solution: Solution, units: Conversion) -> dict[str, Any] | None:
-    """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
-    if motor_duty(solution) is None:
-        return None
-    between = locate_between(scene, solution)
-    duty = motor_duty(solution, between.drive)
-    assert duty is not None
-    si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
-    shown = {name: find_unit_in(unit, units) for name, unit in si.items()}
-    numbers = {name: getattr(duty, name) for name in si}
-    force, angle = find_unit_in("N", units)[1], find_unit_in("rad", units)[1]
-    loads = {
-        pin: (bearing_load(between.bounded(name), pin), bearing_load(solution, pin)) for pin, name in PIN_FORCE.items()
-    }
-    return {
-        "closed": duty.closed,
-        **{name: None if number is None else number * shown[name][1] for name, number in numbers.items()},
-        "pins": {
-            pin: {"peak": peak.largest * force, "rms": load.rms * force, "theta_2": peak.where * angle}
-            for pin, (peak, load) in loads.items()
-        },
-        "units": {name: unit for name, (unit, _) in shown.items()},
-    }
-
-
-FINE = 7200
-"""Positions at which ranges are looked for, by the position formula alone."""
-INSET = 1e-9
-"""Part of a range that is left out at its limit positions, which may not assemble as doubles."""
-END_ROUNDS = 9
-"""Rounds of cutting the interval in which the assembly ends by 40: down to the last digits of a double."""
-IN_LINE = 1e-6
-"""rad. Transmission angle that is zero: at a limit, a place in its last digits leaves some 1e-8."""
 
 
 Stretch = tuple[float | None, float | None]

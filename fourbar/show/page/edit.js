@@ -44,7 +44,7 @@ function connect() {
 }
 let fileName = "SCENE", fileText = "";
 
-// JSON and its columns of doubles, as fourbar.edit.reply packs them; NaN is null as in a saved page.
+// JSON and its columns of doubles, as fourbar.edit.exports packs them; NaN is null as in a saved page.
 function unpacked(buffer) {
   const long = new DataView(buffer).getUint32(0, true), about = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, long)));
   let offset = 4 + long;

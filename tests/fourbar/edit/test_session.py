@@ -18,7 +18,7 @@ from fourbar.quantities.units import find_unit
 pytest.importorskip("tomlkit", reason="the workbench edits scene files by tomlkit: pip install tomlkit")
 from fourbar.edit.document import SceneDocument, list_offers
 from fourbar.edit.dragging import write_rounded
-from fourbar.edit.reply import evaluate_scene, pack_frame
+from fourbar.edit.exports import evaluate_scene, pack_frame
 from fourbar.edit.session import LARGEST_STATE, MOST_KEPT, Session
 
 ROOT = Path(__file__).parents[3]

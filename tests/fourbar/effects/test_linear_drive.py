@@ -14,8 +14,8 @@ from fourbar.effects import SpringEnd
 from fourbar.files.scene_file import loads
 from fourbar.files.scene_text import dump
 from fourbar.mjcf.assembly import write_sdf, write_usd
+from fourbar.show.block import write_motor
 from fourbar.show.duty import motor_duty, shaking_force, shaking_moment
-from fourbar.show.summary import write_motor
 from fourbar.solution import write_json
 from tests.support.scenes import crank_rocker
 

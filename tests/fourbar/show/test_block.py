@@ -12,8 +12,8 @@ import fourbar
 from fourbar.cli import status
 from fourbar.effects import SpringEnd
 from fourbar.scene.motion import Law
-from fourbar.show.block import WIDTH, write_block
-from fourbar.show.summary import summarize, write_motor
+from fourbar.show.block import WIDTH, write_block, write_motor
+from fourbar.show.summary import summarize
 from fourbar.show.units import suit_units
 from fourbar.solve import find_last_stage
 from tests.support.scenes import crank_rocker, thesis

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar.show.block import write_motor
 from fourbar.show.duty import bearing_load, motor_duty, shaking_force, shaking_moment
-from fourbar.show.summary import write_motor
 from fourbar.show.units import units
 from tests.support.scenes import crank_rocker
 
