@@ -64,7 +64,7 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
     file = file or out
     assert file is not None
     if file.exists():
-        raise InputError("FILE", str(file), "is there already; a new scene needs a new name")
+        raise InputError("FILE", str(file), "file exists; give the new scene another name")
     bare = [text for text in lengths if given.is_bare(text)]
     if bare and unit is None:
         raise InputError(
@@ -100,7 +100,7 @@ def _form_options(command: Callable[..., None]) -> Callable[..., None]:
             raise click.UsageError("--json and --csv are two forms of the output; give one of them")
         table = table or every is not None
         if table and (as_json or decimal):
-            raise click.UsageError("--table, --every and --all are of the table; --json and --csv hold every position")
+            raise click.UsageError("--table, --every and --all shape the table; --json and --csv hold every position")
         out = others["out"]
         kind = "json" if as_json else "csv" if decimal else "table" if table else "summary"
         if kind == "summary" and given.ends_in(out, ".json"):
@@ -182,7 +182,7 @@ def _read_pressure(scene: Scene, pressure: str | None) -> float | None:
     if pressure is None:
         return None
     if scene.drive is None:
-        raise InputError("--pressure", pressure, "is of a cylinder: the scene's [drive] has no from and to")
+        raise InputError("--pressure", pressure, "needs a cylinder; the scene's [drive] has no from and to")
     if given.is_bare(pressure):
         raise InputError("--pressure", pressure, f'the unit is missing; did you mean "{pressure} bar"?')
     return given.read_number("--pressure", pressure, "Pa", POSITIVE)
@@ -238,7 +238,7 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units:
 
 def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:
     if as_json and units:
-        raise click.UsageError("--json is SI and radians, every digit; --units is of the table")
+        raise click.UsageError("--json has SI units and radians; --units changes the table only")
 
 
 @click.command()

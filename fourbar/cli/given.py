@@ -48,7 +48,7 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
 
     def require_ending(context: click.Context, parameter: click.Parameter, out: Path | None) -> Path | None:
         if out is not None and out.suffix and out.suffix.lower() not in endings:
-            raise InputError("path", str(out), f"what is written ends in {', '.join(endings)}, or has no ending")
+            raise InputError("path", str(out), f"must end in {', '.join(endings)}, or have no ending")
         return out
 
     told = "Write to FILE." if required else "Write to FILE instead of printing."

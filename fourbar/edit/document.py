@@ -134,14 +134,14 @@ class SceneDocument:
             new = _make_table(value) if own_table else _write_inline(value)
             holder[last] = new if old is None else _make_like(old, value)
         else:
-            raise InputError(name_entry(path), value, "stands in no table")
+            raise InputError(name_entry(path), value, "has no table that it could stand in")
 
     def remove(self, path: Path) -> None:
         """Take an entry away, and a table that it leaves empty."""
         *into, last = path
         holder = self.at(into)
         if self.at(path) is None:
-            raise InputError(name_entry(path), "", "is not there")
+            raise InputError(name_entry(path), "", "entry not found")
         del holder[last]
         if into and not len(holder) and into[0] not in ("lengths", "motion"):
             self.remove(into)

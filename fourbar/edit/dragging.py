@@ -103,7 +103,7 @@ def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], dragged: 
         return
     turned = {1: scene.linkage.ground_angle, 2: dragged.theta_2, 3: float(shown.theta_3[0]), 4: float(shown.theta_4[0])}
     if not all(map(cmath.isfinite, (*pins.values(), *turned.values()))):
-        raise InputError("theta_2", dragged.theta_2, "is no position of the linkage")
+        raise InputError("theta_2", dragged.theta_2, "the linkage does not assemble there; choose another position")
     for handle in list_handles(scene, plain):
         frame = cmath.rect(1.0, turned[handle.bar])
         foot = pins[{1: "O2", 2: "O2", 3: "A", 4: "O4"}[handle.bar]] + frame * handle.at
@@ -121,7 +121,7 @@ def drag(document: SceneDocument, scene: Scene, plain: dict[str, Any], dragged: 
             document.put((*handle.force, 0), write_rounded(force, abs(force) / 50.0, unit))
             document.put((*handle.force, 1), _write_angle(document.at((*handle.force, 1)), angle, 0.02))
             return
-    raise InputError("drag", dragged.what, "is nothing that can be dragged")
+    raise InputError("drag", dragged.what, "cannot be dragged; drag a pin, a point, a mass centre, an end or an arrow")
 
 
 def _drag_pin(document: SceneDocument, dragged: Dragged, pins: dict[str, complex]) -> None:

@@ -184,7 +184,7 @@ class Workbench:
         try:
             listening = socket.create_server((LOOPBACK, port))
         except (OSError, OverflowError) as error:
-            raise InputError("--port", port, f"cannot be listened to: {error}") from None
+            raise InputError("--port", port, f"the port cannot be opened: {error}") from None
         listening.setblocking(False)
         own_port = listening.getsockname()[1]
         self.entrance = Entrance(make_application(self, own_port), listening)

@@ -115,7 +115,7 @@ class Session:
             RecursionError,
             FourBarError,
         ) as error:
-            allowed = f"is no state of the workbench ({error}): remove it to begin from the scene file"
+            allowed = f"cannot be read as a state of the workbench ({error}): remove it to begin from the scene file"
             raise InputError("state file", str(self.state_file), allowed) from None
 
     def keep(self) -> None:
@@ -279,7 +279,7 @@ def _write_text(session: Session, asked: dict[str, Any]) -> None:
 def _move(session: Session, by: int) -> None:
     place = session.place + by
     if not 0 <= place < len(session.texts):
-        raise InputError("history", place, "there is nothing more to undo or redo")
+        raise InputError("history", place, "no further state to undo or redo")
     session.now, session.place, session.gesture = session.read(session.texts[place]), place, ""
     session.document = SceneDocument(session.now.text)
 
@@ -331,7 +331,7 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
         raise InputError("command", place, "needs a cylinder: add one in place of the bar first")
     first, last = _find_monotone(values)
     if last == first:
-        raise InputError("command", place, "needs a motion that moves it")
+        raise InputError("command", place, "does not move in this motion: choose another sweep first")
     middle = (first + last) // 2
     inset = 1e-3 * (values[last] - values[first])  # so that rounding leads to no position beyond
     ground = find_unit(session.now.plain["lengths"]["ground"], "m")

@@ -42,7 +42,7 @@ def read_effect(key: str, value: object, read: Reader) -> "Effect":
 def write_effect(effect: "Effect") -> Any:
     """Write the value of an effect under its key; InputError where a scene file has no form of it."""
     if kinds.list_kinds().get(effect.key) is not type(effect):
-        raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file has no form of this effect")
+        raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file cannot state this effect")
     if isinstance(effect, kinds.Gravity):
         return write_polar(effect.magnitude, effect.angle, effect.numbers["magnitude"].unit)
     if isinstance(effect, kinds.Springs):

@@ -51,7 +51,7 @@ class Reader:
         return value
 
     def choice(self, key: str, value: object, allowed: Iterable[str]) -> str:
-        """One of a few words."""
+        """Read one of a few words."""
         words = list(allowed)
         if not isinstance(value, str) or value not in words:
             raise self.refuse(

@@ -34,7 +34,7 @@ def read_bytes(path: str | Path, key: str, largest: int, *, shown: str | None = 
         with open(path, "rb") as opened:
             data = opened.read(largest + 1)
     except FileNotFoundError:
-        raise refuse("there is no such file") from None
+        raise refuse("file not found") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         raise refuse(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if len(data) > largest:  # it grew, or is of those in /proc that say 0

@@ -242,7 +242,7 @@ def _load(read: Reader, key: str, value: object) -> Load:
     if "force" not in entry and "moment" not in entry:
         raise read.refuse(key, value, "must have a force, a moment or both")
     if "at" in entry and "force" not in entry:
-        raise read.refuse(f"{key}.at", entry["at"], "belongs to a force, and there is none")
+        raise read.refuse(f"{key}.at", entry["at"], "needs a force: state one, or leave this out")
     return Load(
         read.whole(f"{key}.bar", entry.get("bar"), 2, 4),
         **read.numbers(key, entry, Load.numbers),
@@ -252,12 +252,14 @@ def _load(read: Reader, key: str, value: object) -> Load:
 
 
 def _read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Tolerance, ...]:
-    """``"lengths.input" = "0.05 mm"`` (plus or minus) or ``["0.02 mm", "sigma"]``."""
+    """Read ``"lengths.input" = "0.05 mm"`` (plus or minus) or ``["0.02 mm", "sigma"]``."""
     entries, tolerances = list_entries(scene), []
     for key, stated in _flatten(read, value).items():
         name = f'tolerances."{key}"'
         if key in COMMAND_KEYS:
-            raise read.refuse(name, stated, "is what is commanded, and is held; its speed and acceleration may scatter")
+            raise read.refuse(
+                name, stated, "a commanded value has no tolerance; its speed and acceleration may have one"
+            )
         if key not in entries:
             raise read.refuse(name, stated, refuse_key(key, stated, list(entries)).allowed)
         entry, sigma = entries[key], isinstance(stated, list)
@@ -271,7 +273,9 @@ def _read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Toleran
             raise read.refuse(name, width, "must be > 0")
         tolerance, number = Tolerance(key, size, sigma), read_place(scene, entry.place)
         if number is None:
-            raise read.refuse(name, width, "belongs to a number that the scene does not state")
+            raise read.refuse(
+                name, width, "is the tolerance of a number that the scene leaves out: state the number first"
+            )
         if entry.bound != ANY and tolerance.reach >= number:
             three = "three sigma of it " if sigma else ""
             raise read.refuse(name, width, f"{three}must be less than the number itself, {number:.6g} {entry.unit}")

@@ -90,7 +90,9 @@ def describe(scene: Scene) -> dict[str, Any]:
     lengths["ground_angle"] = write_quantity(scene.linkage.ground_angle, "rad")
     effects = {effect.key: write_effect(effect) for effect in scene.effects}
     if len(effects) != len(scene.effects):
-        raise InputError("effects", [effect.key for effect in scene.effects], "a file holds one of each kind")
+        raise InputError(
+            "effects", [effect.key for effect in scene.effects], "a scene file holds one effect of each kind"
+        )
     bars = {name: _write_bar(scene.linkage.bar(number)) for name, number in BARS.items()}
     return {
         "lengths": lengths,
@@ -152,7 +154,7 @@ def _load_entry(load: Load) -> dict[str, Any]:
 
 
 def _write_table(name: str, entries: dict[str, Any]) -> str:
-    """One TOML table."""
+    """Write one TOML table."""
     heading = f"[{name}]\n" if name else ""
     return heading + "".join(f"{key} = {_write_value(key, value)}\n" for key, value in entries.items())
 
@@ -179,7 +181,7 @@ def _write_tolerances(scene: Scene) -> dict[str, Any]:
     entries, rows = list_entries(scene), dict[str, Any]()
     for tolerance in scene.tolerances:
         if tolerance.key not in entries:
-            raise InputError("tolerances", tolerance.key, "is no number of the scene")
+            raise InputError("tolerances", tolerance.key, "no number of the scene has this key")
         width = write_quantity(tolerance.width, entries[tolerance.key].unit)
         rows[tolerance.key] = [width, SIGMA] if tolerance.sigma else width
     return rows

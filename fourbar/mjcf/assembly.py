@@ -257,5 +257,5 @@ def _place(point: complex) -> str:
 
 
 def _write_turn(angle: float) -> str:
-    """Quaternion (w, x, y, z) of a turn about z."""
+    """Write the quaternion (w, x, y, z) of a turn about z."""
     return f"({math.cos(0.5 * angle)!r}, 0, 0, {math.sin(0.5 * angle)!r})"

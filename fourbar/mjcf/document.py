@@ -87,7 +87,7 @@ def write_mjcf(
     elif settings.timestep is not None:
         timestep = settings.timestep * settings.timestep_scale
     else:
-        raise InputError("timestep", None, "is needed where no keyframe is requested")
+        raise InputError("timestep", None, "is missing: state it, or request a keyframe")
     if settings.pad == "fitted":
         settings = replace(settings, pad=_fit_pad(scene))
     model = Model(scene.linkage, settings, timestep)
@@ -158,7 +158,7 @@ def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
 
 
 def compute_load_ratio(scene: Scene) -> float:
-    """(m g L + F L + M)/(q (m L^2 + I)): loads and weights against the inertia of the bars."""
+    """Return (m g L + F L + M)/(q (m L^2 + I)): loads and weights against the inertia of the bars."""
     inertia = _sum_inertia(scene.linkage)
     return _sum_work(scene) / inertia if inertia else math.inf
 
@@ -279,7 +279,7 @@ def write_mjcf_for(scene: Scene, simulator: str = "mujoco", drive: Drive = "flyw
     if drive not in get_args(Drive):
         raise InputError("drive", drive, f"must be one of {', '.join(get_args(Drive))}")
     if drive == "motor" and simulator in OWN_MOTORS:
-        raise InputError("drive", drive, f"is read by mujoco, warp and mjx; for {simulator} take none")
+        raise InputError("drive", drive, f"only mujoco, warp and mjx read it; leave it out for {simulator}")
     return write_mjcf(scene, SIMULATORS[simulator], simulator, drive=drive)
 
 

@@ -42,7 +42,7 @@ def _add_friction(effect: "Friction", model: Model) -> None:
 
 
 def _add_torsion(effect: "Torsion", model: Model) -> None:
-    """``stiffness`` of the hinge (of a tendon at the cut pin B), its rest shifted by the preload."""
+    """Write the ``stiffness`` of the hinge (of a tendon at the cut pin B), its rest shifted by the preload."""
     for pin, k, rest, preload in effect.springs:
         turned = model.linkage.ground_angle if pin in ("O2", "O4") else 0.0
         model.pin[pin]["stiffness"] = k
@@ -51,7 +51,7 @@ def _add_torsion(effect: "Torsion", model: Model) -> None:
 
 
 def _unwind_torsion(effect: "Torsion", linkage: FourBar, q: Joints) -> Joints:
-    """Each sprung pin within half a turn of its rest; LimitError where the turns of A, B and O4 contradict."""
+    """Return each sprung pin within half a turn of its rest; LimitError where the turns of A, B and O4 contradict."""
     rests = {pin: rest for pin, _, rest, _ in effect.springs}
 
     def turns(pin: str, angle: float, line: float) -> float:

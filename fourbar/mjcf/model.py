@@ -25,7 +25,7 @@ MARGIN = 1.15
 
 
 def write_rounded(*numbers: float) -> str:
-    """Numbers that nothing is computed from, in six digits."""
+    """Write numbers that nothing is computed from, in six digits."""
     return " ".join(f"{number:.6g}" for number in numbers)
 
 
@@ -92,7 +92,7 @@ THICKNESS = 0.02
 
 
 def join(*numbers: float) -> str:
-    """Numbers so that they read back bit for bit."""
+    """Write numbers so that they read back bit for bit."""
     return " ".join(repr(float(number)).removesuffix(".0") for number in numbers)
 
 
@@ -163,7 +163,7 @@ class Model:
         """The angles of pins O2, A, O4 in which the bodies are put down, rad; None: every bar along its parent."""
 
     def add_dry_friction(self, pin: str, torque: float) -> None:
-        """``frictionloss`` that reaches its full torque at once: by default it would rise over 0.02 s of slip."""
+        """Write a ``frictionloss`` that reaches its full torque at once, not over 0.02 s of slip as by default."""
         impedance = self.settings.impedance
         self.pin[pin] |= {
             "frictionloss": torque,

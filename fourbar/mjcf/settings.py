@@ -89,7 +89,7 @@ class WindowMotion:
         return math.sqrt(max(self.omega**2, self.omega**2 + 2.0 * self.alpha * (self.stop - self.start)))
 
     def time(self, theta_2: float) -> float:
-        """When the input passes an angle, s; LimitError where alpha_2 stops it before."""
+        """Return the time when the input passes an angle, s; LimitError where alpha_2 stops it before."""
         angle = theta_2 - self.start
         squared = self.omega**2 + 2.0 * self.alpha * angle
         if squared <= 0.0:

@@ -41,7 +41,7 @@ class Symbol(NamedTuple):
     """Factor of a load over theta_2."""
 
     def sign(self, theta_2: float) -> float:
-        """+1 or -1, 0 where the load's factor is zero."""
+        """Return +1 or -1, 0 where the load's factor is zero."""
         if self.table is None:
             return 1.0
         factor = float(self.table.at(theta_2))
@@ -49,7 +49,7 @@ class Symbol(NamedTuple):
 
 
 def list_acting(scene: Scene) -> list[Symbol]:
-    """Everything that acts, the drive first; nothing that has no size."""
+    """List everything that acts, the drive first; nothing that has no size."""
     symbols = []
     if scene.drive is not None and scene.motion.free is None:
         (bar, *start), (bar_2, *end) = scene.drive.start, scene.drive.end

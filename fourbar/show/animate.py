@@ -117,7 +117,7 @@ def collect_live_data(
 
 
 def _write_symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
-    """One thing that acts, as the page's script draws it."""
+    """Write one thing that acts, as the page's script draws it."""
     entry: dict[str, Any] = symbol._asdict()
     for name in ("at", "beyond", "vector"):
         entry[name] = [entry[name].real, entry[name].imag]
@@ -206,7 +206,7 @@ def thin_out(positions: Command) -> Command:
 
 
 def _choose_rate(duration: float) -> float:
-    """Seconds of a motion shown in one second: 1, or the power of ten that makes it last neither too short nor long."""
+    """Return the seconds of a motion shown in one second: 1, or a power of ten if that were too short or too long."""
     if duration <= 0.0:
         return 1.0
     shortest, longest = WATCHED

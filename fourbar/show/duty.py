@@ -104,7 +104,7 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     Positions without a value are left out.
     """
     if not isinstance(pin, str) or pin not in PIN_FORCE:
-        raise InputError("pin", pin, "the pins are " + ", ".join(PIN_FORCE))
+        raise InputError("pin", pin, "must be one of " + ", ".join(PIN_FORCE))
     force = _require(solution, PIN_FORCE[pin])
     load = np.hypot(force[..., 0], force[..., 1])
     load = np.where(np.isfinite(load), load, np.nan)

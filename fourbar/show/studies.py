@@ -130,7 +130,7 @@ SENSITIVITY_SCHEMA = "fourbar-sensitivity/1"
 
 
 def list_shown(derivatives: Sensitivity) -> list[str]:
-    """Torque and pin forces, or where the scene states no speed the angles; and its own points."""
+    """List torque and pin forces, or where the scene states no speed the angles; and its own points."""
     points = [point.name for point in derivatives.scene.points]
     drive = [name for name in (COUPLE.value, LINE.value) if name in derivatives.by]
     return [*((*drive, *PIN_FORCES) if drive else ("theta_3", "theta_4")), *points]
@@ -187,7 +187,7 @@ def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
 
 
 def write_sensitivity_json(derivatives: Sensitivity) -> str:
-    """One object, SI and rad: d(quantity)/d(key) over the positions, vectors as [x, y], null where there is none."""
+    """Write one object, SI and rad: d(quantity)/d(key) over the positions, vectors as [x, y], null for none."""
     return write_object(
         SENSITIVITY_SCHEMA,
         title=derivatives.solution.title,
@@ -235,7 +235,7 @@ def _say_proof(scene: Scene, proof: Extremes, units: Conversion) -> list[str]:
 
 
 def _make_extremes_table(proof: Extremes, units: Conversion) -> "Table":
-    """Two rows for each quantity."""
+    """Make two rows for each quantity."""
     rows, (angle_unit, of_angle) = [], find_unit_in("rad", units)
     for name in proof.least:
         unit, factor = find_unit_in("rad" if name == "transmission" else find_unit(name.strip("|")), units)
@@ -250,7 +250,7 @@ def _make_extremes_table(proof: Extremes, units: Conversion) -> "Table":
 
 
 def write_extremes_json(scene: Scene, proof: Extremes) -> str:
-    """One object, SI and rad."""
+    """Write one object, SI and rad."""
 
     def rows(bounds: Extremes) -> dict[str, Any]:
         return {name: {"least": bounds.least[name], "greatest": bounds.greatest[name]} for name in bounds.least}
@@ -352,7 +352,7 @@ def _write_degrees(angle: float) -> str:
 
 
 def write_equilibria_json(title: str, rest: Equilibria) -> str:
-    """One object, SI and rad."""
+    """Write one object, SI and rad."""
     positions, keys = rest.positions, read_drive(rest.positions).keys
     return write_object(
         EQUILIBRIUM_SCHEMA,

@@ -155,7 +155,7 @@ def make_table(
 
 
 def write_cells(values: Array, form: str = ".6g") -> list[str]:
-    """Six digits, or another form; a dash where there is no value."""
+    """Write six digits, or another form; a dash where there is no value."""
     return [format(value, form) if math.isfinite(value) else "-" for value in values.tolist()]
 
 

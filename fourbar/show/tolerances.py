@@ -27,7 +27,7 @@ SCHEMA = "fourbar-tolerance/1"
 
 
 def list_shown_parts(spreads: Tolerances) -> list[str]:
-    """Torque and magnitudes of pin forces, or where the scene states no speed the angles; and its own points."""
+    """List torque and magnitudes of pin forces, or where the scene states no speed the angles; and its own points."""
     points = [f"{point.name}_{letter}" for point in spreads.scene.points for letter in "xy"]
     drive = [name for name in (COUPLE.value, LINE.value) if name in spreads.spreads]
     return [*([*drive, *(f"|{name}|" for name in PIN_FORCES)] if drive else ["theta_3", "theta_4"]), *points]
@@ -90,12 +90,12 @@ def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES)
 
 
 def find_worst_position(spread: Spread) -> int | None:
-    """Index of the largest first-order worst case; None where no position has one."""
+    """Return the index of the largest first-order worst case; None where no position has one."""
     return int(np.nanargmax(spread.worst)) if np.isfinite(spread.worst).any() else None
 
 
 def make_table(spreads: Tolerances, units: Conversion = DEGREES) -> "Table":
-    """One row for each quantity."""
+    """Make one row for each quantity."""
     angle_unit, of_angle = find_unit_in("rad", units)
     heads = ("", "\nunit", f"theta_2\n{angle_unit}", "\nnominal", "\nsigma", f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %")
     rows = []
@@ -163,7 +163,7 @@ def collect_tolerances(
 
 
 def write_json(spreads: Tolerances) -> str:
-    """One object, SI and rad; arrays over the positions, null where there is no value."""
+    """Write one object, SI and rad; arrays over the positions, null where there is no value."""
     stated = spreads.scene.tolerances
     keys = [tolerance.key for tolerance in stated]
     return write_object(

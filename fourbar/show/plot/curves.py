@@ -181,7 +181,7 @@ draw_accelerations = partial(
 
 
 def _draw_points(axes: "Axes", view: View, letter: str, unit: str, title: str) -> None:
-    """Sizes at A, B, the mass centres and the scene's own points."""
+    """Draw the sizes at A, B, the mass centres and the scene's own points."""
     over = draw_axes(axes, view)
     curves = {
         name: np.hypot(*vector.T) for name, vector in collect_point_vectors(view.scene, view.sweep, letter).items()
@@ -246,12 +246,12 @@ def draw_stroke(axes: "Axes", view: View) -> None:
 
 
 def list_force_sizes(view: View, names: Iterable[str] = FORCE_COLOURS) -> list[Array]:
-    """Magnitudes of pin forces, of every branch that shares the scales."""
+    """List the magnitudes of pin forces, of every branch that shares the scales."""
     return [np.hypot(*getattr(branch.sweep, name).T) for branch in view.alike for name in names]
 
 
 def draw_forces(axes: "Axes", view: View) -> None:
-    """Magnitudes of the four pin forces."""
+    """Draw the magnitudes of the four pin forces."""
     over = draw_axes(axes, view)
     sizes = {name: np.hypot(*getattr(view.sweep, name).T) for name in FORCE_COLOURS}
     everywhere = list_force_sizes(view)
@@ -267,7 +267,7 @@ def draw_forces(axes: "Axes", view: View) -> None:
 
 
 def draw_energy(axes: "Axes", view: View) -> None:
-    """Kinetic energy of a free motion, and the work that made it."""
+    """Draw the kinetic energy of a free motion, and the work that made it."""
     over = draw_axes(axes, view)
     energies = compute_energies(view.scene, view.sweep)
     shared = [compute_energies(branch.scene, branch.sweep) for branch in view.others] + [energies]
@@ -320,7 +320,7 @@ def find_free_place(mu: Array) -> float:
 
 
 def _list_marked(view: View) -> list[tuple[list[float], list[float], str, str]]:
-    """Limits of the commanded bar and dead centres, on the axis: places, mu (degrees), mark, name."""
+    """List limits of the commanded bar and dead centres, on the axis: places, mu (degrees), mark, name."""
     if view.time is not None:
         return []
     positions, marked = view.sweep.at, list[tuple[list[float], list[float], str, str]]()

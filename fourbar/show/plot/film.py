@@ -51,7 +51,7 @@ def _find_ffmpeg() -> str:
 def write_film(
     scene: Scene, path: Path, kind: str, seconds: float | None, units: Conversion = SI, *, moving: bool = False
 ) -> None:
-    """One sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
+    """Film one sweep; where the input does not turn fully, there and back. A motion through time is shown as it is.
 
     Raises DependencyError where matplotlib or, for MP4, ffmpeg with its H.264 encoder is missing.
     """

@@ -71,7 +71,7 @@ class Couple:
 
 
 def list_actions(view: View, bar: int) -> tuple[list[Arrow], list[Couple]]:
-    """Every force and couple on a bar at the position drawn, d'Alembert's included: together they vanish."""
+    """List every force and couple on a bar at the position drawn, d'Alembert's included: together they vanish."""
     pins, turned = place_of(view.scene.linkage, view.here, 0, 1.0).pins, view.state().direction(bar)
     arrows: list[Arrow] = []
     couples: list[Couple] = []
@@ -198,7 +198,7 @@ def draw_internal_forces(figure: "SubFigure", view: View, labels: Labels) -> Non
 
 
 def _reach(view: View, bar: int, arrows: list[Arrow], scale: float) -> Points:
-    """Every point that a bar's panel has to show, from the bar's first pin, m."""
+    """List every point that a bar's panel has to show, from the bar's first pin, m."""
     described, u = view.scene.linkage.bar(bar), view.state().direction(bar)
     points = [0.0j, take_one(described.length * u), take_one(described.to_centre * u)]
     for arrow in arrows:
@@ -250,7 +250,7 @@ def _draw_one(
 
 
 def _write_couples(axes: "Axes", view: View, couples: list[Couple]) -> None:
-    """One line each."""
+    """Write one line for each couple."""
     lines = []
     for couple in couples:
         size = write_quantity(abs(couple.moment), "N m", view.units)

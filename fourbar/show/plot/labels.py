@@ -113,7 +113,7 @@ RING = np.array([(math.cos(k * math.tau / 12), math.sin(k * math.tau / 12)) for 
 
 
 def _sample_line(points: np.ndarray, per_point: float) -> np.ndarray:
-    """Points along a polyline, or around a mark: a line that ends where it begins."""
+    """Sample points along a polyline, or around a mark: a line that ends where it begins."""
     pieces, step = [], STEP * per_point
     for p, q in pairwise(points):
         if not (np.all(np.isfinite(p)) and np.all(np.isfinite(q))):

@@ -211,7 +211,7 @@ def write_path_legend(axes: "Axes") -> float:
 
 
 def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
-    """Paths of A, B, mass centres (or the coupler's mid-point) and own points: (n, 2) in m, colour, dashes, name."""
+    """List paths of A, B, mass centres (or the coupler's mid-point) and own points: (n, 2) in m, colour, dash, name."""
     sweep = view.sweep
     massive = view.scene.linkage.coupler.mass > 0.0
     middle = sweep.G3 if massive else 0.5 * (sweep.A + sweep.B)
@@ -229,7 +229,7 @@ def list_paths(view: View) -> list[tuple[Array, str, Any, str]]:
 
 
 def draw_coupler_curves(axes: "Axes", view: View, labels: Labels) -> None:
-    """Paths of the scene's own points of the coupler; where it has none, of points along its line and off it."""
+    """Draw the paths of the scene's points of the coupler; where it has none, of points along its line and off it."""
     factor, unit, _ = scale_of(view)
     pins, names = locate_pins(view, factor), [point.name for point in view.scene.points if point.bar == 3]
     for (name, path), (colour, dashes) in zip(_list_coupler_points(view, names), cycle(COUPLER_CURVES), strict=False):

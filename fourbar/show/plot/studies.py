@@ -132,7 +132,7 @@ def _draw_shares(axes: "Axes", spreads: Tolerances, part: str, units: Conversion
 
 
 def draw_influences(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    """One panel for each quantity over the same rows."""
+    """Draw one panel for each quantity over the same rows."""
     derivatives = sensitivity(shown.scene)
     names = list_shown(derivatives)[:MOST_PANELS]
     keys = rank_numbers(derivatives, names)[:MOST_NUMBERS][::-1]

@@ -110,7 +110,7 @@ def shorten_text(text: str, width: int) -> str:
 
 
 def find_greatest(*values: Array) -> float:
-    """Largest finite magnitude, or 0."""
+    """Return the largest finite magnitude, or 0."""
     flat = np.concatenate([np.abs(np.ravel(value)) for value in values])
     flat = flat[np.isfinite(flat)]
     return float(flat.max()) if flat.size else 0.0
@@ -138,7 +138,7 @@ def write_quantity(value: float, unit: str, units: Conversion = SI) -> str:
 
 
 def set_degree_ticks(axis: Any, span: float) -> None:
-    """Ticks at round numbers of degrees."""
+    """Set ticks at round numbers of degrees."""
     from matplotlib.ticker import MultipleLocator
 
     for step in (1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360):

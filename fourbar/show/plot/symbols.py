@@ -107,7 +107,7 @@ def place_of(linkage: FourBar, solution: Solution, index: int, factor: float) ->
 
 
 def draw(axes: "Axes", symbol: Symbol, place: Place, size: float) -> DrawnSymbol:
-    """One symbol at one position; `size` is that of a support."""
+    """Draw one symbol at one position; `size` is that of a support."""
     drawn, colour = DrawnSymbol(text=symbol.name), COLOURS[symbol.kind]
     if symbol.kind == "gravity":
         _draw_gravity(axes, symbol, drawn)

@@ -79,7 +79,7 @@ class View:
         return "open" if np.all(branch == 1) else "crossed" if np.all(branch == -1) else "both signs"
 
     def state(self) -> State:
-        """Kinematics at the position drawn."""
+        """Return the kinematics at the position drawn."""
         return compute_state(self.scene, self.here.at)
 
 
@@ -117,7 +117,7 @@ def where_in_words(solution: Solution) -> str:
 
 
 def collect_point_vectors(scene: Scene, solution: Solution, letter: str) -> dict[str, Array]:
-    """Velocities ("v") or accelerations ("a") of A, B, the mass centres of bars that have mass, and own points."""
+    """Collect velocities ("v") or accelerations ("a") of A, B, mass centres of bars that have mass, and own points."""
     drawn = ("A", "B", *(f"G{bar}" for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0))
     vectors = {name: getattr(solution, f"{letter}_{name}") for name in drawn}
     vectors |= solution.velocity if letter == "v" else solution.acceleration

@@ -218,7 +218,7 @@ def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None
     [
         (("analyze", "x.toml", "--json", "--csv"), "give one of them"),
         (("analyze", "x.toml", "--json", "--every", 2), "hold every position"),
-        (("analyze", MODELS / "crank_rocker.toml", "--pressure", "210 bar"), "is of a cylinder"),
+        (("analyze", MODELS / "crank_rocker.toml", "--pressure", "210 bar"), "needs a cylinder"),
         (("analyze", MODELS / "gallery" / "excavator_bucket.toml", "--pressure", 210), 'did you mean "210 bar"?'),
         (("plot", MODELS / "crank_rocker.toml", "-o", "a.svg", "--position", "12"), 'did you mean "12 deg"?'),
         (("new", "--lengths", 3, 1, 2, 2), "name the new file once"),

@@ -304,7 +304,7 @@ def test_save_is_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 def test_what_a_file_cannot_hold_is_refused() -> None:
     scene = load(MODELS[0])
-    with pytest.raises(InputError, match="one of each kind"):
+    with pytest.raises(InputError, match="one effect of each kind"):
         dump(replace(scene, effects=(fourbar.Gravity(), fourbar.Gravity())))
     with pytest.raises(InputError, match="Unicode"):
         dump(replace(scene, title="\ud800"))

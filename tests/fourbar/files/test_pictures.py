@@ -103,7 +103,7 @@ def test_what_the_name_leads_to_is_looked_at_before_it_is_shown(tmp_path: Path) 
         ("text.png", "PNG or JPEG"),
         ("big.png", "must not exceed 2000000"),
         ("folder.png", "is a directory"),
-        ("missing.png", "no such file"),
+        ("missing.png", "file not found"),
     ):
         scene = load(scene_file(inner, name))
         fourbar.solve(scene)  # nobody has to see it to compute

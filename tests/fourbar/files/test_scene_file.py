@@ -103,7 +103,7 @@ MISTAKES = [
     ("drive as truth", "[drive]\nbar = 2", "[drive]\nbar = true", ["drive.bar", "True"]),
     ("load on the ground", "bar = 4", "bar = 1", ["loads[0].bar", "1"]),
     ("load that does nothing", 'force = ["3 N", "40 deg"]\nat = ["5 cm", "0 deg"]\n', "", ["loads[0]", "force"]),
-    ("arm without a force", 'force = ["3 N", "40 deg"]', 'moment = "1 N m"', ["loads[0].at", "belongs to a force"]),
+    ("arm without a force", 'force = ["3 N", "40 deg"]', 'moment = "1 N m"', ["loads[0].at", "needs a force"]),
     ("force without an angle", '["3 N", "40 deg"]', '"3 N"', ["loads[0].force", "pair"]),
     ("force with three parts", '["3 N", "40 deg"]', '["3 N", "40 deg", "1 m"]', ["loads[0].force", "pair"]),
     ("loads as a table", "[[loads]]", "[loads]", ["loads", "[[loads]]"]),
@@ -164,7 +164,7 @@ def refused(arguments: list[str], words: list[str], folder: Path, capsys: pytest
 
 @pytest.mark.parametrize("command", ["analyze", "mjcf", "plot", "animate"])
 def test_every_command_refuses_a_bad_file(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    refused([command, str(tmp_path / "missing.toml")], ["missing.toml", "no such file"], tmp_path, capsys)
+    refused([command, str(tmp_path / "missing.toml")], ["missing.toml", "file not found"], tmp_path, capsys)
     bad = tmp_path / "bad.toml"
     bad.write_text(GOOD.replace('"open"', '"opne"'))
     refused([command, str(bad)], [str(bad), "motion.branch", "opne"], tmp_path, capsys)

@@ -153,7 +153,7 @@ def test_a_picture_is_embedded_where_it_is_one(tmp_path: Path) -> None:
         ("input", b"<svg onload='alert(1)'/>", "PNG or JPEG"),
         ("input", b"", "PNG or JPEG"),
         ("input", PNG + bytes(LARGEST), f"must not exceed {LARGEST}"),
-        ("input", None, "there is no such file"),
+        ("input", None, "file not found"),
         ("wheel", PNG, "must name one of input, coupler, output"),
     ],
 )

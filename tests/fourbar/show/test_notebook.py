@@ -124,7 +124,7 @@ def test_a_new_scene_never_replaces_a_file(tmp_path: Path, capsys: pytest.Captur
     assert status(["new", str(file), "--lengths", "4", "2", "5", "5", "--unit", "m"]) == 0
     before = file.read_text()
     assert status(["new", str(file), "--lengths", "4", "2", "5", "6", "--unit", "m"]) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "file exists" in capsys.readouterr().err
     assert file.read_text() == before
 
 

@@ -93,7 +93,7 @@ def test_tolerances_of_a_file_come_back_as_they_were() -> None:
         ('"lengths.input" = "0 mm"', "> 0"),
         ('"bars.input.inertia" = "1 kg m^2"', "follows the length"),
         ('"bars.input.centre" = "1 mm"', "is more than one number"),
-        ('"motion.theta_2" = "1 deg"', "is what is commanded, and is held"),
+        ('"motion.theta_2" = "1 deg"', "a commanded value has no tolerance"),
     ],
 )
 def test_a_bad_tolerance_is_one_line(line: str, words: str) -> None:

@@ -485,7 +485,7 @@ def test_a_table_that_is_too_large_or_missing_is_one_line(tmp_path: Path, capsys
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
         file.truncate(LARGEST_FILE + 1)
-    for path, words in ((large, "must not exceed"), (tmp_path / "none.csv", "no such file"), (tmp_path, "directory")):
+    for path, words in ((large, "must not exceed"), (tmp_path / "none.csv", "file not found"), (tmp_path, "directory")):
         assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == BAD_INPUT
         assert words in capsys.readouterr().err
 
