@@ -134,9 +134,7 @@ def test_every_axis_of_theta_2_is_in_degrees_and_every_axis_has_a_unit() -> None
 
 def solved(scene: fourbar.Scene) -> fourbar.Solution:
     """At the positions of a scene, and those that a figure shows between them."""
-    solution = fourbar.solve(scene)
-    found = locate_between(scene, solution)
-    return solution if found is None else found.solution
+    return locate_between(scene, fourbar.solve(scene)).solution
 
 
 @pytest.mark.slow
@@ -174,14 +172,10 @@ def test_the_coupler_figure_shows_the_points_of_the_scene() -> None:
 
 
 @pytest.mark.slow
-def test_couples_of_a_free_body_have_an_arrow_and_no_sign() -> None:
-    lines = [text for text, _ in texts_shown(composed(crank_rocker(), "freebody")) if text[0] in "↺↻"]
-    assert lines and not any(" = −" in line for line in lines)
-
-
-@pytest.mark.slow
-def test_free_bodies_say_at_which_position_they_are_drawn() -> None:
+def test_free_bodies_say_their_position_and_couples_have_an_arrow_and_no_sign() -> None:
     figure = composed(crank_rocker(), "freebody", position=math.radians(135.0))
+    lines = [text for text, _ in texts_shown(figure) if text[0] in "↺↻"]
+    assert lines and not any(" = −" in line for line in lines)
     assert " ".join(figure.subfigs[0].get_supxlabel().split()).startswith("At θ₂ = 135°. ")
 
 
@@ -467,14 +461,6 @@ def test_both_branches_are_drawn_to_one_scale(name: str) -> None:
             np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
         np.testing.assert_allclose(np.diff(ends[0]), np.diff(ends[1]), rtol=1e-9)
         assert one.get_ylabel() == other.get_ylabel()
-
-
-def test_the_settings_of_the_reader_are_left_alone(tmp_path: Path) -> None:
-    import matplotlib as mpl
-
-    before = dict(mpl.rcParams)
-    plot.draw(crank_rocker(), tmp_path / "a.svg", "torque")
-    assert dict(mpl.rcParams) == before
 
 
 @pytest.mark.slow
