@@ -169,12 +169,12 @@ def _say(message: str, status: int) -> int:
 
 
 def clean_line(text: str) -> str:
-    """One line without control characters: a title or file name does not steer the terminal."""
+    """Return one line without control characters: a title or file name does not steer the terminal."""
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
 def _report_interruption(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """One line also where the libraries are still being imported, and nothing can catch it yet."""
+    """Print one line also where the libraries are still being imported, and nothing can catch it yet."""
     if not issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, trace)
         return

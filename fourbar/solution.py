@@ -58,15 +58,15 @@ class Solution(Quantities):
     points: dict[str, Array] = field(default_factory=dict, init=False)
     """Positions of the scene's own points by name, (n, 2), m."""
     velocity: dict[str, Array] = field(default_factory=dict, init=False)
-    """Their velocities, m/s."""
+    """Velocities of the scene's points, m/s."""
     acceleration: dict[str, Array] = field(default_factory=dict, init=False)
-    """Their accelerations, m/s^2."""
+    """Accelerations of the scene's points, m/s^2."""
     ground: tuple[Any, Any] | None = field(default=None, init=False)
     """Length and angle of the ground bar, m and rad; of a study (m, 1) each where they vary."""
     drive: "LinearDrive | None" = field(default=None, init=False)
     """Linear drive of the scene; None: a bar is driven."""
     stopped_at: float | None = field(default=None, init=False)
-    """When a free motion reached a limit position or change point, s; None: it did not."""
+    """Time at which a free motion reached a limit position or change point, s; None: it did not."""
 
     at: Command = field(default=None, init=False)  # type: ignore[assignment]  # `solve` states it
     """Name of the commanded quantity; theta_2 for a free motion."""
@@ -108,13 +108,13 @@ class Solution(Quantities):
         return np.array(STATUS_NAMES)[self.status_code].tolist()
 
     def evaluated(self) -> list[str]:
-        """Names of the quantities that were evaluated, theta_2 first; without the scene's own points."""
+        """List the names of the quantities that were evaluated, theta_2 first; without the scene's own points."""
         return [name for name in UNITS if getattr(self, name) is not None]
 
     def to_csv(
         self, path: str | Path | None = None, *, degrees: bool = False, units: Conversion = SI, decimal: str = "."
     ) -> str | None:
-        """One line per position, every digit; the text itself, or written to a file, whole or not at all.
+        """Write one line per position with every digit: returned as text, or written to a file atomically.
 
         Parameters
         ----------
@@ -133,7 +133,7 @@ class Solution(Quantities):
         return None
 
     def to_pandas(self, units: Conversion = SI) -> "DataFrame":
-        """One row per position, vectors as columns `A_x`, `A_y`; only what was evaluated, SI and radians by default.
+        """Make a table of what was evaluated, a row per position, vectors as `A_x`, `A_y`; SI and radians by default.
 
         Raises DependencyError where pandas is not installed.
         """
@@ -163,7 +163,7 @@ def list_parts(values: Mapping[str, Array | None], scalars: tuple[str, ...]) -> 
 
 
 def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
-    """One object; arrays over the positions, vectors as [x, y], null where there is no value; `units` says in what.
+    """Write one object: arrays over the positions in the given units, vectors as [x, y], null for no value.
 
     Entries of other names follow as they are given.
     """
@@ -184,7 +184,7 @@ def write_json(solution: Solution, units: Conversion = SI, **more: Any) -> str:
 
 
 def write_csv(solution: Solution, units: Conversion = SI, decimal: str = ".") -> str:
-    """One line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
+    """Write one line per position; vectors as columns `A_x`, `A_y`, empty where there is no value."""
     size, first = solution.theta_2.size, list_leading(solution)
     columns = {
         name: [math.nan] * size if values is None else values.tolist()
@@ -212,7 +212,7 @@ def list_leading(solution: Solution) -> dict[str, list[Any]]:
 
 
 def list_scalars(solution: Solution, units: Conversion = SI) -> dict[str, Array | None]:
-    """Every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated.
+    """List every quantity as columns of numbers, vectors as `A_x`, `A_y`; None for what was not evaluated.
 
     Of a pin force the magnitude too, and where it is known the time. In other units than SI every heading names its
     own: `F12_x [lbf]`.
@@ -245,7 +245,7 @@ def _compute_times(solution: Solution) -> Array | None:
 
 
 def require_units(units: object) -> Conversion:
-    """Units as `fourbar.units` makes them, or an InputError."""
+    """Return units as `fourbar.units` makes them; InputError for others."""
     plain = isinstance(units, Mapping) and all(isinstance(to, tuple) and len(to) == 2 for to in units.values())
     if not isinstance(units, Mapping) or not plain or not all(isinstance(name, str) for name, _ in units.values()):
         raise InputError("units", units, 'must be as fourbar.units makes them, like fourbar.units("mm N.mm")')
@@ -260,7 +260,7 @@ def find_unit_in(unit: str, units: Conversion) -> tuple[str, float]:
 
 
 def _list_quantities(solution: "Solution") -> list[str]:
-    """Every quantity of a solution, evaluated or not; time and those of a linear drive only where there is one."""
+    """List every quantity of a solution, evaluated or not; time and those of a linear drive only where there is one."""
     left_out = () if solution.drive is not None else LINE_QUANTITIES
     names = [name for name in UNITS if name not in left_out and (name != "time" or solution.time is not None)]
     points = dict.fromkeys((*solution.points, *solution.velocity, *solution.acceleration))
@@ -268,7 +268,7 @@ def _list_quantities(solution: "Solution") -> list[str]:
 
 
 def find_unit(name: str) -> str:
-    """SI unit of a quantity, or of a point of the scene: its path, velocity or acceleration."""
+    """Return the SI unit of a quantity, or of a point of the scene: its path, velocity or acceleration."""
     return UNITS.get(name) or {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
 
 

@@ -298,7 +298,7 @@ def make_arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, 
 
 
 def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
-    """Every quantity of a scene, those of its own points too, and its stage."""
+    """List every quantity of a scene, those of its own points too, and its stage."""
     return STAGE_OF | {start + name: stage for name in points for start, stage in POINT_STAGES.items()}
 
 
@@ -364,7 +364,7 @@ def _solve_alone(
 
 
 def _list_foreign(scene: Scene) -> tuple[str, ...]:
-    """Quantities of the kind of drive that the scene has not."""
+    """List quantities of the kind of drive that the scene lacks."""
     return LINE_QUANTITIES if scene.drive is None else COUPLE
 
 

@@ -34,7 +34,7 @@ def name_file(path: Path) -> Iterator[None]:
 
 
 def require_file(target: Path, *read: Path) -> None:
-    """InputError for what can name no output: a folder, a file in a folder that does not exist, one that is read."""
+    """Raise InputError for what can name no output: a folder, a file in a missing folder, one that is read."""
     if target.is_dir() or "\0" in str(target):
         raise InputError("path", str(target), "must name a file, not a folder")
     if not target.parent.is_dir():
@@ -106,7 +106,7 @@ def describe_extent(theta_2: Any) -> str:
 
 
 def write_between(values: Any) -> str:
-    """Least and greatest of an array."""
+    """Write the least and greatest of an array."""
     finite = values[np.isfinite(values)]
     if not finite.size:
         return "no value"
@@ -114,7 +114,7 @@ def write_between(values: Any) -> str:
 
 
 def list_names(what: str, names: Iterable[str]) -> str:
-    """Names on one line of a representation, as many as fit."""
+    """Write names on one line of a representation, as many as fit."""
     return shorten(f"{what}: {', '.join(names)}", 110, placeholder=" ...")
 
 

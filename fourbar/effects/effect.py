@@ -156,7 +156,7 @@ class Actions:
         return total
 
     def sense(self, pin: str) -> Number:
-        """Sign of omega_j - omega_i at a pin; at rest the one that a motion beginning to `side` would have.
+        """Return the sign of omega_j - omega_i at a pin; at rest the one that a motion beginning to `side` would have.
 
         A linkage at rest begins to move as theta_2 grows or falls; a pin that is at rest in a linkage that
         moves turns in either sense.
@@ -174,7 +174,7 @@ class Actions:
         return abs(self.state.slip(pin)) > AT_REST * (abs(h(2)) + abs(h(i)) + abs(h(j)))
 
     def wrenches(self, inertia: Wrenches) -> Wrenches:
-        """Everything that acts on each bar, with d'Alembert's forces and moments."""
+        """Sum everything that acts on each bar, with d'Alembert's forces and moments."""
         R, M = [*inertia[:3]], [*inertia[3:6]]
         for bar, force in self.forces.items():
             R[bar - 2] = R[bar - 2] + force
@@ -267,7 +267,7 @@ class Effect:
         return self
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
-        """Status codes, (n,): other than `OK` where it has no value; None: it has one everywhere."""
+        """Return status codes, (n,): other than `OK` where it has no value; None: it has one everywhere."""
         return None
 
 

@@ -29,6 +29,6 @@ class Friction(PinRows):
         return tuple(pin for pin, f in self.torques if is_any(f != 0.0))
 
     def act(self, actions: Actions, state: State) -> None:
-        """M on bar j = -f sign(omega_j - omega_i), its opposite on bar i."""
+        """Add M on bar j = -f sign(omega_j - omega_i), its opposite on bar i."""
         for pin, f in self.torques:
             actions.couple(pin, -f * actions.sense(pin))

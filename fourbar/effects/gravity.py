@@ -44,7 +44,7 @@ class Gravity(Effect):
         return float(self.field.real), float(self.field.imag)
 
     def act(self, actions: Actions, state: State) -> None:
-        """F = m g at G."""
+        """Add F = m g at G."""
         field = self.field
         for number, body in zip(MOVING_BARS, actions.bodies, strict=True):
             if is_any(body.m != 0.0):

@@ -55,7 +55,7 @@ class LinearDrive:
         return (*bars - {1},) if bars in ({1, 2}, {1, 4}) else MOVING_BARS
 
     def require_stroke(self, linkage: FourBar) -> None:
-        """InputError where no motion changes the distance of the ends: a bar holds both, or the pins that they are."""
+        """Raise InputError where no motion changes the distance of the ends, as where one bar holds both."""
         if common := _list_bars(linkage, self.start) & _list_bars(linkage, self.end):
             allowed = f"keeps its distance from `from` at every position: bar {min(common)} holds both"
             raise InputError("drive.to", f"bar {self.end.bar} at {self.end.distance:g} m", allowed)
@@ -67,7 +67,7 @@ class LinearDrive:
         return stroke, across / stroke
 
     def gain(self, state: State) -> Number:
-        """ds/dq, m: the work of 1 N of it, whose parts between two bars that meet go by the turn at their pin."""
+        """Compute ds/dq, m: the work of 1 N, whose parts between two bars that meet go by the turn at their pin."""
         return self.per_newton(Actions(state, MASSLESS)).work()[0]
 
     def act(self, actions: Actions, force: Number) -> None:
@@ -81,7 +81,7 @@ class LinearDrive:
         return single
 
     def leverage(self, state: State, sines: dict[int, Number]) -> tuple[Number, Number]:
-        """P, and what of it there could be at most: L, the sum of what each end could move, m.
+        """Compute P and the most that it could be: L, the sum of what each end could move, m.
 
         That is r on bar 2, a + r a/b on bar 3, r a/c on bar 4, r its distance from the bar's first pin.
 
@@ -95,7 +95,7 @@ class LinearDrive:
         return self.gain(turned), most
 
     def status(self, state: State, sines: dict[int, Number]) -> Number:
-        """NO_DIRECTION where the ends coincide, NO_LEVER where P lies within its rounding; None: nowhere.
+        """Return NO_DIRECTION where the ends coincide, NO_LEVER where P lies within its rounding; None: nowhere.
 
         Places are rounded by the lengths over which they are reached, the line's direction by that over the stroke.
         """
@@ -109,7 +109,7 @@ class LinearDrive:
 
 
 def _list_bars(linkage: FourBar, point: SpringEnd) -> set[int]:
-    """Bars that hold a point: its own, and at one of its pins the other one too."""
+    """List the bars that hold a point: its own, and at one of its pins the other one too."""
     length = linkage.lengths[point.bar - 1]
     places = zip({1: ("O2", "O4"), **ENDS}[point.bar], (0.0, length), strict=True)
     pins = [pin for pin, along in places if abs(point.in_bar - along) <= COINCIDE * length]

@@ -127,7 +127,7 @@ class Load(Effect):
         check_numbers(self, "loads")
 
     def act(self, actions: Actions, state: State) -> None:
-        """F at its point, and the couple."""
+        """Add F at its point, and the couple."""
         factor = 1.0
         if self.table is not None:
             factor = self.table.at(state.theta_2)

@@ -88,7 +88,7 @@ class PinFriction(PinRows):
         shape = np.shape(pins.F12)
 
         def column(force: Any) -> Any:
-            """Components of a force over all positions, (n, 2)."""
+            """Return the components of a force over all positions, (n, 2)."""
             flat = np.broadcast_to(_make_plain(force), shape).ravel()
             return np.stack([flat.real, flat.imag], axis=-1)
 
@@ -201,7 +201,7 @@ def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
 
 
 def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """(k^2 |C|^2 - 1) x^2 + 2 k^2 F.C x + k^2 |F|^2 = 0."""
+    """Solve (k^2 |C|^2 - 1) x^2 + 2 k^2 F.C x + k^2 |F|^2 = 0."""
     c2 = k * np.hypot(C[:, 0], C[:, 1])
     a = (c2 - 1.0) * (c2 + 1.0)
     b = k * k * (F[:, 0] * C[:, 0] + F[:, 1] * C[:, 1])
@@ -231,7 +231,7 @@ def _compute_right_side(F: Array, C: Array, k: Array, x: Array) -> tuple[Array, 
 
 
 def compute_step(gap: Array, slope: Array) -> Array:
-    """(1 - slope) step = gap, zero where that cannot be solved, (n, p)."""
+    """Solve (1 - slope) step = gap, zero where that cannot be solved, (n, p)."""
     matrix = np.eye(gap.shape[1]) - slope
     usable = np.asarray(np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(gap).all(axis=1))
     usable[usable] = np.linalg.det(matrix[usable]) != 0.0
@@ -241,7 +241,7 @@ def compute_step(gap: Array, slope: Array) -> Array:
 
 
 def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
-    """Newton's step where it lessens the gap, else the plain one of the contraction."""
+    """Take Newton's step where it lessens the gap, else the plain one of the contraction."""
     done = np.zeros(len(x), dtype=bool)
     for _ in range(STEPS):
         right, slope = _compute_right_side(F, C, k, x)

@@ -156,7 +156,7 @@ class Spring:
         return self.preload - self.stiffness * self.length
 
     def greatest_tension(self, linkage: FourBar) -> float:
-        """No less than the greatest tension, N: the points stay within the linkage and their own arms."""
+        """Return a bound of the tension, N: the points stay within the linkage and their own arms."""
         reach = sum(linkage.lengths) + abs(self.start.distance) + abs(self.end.distance)
         return abs(self.preload) + self.stiffness * (reach + self.length)
 
@@ -190,7 +190,7 @@ class Springs(Effect):
             actions.pull(spring.start, spring.end, _divide_by_distance(spring, across) * across)
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
-        """NO_DIRECTION where the two points of a spring with slack coincide."""
+        """Return NO_DIRECTION where the two points of a spring with slack coincide."""
         codes = None
         for spring in self.springs:
             if not is_any(spring.slack != 0.0):
@@ -203,7 +203,7 @@ class Springs(Effect):
 
 
 def _divide_by_distance(spring: Spring, across: Any) -> Any:
-    """Tension over distance, N/m."""
+    """Compute tension over distance, N/m."""
     if not is_any(spring.slack != 0.0):
         return spring.stiffness
     return spring.stiffness + spring.slack / namespace(across).abs(

@@ -53,7 +53,7 @@ class Torsion(PinRows):
         return sum(abs(preload) + k * math.pi for _, k, _, preload in self.springs)
 
     def act(self, actions: Actions, state: State) -> None:
-        """M on bar j = -(preload + k (theta_j - theta_i - rest)), its opposite on bar i."""
+        """Add M on bar j = -(preload + k (theta_j - theta_i - rest)), its opposite on bar i."""
         for pin, k, rest, preload in self.springs:
             i, j = PINS[pin]
             turned = state.direction(j) * conjugate(state.direction(i))
@@ -61,7 +61,7 @@ class Torsion(PinRows):
             actions.couple(pin, -(preload + k * wrap_angle(angle - rest)))
 
     def counted_from(self, start: State, branch: Number) -> "Torsion":
-        """Whole turns counted where the motion begins."""
+        """Count whole turns where the motion begins."""
         away = [
             angle - rest
             for angle, (_, _, rest, _) in zip(self._follow_angles(start, branch), self.springs, strict=True)
@@ -72,7 +72,7 @@ class Torsion(PinRows):
         return counted
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
-        """WOUND at half a turn from rest and beyond."""
+        """Return WOUND at half a turn from rest and beyond."""
         if self.turns is None or branch is None:
             return None
         wound = np.zeros(np.shape(state.theta_2), dtype=bool)
@@ -83,13 +83,13 @@ class Torsion(PinRows):
         return np.where(wound, WOUND, OK).astype(np.uint8)
 
     def _follow_angles(self, state: State, branch: Number) -> list[Array]:
-        """theta_j - theta_i of each sprung pin, continuous in the commanded angle on one branch."""
+        """Compute theta_j - theta_i of each sprung pin, continuous in the commanded angle on one branch."""
         angles = _remove_jumps(state, branch)
         return [angles[PINS[pin][1]] - angles[PINS[pin][0]] for pin, *_ in self.springs]
 
 
 def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
-    """theta_1 .. theta_4 without jumps at a whole turn, on one branch, as the loop is read from the commanded bar.
+    """Compute theta_1 .. theta_4 without jumps at whole turns, on one branch of the loop read from the commanded bar.
 
     The diagonal from A to O4 swings about the ground's line where a < d, and otherwise about the input's, never by
     more than a quarter turn; bars 3 and 4 make angles with it that stay between 0 and half a turn.

@@ -18,6 +18,6 @@ class Viscous(PinRows):
     numbers: ClassVar[dict[str, Declared]] = {"": Declared("N m s/rad", AT_LEAST_ZERO)}
 
     def act(self, actions: Actions, state: State) -> None:
-        """M on bar j = -k (omega_j - omega_i), its opposite on bar i."""
+        """Add M on bar j = -k (omega_j - omega_i), its opposite on bar i."""
         for pin, k in self.coefficients:
             actions.couple(pin, -k * (state.slip(pin) * state.speed))

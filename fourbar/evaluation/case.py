@@ -111,7 +111,7 @@ class Case(NamedTuple):
         return {bar: self.path.drive_sine(at, bar) for bar in MOVING_BARS}
 
     def drive_speed(self, state: State) -> Any:
-        """Speed at which the drive works: of the driven bar, rad/s, or of the stroke, m/s."""
+        """Compute the speed at which the drive works: of the driven bar, rad/s, or of the stroke, m/s."""
         return state.omega(self.drive_bar) if self.drive is None else self.drive.gain(state) * state.speed
 
     def drive_condition(self, state: State) -> Any:
@@ -122,7 +122,7 @@ class Case(NamedTuple):
         return abs(lever) / most
 
     def state(self, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True) -> State:
-        """Positions and, where more than they is wanted, motion.
+        """Compute positions and, if more is wanted, motion.
 
         `at`: in the order in which the path reads the loop.
         """
@@ -216,7 +216,7 @@ class Case(NamedTuple):
         return Dynamics(*friction, driving_torque(gain, inertia.total, Q), inertia.total - Q)
 
     def drive_interval(self, state: State, acceleration: Any, drive: Any) -> tuple[Any, Any, Any]:
-        """Least and greatest torque or force of the drive where dry friction holds a pin at rest, elsewhere it twice.
+        """Compute the least and greatest torque or force of the drive; equal unless dry friction holds a pin at rest.
 
         The third is where one of them is NaN because friction jams the motion that would begin; None: nowhere.
         The ends are those at which the linkage would begin to move forwards or backwards, or, where only a

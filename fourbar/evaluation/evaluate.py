@@ -256,7 +256,7 @@ def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[n
 
 
 def make_no_value(quantity: Any) -> complex:
-    """NaN; of a vector in both components."""
+    """Return NaN; of a vector in both components."""
     return complex(np.nan, np.nan) if np.iscomplexobj(quantity) else np.nan
 
 

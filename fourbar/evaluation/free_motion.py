@@ -137,7 +137,7 @@ class _Reading:
         self.last: tuple[tuple[float, float], tuple[Position, Coefficients]] | None = None
 
     def branch(self, q: float) -> float:
-        """Sign of the root at q."""
+        """Return the sign of the root at q."""
         if not self.changes:
             return self.sign
         psi = q - self.path.theta_1 - (math.pi if self.bar == 4 else 0.0)
@@ -163,7 +163,7 @@ class _Reading:
 
 
 def _compute_sines(at: Position) -> dict[int, float]:
-    """sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2): zero at the limits of bars 2, 3, 4."""
+    """Compute the sines between two bars by the number of the third, at whose limits they are zero."""
     return {bar: float(drive_sine(at, bar)) for bar in MOVING_BARS}
 
 
@@ -259,7 +259,7 @@ class _Run:
         return self.reading.at(float(self.y[0]))
 
     def _compute_generalised_force(self, q: float, at: Position, k: Coefficients, rate: float) -> float:
-        """Q under everything that acts, at a speed that is not zero where friction has to have a sense."""
+        """Compute Q under everything that acts, at a speed that is not zero where friction has to have a sense."""
         theta_2 = q if self.reading.bar == 2 else cmath.phase(at.u2)
         state = State(self.lengths, self.linkage.ground_angle, theta_2, at, k, rate, rates(k, rate, 0.0))
         return float(Actions(state, self.bodies).add(self.terms).work()[0])
@@ -372,11 +372,11 @@ class _Run:
             self.rows.append(self._make_row(dense(float(self.times[len(self.rows)]))))
 
     def _compute_sine(self, y: Array) -> float:
-        """sin(theta_4 - theta_3), or that of the bar that was released: zero at its limits."""
+        """Compute sin(theta_4 - theta_3), or that of the bar that was released: zero at its limits."""
         return _compute_sines(self.reading.at(float(y[0]))[0])[self.bar]
 
     def _make_row(self, y: Array) -> tuple[float, ...]:
-        """theta_2, omega_2, alpha_2, branch, and the independent angle with all that belongs to it, of one instant."""
+        """Return theta_2, omega_2, alpha_2, branch and what belongs to the independent angle, of one instant."""
         q, rate = float(y[0]), float(y[1])
         at, k = self.reading.at(q)
         now = cmath.phase(at.u2)

@@ -100,7 +100,7 @@ def split_sum(x: Number, y: Number) -> tuple[Number, Number]:
 
 
 def exact_difference(p: Number, q: Number, r: Number, s: Number) -> Number:
-    """(p + q) - (r + s), zero only where it is zero."""
+    """Compute (p + q) - (r + s), zero only where it is zero."""
     added, lost_1 = split_sum(p, q)
     subtracted, lost_2 = split_sum(r, s)
     gap, lost = split_sum(added, -subtracted)
@@ -138,12 +138,12 @@ def sine_of(x: Number) -> Number:
 
 
 def angle(u: Number) -> Number:
-    """Angle of a complex number, rad, in [-pi, pi]."""
+    """Return the angle of a complex number, rad, in [-pi, pi]."""
     return cmath.phase(u) if type(u) is complex else namespace(u).atan2(u.imag, u.real)
 
 
 def conjugate(u: Number) -> Number:
-    """u*, of a complex number; by its parts in PyTorch, which maps no conjugate over many numbers at once."""
+    """Return u* of a complex number, by its parts in PyTorch, which maps no conjugate over many numbers at once."""
     try:
         return u.conjugate()
     except AttributeError:
@@ -151,13 +151,13 @@ def conjugate(u: Number) -> Number:
 
 
 def sign(x: Number) -> Number:
-    """-1, 0 or 1; for arrays of other libraries 0 of what is no number, which PyTorch else does not map."""
+    """Return -1, 0 or 1; NaN gives 0 in other libraries, because PyTorch does not map NumPy's rule."""
     xp = namespace(x)
     return np.sign(x) if xp is np else xp.astype(x > 0.0, x.dtype) - xp.astype(x < 0.0, x.dtype)
 
 
 def nearest(x: Number) -> Number:
-    """Nearest whole number, the even one of two."""
+    """Return the nearest whole number, the even one of two."""
     return np.rint(x) if (xp := namespace(x)) is np else xp.round(x)
 
 
@@ -173,7 +173,7 @@ def tangent(x: Number) -> Number:
 
 
 def square_root(x: Number) -> Number:
-    """sqrt(x), NaN where x < 0, of Python's own floats as such."""
+    """Compute sqrt(x), NaN where x < 0, of Python's own floats as such."""
     return math.sqrt(x) if type(x) is float and x >= 0.0 else namespace(x).sqrt(x)
 
 
@@ -190,10 +190,10 @@ def sine(u: Number, v: Number) -> Number:
 
 
 def cross(u: Number, v: Number) -> Number:
-    """z-component of u x v, the imaginary part of u* v; over arrays least work where u is one number."""
+    """Compute the z-component of u x v, the imaginary part of u* v; over arrays least work where u is one number."""
     return (conjugate(u) * v).imag
 
 
 def dot(u: Number, v: Number) -> Number:
-    """Scalar product u . v."""
+    """Compute the scalar product u . v."""
     return (conjugate(u) * v).real

@@ -88,7 +88,7 @@ class Pair(NDArrayOperatorsMixin):
         return Pair(np.imag(self.high), np.imag(self.low))
 
     def conjugate(self) -> "Pair":
-        """Complex conjugates."""
+        """Return the complex conjugates."""
         return Pair(np.conjugate(self.high), np.conjugate(self.low))
 
     def like(self, values: Any) -> "Pair":

@@ -93,7 +93,7 @@ def choose_unit(linkage: FourBar) -> float:
 
 
 def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
-    """Bar 2, 3 or 4 against the rest of the loop; InputError for another bar."""
+    """Return bar 2, 3 or 4 against the rest of the loop; InputError for another bar."""
     bar = require_bar("bar", bar)
     unit = choose_unit(linkage)  # exact, and no product of lengths leaves the range of doubles
     d, *moving = (length / unit for length in linkage.lengths)
@@ -194,7 +194,7 @@ def find_limit_angles(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
 
 
 def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
-    """Angles of a bar (theta_2 if none is named) at which all bars are collinear and both branches cross, rad.
+    """Find the angles of a bar (theta_2 if none is named) at which all bars are collinear and both branches cross, rad.
 
     theta_1 where |a - d| = |b - c|, theta_1 + pi where a + d = b + c, within the rounding of the lengths; likewise of
     the lengths as they are read from another bar, from bar 4 with the ground reversed.
@@ -207,13 +207,13 @@ def change_points(linkage: FourBar, bar: int = 2) -> tuple[float, ...]:
 
 
 def swing(linkage: FourBar, bar: int = 4) -> float:
-    """Angle through which a bar swings between its limits, rad; 2 pi where it turns fully."""
+    """Compute the angle through which a bar swings between its limits, rad; 2 pi where it turns fully."""
     start, stop = find_intervals(linkage, bar)[0]
     return stop - start
 
 
 def time_ratio(linkage: FourBar) -> float | None:
-    """Quick return of a crank-rocker: time of its slower stroke over that of the faster, at constant omega_2.
+    """Compute the quick return of a crank-rocker: time of the slower stroke over the faster, at constant omega_2.
 
     (2 pi - delta)/delta, delta <= pi the input's angle between the two limits of the output
     (R. L. Norton, Design of Machinery). None where the input does not turn fully or the output has no

@@ -118,7 +118,7 @@ class Rates(NamedTuple):
 
 
 def rates(k: Coefficients, speed: Number, acceleration: Number) -> Rates:
-    """omega_k = h_k q', alpha_k = h_k q'' + h_k' q'^2, by the speed q' (rad/s) and the acceleration q'' (rad/s^2)."""
+    """Compute omega_k = h_k q', alpha_k = h_k q'' + h_k' q'^2, from speed q' (rad/s) and acceleration q'' (rad/s^2)."""
     square = speed * speed
     alpha_2, alpha_3, alpha_4 = k.dh2 * square, k.dh3 * square, k.dh4 * square
     if is_any(acceleration != 0.0):
@@ -169,7 +169,7 @@ class State(NamedTuple):
     """Sine between the two other moving bars, zero at the limits of the bar; None: that of theta_4 - theta_3."""
 
     def direction(self, bar: int) -> Number:
-        """e^{i theta} of bar 1 (from O2 to O4), 2, 3 or 4."""
+        """Return e^{i theta} of bar 1 (from O2 to O4), 2, 3 or 4."""
         return self.at[bar - 1]
 
     def coefficient(self, bar: int) -> Number:
@@ -177,15 +177,15 @@ class State(NamedTuple):
         return 0.0 if bar == 1 else self.k[bar - 2]
 
     def omega(self, bar: int) -> Number:
-        """Angular velocity of bar 1, 2, 3 or 4, rad/s."""
+        """Return the angular velocity of bar 1, 2, 3 or 4, rad/s."""
         return 0.0 if bar == 1 else self.moving[bar - 2]
 
     def alpha(self, bar: int) -> Number:
-        """Angular acceleration of bar 1, 2, 3 or 4, rad/s^2."""
+        """Return the angular acceleration of bar 1, 2, 3 or 4, rad/s^2."""
         return 0.0 if bar == 1 else self.moving[bar + 1]
 
     def foot(self, bar: int) -> Number:
-        """First pin of a bar, complex, m: O2 of bars 1 and 2, A of bar 3, O4 of bar 4."""
+        """Return the first pin of a bar, complex, m: O2 of bars 1 and 2, A of bar 3, O4 of bar 4."""
         if bar == 3:
             return self.lengths.a * self.at.u2
         return self.lengths.d * self.at.u1 if bar == 4 else 0.0
@@ -219,5 +219,5 @@ class State(NamedTuple):
         return frame.acceleration(z * frame.u)
 
     def slip(self, pin: str) -> Number:
-        """h_j - h_i of the bars i, j that meet at a pin."""
+        """Return h_j - h_i of the bars i, j that meet at a pin."""
         return {"O2": self.k.h2, "A": -self.k.h23, "B": self.k.h43, "O4": self.k.h4}[pin]

@@ -70,7 +70,7 @@ class Path(NamedTuple):
         return half_angle(self.lengths, q - self.theta_1, opposite=self.bar == 4)
 
     def position(self, q: Number, half: HalfAngle, branch: Number) -> Position:
-        """Positions with the bars in the order of the reading.
+        """Compute positions with the bars in the order of the path.
 
         `branch`: sign of the root in that order, which is that of `drive_sine` for a drive on the bar itself.
         """
@@ -86,7 +86,7 @@ class Path(NamedTuple):
         return at
 
     def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
-        """theta_3, theta_4 and the root alone, the arguments of what `close_loop` divides by lengths, in (-pi, pi].
+        """Compute theta_3, theta_4 and the root alone: arguments of what `close_loop` divides by lengths, in (-pi, pi].
 
         In real numbers, against the ground; a turned ground's angle is added.
         """
@@ -104,7 +104,7 @@ class Path(NamedTuple):
         return theta_3, theta_4, root
 
     def motion(self, at: Position, branch: Number) -> tuple[Position, Coefficients]:
-        """Positions and kinematic coefficients by q with the bars in their usual order, from `position`."""
+        """Compute positions and kinematic coefficients by q with the bars in their usual order, from `position`."""
         k = coefficients(self.lengths, at)
         at = take_sines_of_rates(self.lengths, at, k)
         if self.may_stay_parallel:
@@ -128,7 +128,7 @@ class Path(NamedTuple):
         return Position(u1, u2, u3, u4, self.drive_sine(closed, 2), diagonal, at.e2, at.root, at.half)
 
     def drive_sine(self, at: Position, drive_bar: int) -> Number:
-        """Sine between the two bars that are not driven; positions as `motion` returns them, or without a triangle."""
+        """Compute the sine between the two bars that are not driven; `motion` or `on_curve` made the positions."""
         if at.half is None:
             return drive_sine(at, drive_bar)
         role = ROLES[self.bar][drive_bar - 2]
@@ -168,7 +168,7 @@ def find_singular(at: Position) -> Number:
 def compute_state(
     linkage: FourBar, theta_2: Number, branch: Number, omega_2: Number = 1.0, alpha_2: Number = 0.0
 ) -> State:
-    """Positions and motion for a motion of the input; NaN where the loop does not close, or speeds are 0/0.
+    """Compute positions and motion for a motion of the input; NaN where the loop does not close, or speeds are 0/0.
 
     With omega_2 and alpha_2 left out speeds are first coefficients and accelerations second ones.
     """
@@ -181,7 +181,7 @@ def compute_state(
 
 
 def drive_sine(at: Position, drive_bar: int) -> Number:
-    """sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2) for the drive on bar 2, 3, 4."""
+    """Compute sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2) for the drive on bar 2, 3, 4."""
     if drive_bar == 2:
         return at.sin_mu
     return sine(at.u2, at.u4 if drive_bar == 3 else at.u3)

@@ -57,12 +57,12 @@ class PinForces(NamedTuple):
 
 
 def about_first_pin(body: Body) -> Number:
-    """I + m r^2, kg m^2."""
+    """Compute I + m r^2, kg m^2."""
     return body.I + body.m * body.z.real * body.z.real + body.m * body.z.imag * body.z.imag
 
 
 def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> tuple[Wrenches, Number]:
-    """d'Alembert: -m a_G on each bar, and -(I + m r^2) alpha - m r_G x a_pin about its first pin.
+    """Compute d'Alembert's -m a_G on each bar, and -(I + m r^2) alpha - m r_G x a_pin about its first pin.
 
     The force -m a_A of the coupler's mass at pin A is no part of R3; it is returned apart, in the frame of bar 2:
     m_3 a (omega_2^2 - i alpha_2).
@@ -85,7 +85,7 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
 
 
 def coupler_about_B(lengths: Loop, three: Body, at: Position, moving: Rates, sine: Number) -> Number:
-    """d'Alembert: -I alpha_3 - m (G - B) x a_G, the coupler's moment about pin B, which is small where G lies near B.
+    """Compute d'Alembert's moment -I alpha_3 - m (G - B) x a_G of the coupler about B, small where G lies near B.
 
     `sine`: of theta_3 - theta_2.
     """

@@ -96,7 +96,7 @@ def direction(theta: Number) -> Number:
 
 
 def direction_of_tangent(t: Number) -> Number:
-    """e^{i theta} = ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
+    """Compute e^{i theta} = ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
     kk = 1.0 / (1.0 + t * t)
     return vector((1.0 - t * t) * kk, 2.0 * t * kk)
 
@@ -137,7 +137,7 @@ def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAn
 
 
 def tiny_tangent(t: Number) -> Number:
-    """TINY_TANGENT with the sign of a tangent."""
+    """Return TINY_TANGENT with the sign of a tangent."""
     xp = namespace(t)
     return np.copysign(TINY_TANGENT, t) if xp is np else xp.copysign(0.0 * t + TINY_TANGENT, t)
 

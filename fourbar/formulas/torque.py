@@ -17,7 +17,7 @@ from fourbar.formulas.position import Position
 
 
 def inertia(a: Number, bodies: Bodies, at: Position, k: Coefficients) -> tuple[Number, Number]:
-    """Equivalent inertia J = sum of m |dG/dq|^2 + I h_k^2 of bar 2, and of bars 3 and 4, kg m^2.
+    """Compute the equivalent inertia J = sum of m |dG/dq|^2 + I h_k^2 of bar 2, and of bars 3 and 4, kg m^2.
 
     `a`: length of the input, m.
     """
@@ -28,7 +28,7 @@ def inertia(a: Number, bodies: Bodies, at: Position, k: Coefficients) -> tuple[N
 
 
 def half_slope(a: Number, bodies: Bodies, at: Position, k: Coefficients) -> Number:
-    """J'/2 = sum of m G'.G'' + I h_k h_k', kg m^2/rad; bar 2 has no part of it where q = theta_2.
+    """Compute J'/2 = sum of m G'.G'' + I h_k h_k', kg m^2/rad; bar 2 has no part of it where q = theta_2.
 
     About the pins O2, O4 of bars 2, 4 that is (I + m r^2) h_k h_k'; of the coupler, with G = A + R,
         G'.G'' = a^2 h2 h2' + r^2 h3 h3' + (h2 h3' + h3 h2') A.R + h2 h3 (h2 - h3) A x R.

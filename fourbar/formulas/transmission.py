@@ -41,7 +41,7 @@ class TransmissionExtremes(NamedTuple):
 
 
 def transmission_extremes(linkage: FourBar) -> TransmissionExtremes:
-    """Extremes of the angle at B: bars 1, 2 collinear, or a limit of the input; the same on both branches.
+    """Find the extremes of the angle at B: bars 1, 2 collinear, or a limit of the input; the same on both branches.
 
     tan^2(mu/2) = (e + b - c)(e - b + c)/((b + c - e)(b + c + e)) at e = |d - a| and e = d + a.
     """
@@ -63,12 +63,12 @@ def _angle_at_B(reach: Reach, d: int, a: int) -> float:
 
 
 def speed_ratio(state: State) -> Array:
-    """omega_4/omega_2 = a sin(theta_2 - theta_3)/(c sin(theta_4 - theta_3)), (n,); NaN at a singular position."""
+    """Return omega_4/omega_2 = a sin(theta_2 - theta_3)/(c sin(theta_4 - theta_3)), (n,); NaN where singular."""
     return np.asarray(state.k.h4)
 
 
 def mechanical_advantage(state: State, radius_in: float = 1.0, radius_out: float = 1.0) -> Array:
-    """F_out/F_in = (omega_2/omega_4)(r_in/r_out) of a linkage without losses, (n,).
+    """Compute F_out/F_in = (omega_2/omega_4)(r_in/r_out) of a linkage without losses, (n,).
 
     The signed ratio of torques where the radii are equal; +-inf where the output stands still (bars
     2, 3 collinear), NaN at a singular position.
@@ -86,7 +86,7 @@ def mechanical_advantage(state: State, radius_in: float = 1.0, radius_out: float
 def distance_to_singular(
     linkage: FourBar, theta_2: Array, drive_bar: int = 2, branch: int | Array | None = None
 ) -> Array:
-    """Angle of the input to the nearest singular position, rad, in [0, pi], (n,); inf where there is none.
+    """Compute the angle of the input to the nearest singular position, rad, in [0, pi], (n,); inf where there is none.
 
     Singular are the limits of theta_2 and the change points (speeds are 0/0), and for a drive on bar 3
     or 4 its dead centres, where no torque on it holds the linkage. Error at most about

@@ -118,7 +118,7 @@ class Scene:
         return import_module("fourbar.show.notebook").show_scene(self)
 
     def _require_linear(self, drive: object) -> None:
-        """InputError where the drive is none along a line, acts on a bar too, or never moves its ends."""
+        """Raise InputError where the drive is none along a line, acts on a bar too, or never moves its ends."""
         from fourbar.effects.linear_drive import LinearDrive
 
         expect("drive", drive, LinearDrive)

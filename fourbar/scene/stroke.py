@@ -39,7 +39,7 @@ class Triangle(NamedTuple):
         return across
 
     def require(self, stroke: Array) -> None:
-        """InputError for a stroke that the cylinder cannot have."""
+        """Raise InputError for a stroke that the cylinder cannot have."""
         least, most = abs(self.length - self.reach), self.length + self.reach
         inside = (stroke >= least) & (stroke <= most)
         if not inside.all():
@@ -101,6 +101,6 @@ def find_round_off(
 
 
 def _reverse(point: "SpringEnd") -> Any:
-    """Half a turn for a point at a distance that is negative."""
+    """Return half a turn for a point at a distance that is negative."""
     forwards = 0.0 * point.distance  # of its kind
     return select(point.distance >= 0.0, forwards, np.pi + forwards + PI_LOW)

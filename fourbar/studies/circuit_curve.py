@@ -143,7 +143,7 @@ class CircuitCurve:
         return self.circuit.branches if self.full else (1,)
 
     def samples(self) -> Array:
-        """All rows at even places within the sweep, off the limits and change points, (n, 2)."""
+        """Sample all rows at even places within the sweep, off the limits and change points, (n, 2)."""
         tau = np.linspace(0.0, TURN, SAMPLES, endpoint=False) + 0.5 * TURN / SAMPLES
         points = np.concatenate([self.point(tau, branch) for branch in self.rows])
         return points[self.inside(points[:, 0], np.zeros(1))]
@@ -155,15 +155,15 @@ class CircuitCurve:
         return points[np.lexsort((tau, row))]
 
     def state(self, points: Array) -> State:
-        """Positions with their derivatives along the curve."""
+        """Compute positions with their derivatives along the curve."""
         return on_curve(self.lengths, self.theta_1, points[:, 0], points[:, 1])
 
     def force(self, points: Array) -> Array:
-        """Q of all but dry friction, by the curve's parameter."""
+        """Compute Q of all but dry friction, by the curve's parameter."""
         return np.broadcast_to(compute_generalised_force(self.scene, self.case.terms, self.state(points)), len(points))
 
     def slope(self, points: Array) -> Array:
-        """dQ/ds."""
+        """Compute dQ/ds."""
         k = self.state(points).k
         psi, mu = (Sloped(x, h[None]) for x, h in zip(points.T, (k.h2, k.h43), strict=True))
         Q = compute_generalised_force(self.scene, self.case.terms, on_curve(self.lengths, self.theta_1, psi, mu))
@@ -179,7 +179,7 @@ class CircuitCurve:
         return np.asarray(np.abs(self.force(points)) <= NOTHING * self.size(points))
 
     def in_rows(self, tau: Array, branch: Array) -> Array:
-        """Points of several rows."""
+        """Compute points of several rows."""
         points = np.empty((len(tau), 2))
         for row in self.rows:
             points[branch == row] = self.point(tau[branch == row], row)
@@ -237,7 +237,7 @@ def _less_turned(p: Number, q: Number, angle: Number) -> Number:
 
 
 def transmission(lengths: Loop, psi: Number) -> Number:
-    """theta_4 - theta_3 on the open branch, in [0, pi]; where the loop does not close, the end that is nearest.
+    """Compute theta_4 - theta_3 on the open branch, in [0, pi]; where the loop does not close, the end that is nearest.
 
     tan^2(mu/2) = (e^2 - (b - c)^2)/((b + c)^2 - e^2), the factors of Heron's formula.
     """

@@ -56,7 +56,7 @@ class Sensitivity:
     keys: dict[str, SceneNumber]
     """The p numbers by which they are derived, as in the scene file, pairs and lists by index."""
     numbers: Array
-    """Their values, (p,); of motion.theta_2 and of what a motion law varies NaN."""
+    """Values of the numbers, (p,); of motion.theta_2 and of what a motion law varies NaN."""
     status: list[str]
     """Status of each position, as in `Solution.status`; "at_rest": dry friction holds a pin, torque and pin forces have
     no derivative there. Quantities that a status other than ok concerns are NaN."""
@@ -64,7 +64,7 @@ class Sensitivity:
     """Derivatives by quantity, (p, n) or (p, n, 2)."""
 
     def of(self, quantity: str, key: str) -> Array:
-        """d(quantity)/d(key), (n,) or (n, 2); of a component F12_x or of a magnitude |F12| (n,).
+        """Return d(quantity)/d(key), (n,) or (n, 2); of a component F12_x or of a magnitude |F12| (n,).
 
         Raises InputError for a quantity or a key that is not known here.
         """
@@ -87,7 +87,7 @@ class Sensitivity:
         return values if quantity == name else split_parts(name, values)[quantity]
 
     def to_pandas(self) -> "DataFrame":
-        """One row for each number and position: its key, theta_2, status, and d(quantity)/d(key), SI and rad.
+        """Make a table, a row for each number and position: key, theta_2, status and d(quantity)/d(key), SI and rad.
 
         Raises DependencyError where pandas is not installed.
         """
@@ -241,7 +241,7 @@ def _seed(scene: Scene, keys: dict[str, SceneNumber]) -> Scene:
 
 
 def make_unit_slope(index: int, count: int) -> Sloped:
-    """Zero, with the slope 1 by one of the variables."""
+    """Return zero, with the slope 1 by one of the variables."""
     return Sloped(0.0, np.eye(count)[:, index : index + 1])
 
 

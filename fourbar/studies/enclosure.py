@@ -96,7 +96,7 @@ class Extremes(NamedTuple):
 
 
 def extremes(scene: Scene, quantities: Sequence[str] = ()) -> Extremes:
-    """Largest and smallest drive, pin forces and transmission angle over the input's whole interval, proven.
+    """Prove the largest and smallest drive, pin forces and transmission angle over the input's whole interval.
 
     At the scene's omega_2, alpha_2 and branch. Where the scene has tolerances the bounds hold for every linkage within
     them (three sigma of a normal one): `high` of the greatest and `low` of the least are then proven, and the other end
@@ -263,7 +263,7 @@ class _Search:
         return (reached, proven, theta_2) if sign > 0 else (-proven, -reached, theta_2)
 
     def _bound(self, scale: Any, over: Sloped, nominal: Sloped, index: int, radius: float) -> tuple[float, bool]:
-        """Above everything that a box holds, inf where it has no bound; and whether halving it would gain nothing."""
+        """Bound what a box holds from above, inf without a bound; the second is True if halving gains nothing."""
         slopes = np.broadcast_to(over.slopes, (1 + len(self.keys), len(over.values)))[:, index]
         reach = [radius, *(self.reach[key] for key in self.keys)]
         added = [scale * s * self.arb(0, r) for s, r in zip(slopes, reach, strict=True)]
@@ -291,7 +291,7 @@ def _above(ball: Any) -> float:
 
 
 def _centre(boxes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centres, and radii that reach both ends."""
+    """Return centres, and radii that reach both ends."""
     centre = boxes.mean(axis=1)
     return centre, np.nextafter(np.maximum(boxes[:, 1] - centre, centre - boxes[:, 0]), math.inf)
 
@@ -305,7 +305,7 @@ def _halve(ends: Any) -> list[tuple[float, float]]:
 
 
 def require_provable(scene: Scene) -> None:
-    """InputError for what has no proven extremes."""
+    """Raise InputError for what has no proven extremes."""
     motion = scene.motion
     require_input(scene, "the search for proven extremes")
     if motion.free is not None or motion.law is not None:
@@ -359,7 +359,7 @@ def _find_interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float
 
 
 def _require_assembly(scene: Scene, parts: tuple[tuple[float, float], ...]) -> None:
-    """LimitError with the share of the linkages within the tolerances that do not assemble over the whole interval.
+    """Raise LimitError with the share of the linkages within the tolerances that do not assemble everywhere.
 
     The diagonal from A to O4 is shortest and longest at the ends, and where the input lies along the ground's line.
     """

@@ -271,7 +271,7 @@ def _choose_boxes(curve: CircuitCurve, idle: Array) -> Callable[[Array, Array], 
 
 
 def _add_friction(curve: CircuitCurve, points: Array, side: int) -> Array:
-    """Q with what friction does against a motion that begins to one side; -inf or inf where it jams that motion."""
+    """Compute Q with the friction that opposes impending motion to one side; infinite where friction jams."""
     state, force = curve.state(points), np.empty(len(points))
     along = np.abs(state.k.h2) >= np.abs(state.k.h4)  # the torque that balances Q, on the bar that turns faster
     for bar, chosen in ((2, along), (4, ~along)):

@@ -82,7 +82,7 @@ class Tolerances:
     """Members with a number that no scene takes (a length below zero)."""
 
     def to_pandas(self) -> "DataFrame":
-        """One row for each quantity and position, SI and rad; the shares of the variance as columns "share of KEY".
+        """Make a table, a row for each quantity and position, SI and rad; shares of the variance as "share of KEY".
 
         Raises DependencyError where pandas is not installed.
         """
@@ -124,7 +124,7 @@ class Tolerances:
 def tolerances(
     scene: Scene, samples: int = SAMPLES, seed: int = 0, *, progress: Callable[[float], None] | None = None
 ) -> Tolerances:
-    """Spread of every quantity at each position, from quasi-random samples of the toleranced numbers.
+    """Compute the spread of every quantity at each position, from quasi-random samples of the toleranced numbers.
 
     With the samples come first-order figures, from s_i = d(quantity)/d(number i): the worst case sum |s_i| t_i and
     the shares (s_i sigma_i)^2 of the variance.
@@ -203,7 +203,7 @@ def _make_members(scene: Scene, samples: int, seed: int) -> Study:
 def _list_blocks(
     study: Study, scene: Scene, samples: int, closes: NDArray[np.bool_]
 ) -> Iterator[tuple[slice, NDArray[np.intp]]]:
-    """Blocks of positions, and their indices: after that at which the motion begins where an effect counts from it."""
+    """List blocks of positions with their indices; the start of the motion comes first if an effect counts from it."""
     n, first = study.at.angle.shape[1], int(np.argmax(closes))
     begins = [first] if scene.counts_turns else []
     size = max(1, AT_ONCE // samples)

@@ -204,7 +204,7 @@ def _shorten(value: Any) -> object:
 
 
 def _read_angles(scene: Scene, arrays: Mapping[str, Array], key: str) -> Array:
-    """Commanded angles of all members, (1, n) or (m, n)."""
+    """Return the commanded angles of all members, (1, n) or (m, n)."""
     motion = scene.motion
     if key in arrays:
         if motion.law is not None:

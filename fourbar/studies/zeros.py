@@ -148,7 +148,7 @@ class _Newton:
         return any(value.is_finite() and not value.contains(0) for value in (moved, self.over[i]))
 
     def step(self, i: int) -> tuple[Any, Any] | None:
-        """Newton's step from the centre; None where the determinant may vanish."""
+        """Return Newton's step from the centre; None where the determinant may vanish."""
         det = self.det[i]
         if not det.is_finite() or det.contains(0):
             return None
@@ -183,7 +183,7 @@ def _wrap(angle: Any) -> Any:
 
 
 def _separate(points: Array) -> Array:
-    """One of each group of neighbouring points: its middle."""
+    """Return the middle of each group of neighbouring points."""
     groups: list[list[Array]] = []
     for point in points:
         near = [g for g in groups if any((np.abs(_wrap(point - member)) < 8.0 * FINEST).all() for member in g)]
