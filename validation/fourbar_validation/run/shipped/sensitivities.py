@@ -172,12 +172,12 @@ class Expected(NamedTuple):
 
     deviation: Array
     """Standard deviation, by cubature over the linkages themselves."""
-    skew: Array
-    """Distance of the cubature's mean from the nominal value."""
     first_order: Array
     worst: Array
+    bent: Array
+    """Relative difference of cubature and first order: of their deviations, or the square of the skewness."""
     low: Array
-    """Percentiles of the first order, from the nominal value."""
+    """Percentiles of the first order, from the nominal value; NaN where the quantity is not straight."""
     high: Array
 
 
@@ -212,32 +212,29 @@ def _compute_expected(scene: Scene) -> dict[str, Expected]:
     drawn = [
         rng.normal(size=DRAWN) if tolerance.sigma else rng.uniform(-1.0, 1.0, DRAWN) for tolerance in scene.tolerances
     ]
+    samples = np.array(drawn).T
+    widths = np.array([[tolerance.width] for tolerance in scene.tolerances])
+    variances = np.array([[1.0 if tolerance.sigma else 1.0 / 3.0] for tolerance in scene.tolerances])
+    reaches = widths * np.array([[3.0 if tolerance.sigma else 1.0] for tolerance in scene.tolerances])
     expected = {}
     for part in nominal:
-        values, slope = (
-            np.array([values_of[part] for values_of in off]),
-            np.array([values_of[part] for values_of in slopes]),
-        )
+        values, slope = (np.array([member[part] for member in members]) for members in (off, slopes))
         mean = (w * values).sum(axis=0)
-        widths = np.array([[tolerance.width] for tolerance in scene.tolerances])
-        variances = np.array([[1.0 if tolerance.sigma else 1.0 / 3.0] for tolerance in scene.tolerances])
-        reaches = widths * np.array([[3.0 if tolerance.sigma else 1.0] for tolerance in scene.tolerances])
-        low, high = np.percentile(np.array(drawn).T @ (slope * widths), (1.0, 99.0), axis=0)
-        expected[part] = Expected(
-            np.sqrt((w * (values - mean) ** 2).sum(axis=0)),
-            np.abs(mean),
-            np.sqrt((variances * (slope * widths) ** 2).sum(axis=0)),
-            np.abs(slope * reaches).sum(axis=0),
-            low,
-            high,
-        )
+        deviation = np.sqrt((w * (values - mean) ** 2).sum(axis=0))
+        first_order = np.sqrt((variances * (slope * widths) ** 2).sum(axis=0))
+        bent = divide(np.abs(deviation - first_order), deviation)
+        bent = np.maximum(bent, divide(np.abs(mean), deviation) ** 2)
+        percentiles, straight = np.full((2, len(mean)), np.nan), bent <= STRAIGHT
+        if straight.any():
+            percentiles[:, straight] = np.percentile(samples @ (slope * widths)[:, straight], (1.0, 99.0), axis=0)
+        worst = np.abs(slope * reaches).sum(axis=0)
+        expected[part] = Expected(deviation, first_order, worst, bent, *percentiles)
     return expected
 
 
 def _compute_off(spread: Spread, expected: Expected, slight: float) -> Array:
     """Compute by what part the figures of a spread are off, (n,)."""
-    bent = divide(np.abs(expected.deviation - expected.first_order), expected.deviation)
-    bent = np.maximum(bent, divide(expected.skew, expected.deviation) ** 2)
+    bent = expected.bent
     every, near, straight = bent >= 0.0, bent <= NEARLY_STRAIGHT, bent <= STRAIGHT
     pairs = [
         (spread.worst, expected.worst, expected.worst, 1.0, every),
