@@ -112,7 +112,7 @@ def solve(
             arrays, evaluated = make_arrays(names, shape, out), None
             blocks = _list_members(study, wanted, side) if study else _list_blocks(scene, commanded, wanted, side)
             for part, case, block in blocks:
-                # what a block found is freed when the next has its own: else its memory goes back to the system
+                # kept until the next block is evaluated, so that its memory is used again
                 evaluated = evaluate(case, block, wanted, names)
                 _store_block(case, evaluated, arrays, code, part)
     unwrap_angles(arrays, commanded.bar)

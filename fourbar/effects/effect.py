@@ -182,7 +182,7 @@ class Actions:
             M[bar - 2] = M[bar - 2] + moment
         for pin, couple in self.couples.items():
             i, j = PINS[pin]
-            if pin != "B":  # which has a place of its own
+            if pin != "B":  # its couple is a field of the wrenches
                 M[j - 2] = M[j - 2] + couple
                 if i != 1:
                     M[i - 2] = M[i - 2] - couple

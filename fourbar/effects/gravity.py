@@ -33,7 +33,7 @@ class Gravity(Effect):
     def field(self) -> Any:
         """g_x + i g_y, m/s^2; a component that the angle as a double cannot tell from zero is zero."""
         u = polar(1.0, self.angle)
-        # it may be differentiated by the angle; in longer numbers the component is what the error bar shows
+        # derivatives by the angle need the small component, and so does the error bar in longer numbers
         if namespace(u) is not np or shorten(self.angle) is not self.angle:
             return self.magnitude * u
         return self.magnitude * vector(u.real * (abs(u.real) > U), u.imag * (abs(u.imag) > U))

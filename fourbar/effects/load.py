@@ -66,7 +66,7 @@ class Table:
         if xp is np:
             place = self._require_covered(place)
             k = np.clip(np.searchsorted(np.array(self.theta_2), place, "right") - 1, 0, len(self.theta_2) - 2)
-        else:  # what no library lacks, under no transformation of its own
+        else:  # operations that every array library has
             k = xp.sum(xp.astype(place[..., None] >= points[1:-1], xp.int32), axis=-1)[None]
         pieces = (points[:-1], points[1:] - points[:-1], factors[:-1], factors[1:] - factors[:-1])
         start, width, before, rise = (piece[k] if xp is np else piece[k][0] for piece in pieces)

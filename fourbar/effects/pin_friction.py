@@ -189,7 +189,7 @@ def solve_sliding(F: Array, C: Array, k: Array) -> Sliding:
             first = some[first]
             x[some], count[some] = (array[same.ravel()] for array in _search(F[first], C[first], k[first]))
     with np.errstate(invalid="ignore"):
-        for _ in range(2):  # takes back the rounding of the search and of the quadratic
+        for _ in range(2):  # removes the rounding of the search and of the quadratic
             right, slope = _compute_right_side(F, C, k, x)
             x = x + compute_step(right - x, slope)
         _, slope = _compute_right_side(F, C, k, x)
@@ -206,7 +206,7 @@ def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.ui
     a = (c2 - 1.0) * (c2 + 1.0)
     b = k * k * (F[:, 0] * C[:, 0] + F[:, 1] * C[:, 1])
     c = (k * k) * (F[:, 0] * F[:, 0] + F[:, 1] * F[:, 1])
-    # b^2 - a c as k^2 |F|^2 - k^4 (F x C)^2: nothing cancels where there is no jam
+    # b^2 - a c written as k^2 |F|^2 - k^4 (F x C)^2, which cancels only near jamming
     turned = k * k * (F[:, 0] * C[:, 1] - F[:, 1] * C[:, 0])
     under = c - turned * turned
     root = np.sqrt(under)
@@ -249,7 +249,7 @@ def _iterate(F: Array, C: Array, k: Array, x: Array) -> Array:
         plain_gap = np.abs(_compute_right_side(F, C, k, right)[0] - right).max(axis=1)
         newton_gap = np.abs(_compute_right_side(F, C, k, newton)[0] - newton).max(axis=1)
         new = np.where((newton_gap < plain_gap)[:, None], newton, right)
-        new = np.where(done[:, None], x, new)  # what others need changes no digit of this one
+        new = np.where(done[:, None], x, new)  # solved problems keep their digits while others go on
         done |= np.abs(new - x).max(axis=1, initial=0.0) <= ROUNDING * new.max(axis=1, initial=0.0)
         x = new
         if done.all():

@@ -65,7 +65,7 @@ class SpringEnd(NamedTuple):
         arm = self.of(state)
         if pin != SECOND_PIN[self.bar]:
             return arm, self.distance * self.distance
-        half = sine_of(0.5 * self.angle)  # r cos phi - L beside the pin, where the cosine is 1 in any digits
+        half = sine_of(0.5 * self.angle)  # r cos phi - L near the pin, where the cosine rounds to 1
         arm = vector((self.distance - state.lengths[self.bar - 1]) - 2.0 * self.distance * half * half, arm.imag)
         return arm, dot(arm, arm)
 
@@ -206,6 +206,4 @@ def _divide_by_distance(spring: Spring, across: Any) -> Any:
     """Compute tension over distance, N/m."""
     if not is_any(spring.slack != 0.0):
         return spring.stiffness
-    return spring.stiffness + spring.slack / namespace(across).abs(
-        across
-    )  # at a distance of 0 no number, which the status says
+    return spring.stiffness + spring.slack / namespace(across).abs(across)  # NaN at a distance of 0; the status says so

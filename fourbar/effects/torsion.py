@@ -96,7 +96,7 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     """
     bar, theta_1, theta_2 = state.bar, state.theta_1, state.theta_2 if state.q is None else state.q
     d, a, *_ = reorder_lengths(bar, state.lengths[:4])
-    turned = math.pi if bar == 4 else 0.0  # of the ground, and with it of the coupler
+    turned = math.pi if bar == 4 else 0.0  # turn of the ground, and of the coupler with it
     u2, u3, u4 = (state.direction(role) for role in ROLES[bar])
     theta_3, theta_4 = np.angle(u3) + turned, np.angle(u4)
     theta_1 = theta_1 + turned

@@ -93,7 +93,7 @@ class Case(NamedTuple):
         linkage, terms, drive = change_numbers((self.linkage, self.terms, self.drive), lengthen)
         d, a, b, c = linkage.lengths
         path = prepare_path(Loop(d, a, b, c, 0.0, 0.0), linkage.ground_angle, self.path.bar)
-        kept: Any = {  # a change point that is met, as a free motion does where the lengths miss it by rounding
+        kept: Any = {  # a free motion meets a change point that the lengths miss by rounding
             name: select(getattr(self.path.lengths, name) == 0.0, 0.0, getattr(path.lengths, name))
             for name in ("E1", "E2")
         }
@@ -172,7 +172,7 @@ class Case(NamedTuple):
         close: Any = remainder is not None
         if remainder is None:
             for factor, constant in ((half.outer, lengths.E1), (half.inner, lengths.E2)):
-                if is_any(constant < 0.0):  # else it is a sum of two positive terms
+                if is_any(constant < 0.0):  # otherwise both terms are positive and nothing cancels
                     close = close | find_undecided(factor, constant, 4.0 * lengths.a * lengths.d)
         if not is_any(close):
             return half, NO_POSITIONS
@@ -289,7 +289,7 @@ class _FreeBodies(NamedTuple):
         if left_out == 4:
             moment = -(actions.about_B() + inertia.about_B)
         elif left_out == 2 and is_any(lengths.d < lengths.a):
-            moment = (actions.work()[1] - inertia.of_others) / self.state.k.h2  # of bars 3 and 4 over the turn of bar 2
+            moment = (actions.work()[1] - inertia.of_others) / self.state.k.h2  # virtual work of bars 3 and 4
         wrenches = actions.wrenches(inertia.wrenches)
         pins = pin_forces(lengths, at, left_out, self.sines[left_out], wrenches, inertia.mass_at_A, moment)
         return actions.at_pins(pins)

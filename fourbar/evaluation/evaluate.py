@@ -99,7 +99,7 @@ def _compute_codes(sine: Any, half: HalfAngle, command: Command | None, unit: fl
     if not np.min(size, initial=np.inf) > margin:  # NaN where the loop does not close
         codes[size <= margin] = SINGULAR
         codes[np.isnan(sine)] = NOT_ASSEMBLED
-        codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1: not even where it closes is known
+        codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1, so that nothing is known of the loop
     return codes
 
 

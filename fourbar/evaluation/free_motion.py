@@ -154,7 +154,7 @@ class _Reading:
         half = self.path.half_angle(q)
         try:
             return self._by(q, _make_plain(half), branch)
-        except ZeroDivisionError:  # numpy's numbers have a value there, infinite or none
+        except ZeroDivisionError:  # NumPy's numbers give inf or NaN instead
             return self._by(q, half, branch)
 
     def _by(self, q: float, half: HalfAngle, branch: float) -> tuple[Position, Coefficients]:
@@ -223,7 +223,7 @@ class _Run:
         self.bodies: tuple[Body, Body, Body] = two, three, four
         self.readings = {each: _Reading(linkage, each) for each in (2, 4)}
         self.reading = self.readings[bar] if bar != 3 else _Reading(linkage, 3)
-        # the sign of the path is that of the branch just after the start, should that be a change point
+        # at a change point the branch just after the start decides the sign of the path
         ahead = theta + math.copysign(1e-8, omega)
         for near in (theta, ahead, 2.0 * theta - ahead):
             sine = _compute_sines(self.reading.at(near)[0])[bar]
@@ -238,8 +238,8 @@ class _Run:
         if not float(self._compute_inertia(at, k)) > 0.0:
             raise FourBarError("nothing that moves has inertia: the free motion is undetermined")
         self._change_over()
-        self.side = 0.0  # the sense of motion, where dry friction tells the two apart
-        self.holding = 0.0  # at a standstill, the part of its torque that dry friction takes at every pin
+        self.side = 0.0  # sense of motion if dry friction depends on it
+        self.holding = 0.0  # fraction of its torque with which dry friction holds at a standstill
         ahead, back = self._try_both_senses()
         self.dry = ahead != back
         self.start_energy = self._compute_kinetic_energy()
@@ -271,18 +271,18 @@ class _Run:
     def _compute_rates(self, _: float, y: Array) -> list[float]:
         q, rate = float(y[0]), float(y[1])
         at, k = self.reading.at(q)
-        # beyond a standstill friction keeps its sense, until the step is cut there
+        # friction keeps its sense beyond a standstill, at which the step is then cut
         moving = self.side * max(self.side * rate, VANISHING) if self.side else rate
         Q = self._compute_generalised_force(q, at, k, moving)
         slope = half_slope(self.lengths.a, self.bodies, at, k)
-        # numpy's division: no error where the inertia vanishes
+        # NumPy's division raises no error where the inertia vanishes
         return [rate, float(np.float64(Q - slope * rate * rate) / self._compute_inertia(at, k)), Q * rate]
 
     def _change_over(self) -> bool:
         """Take the other angle where it is further from its limit; keeps position, velocity and work."""
         at, k = self._at()
         sines, bar = _compute_sines(at), 6 - self.reading.bar
-        if self.reading.bar == 3:  # of the start alone
+        if self.reading.bar == 3:  # only at the start
             bar = max((2, 4), key=lambda number: abs(sines[number]))
         elif abs(sines[self.reading.bar]) >= CHANGE_OVER * abs(sines[bar]):
             return False
@@ -351,7 +351,7 @@ class _Run:
             if rested:
                 t = _find_root(dense, lambda y: float(y[1]), solver.t_old, t)
                 new = np.array([dense(t)[0], 0.0, dense(t)[2]])
-            if not self.follow and self.branch * self._compute_sine(new) < 0.0:  # through their common line
+            if not self.follow and self.branch * self._compute_sine(new) < 0.0:  # bars 3, 4 were in line
                 self.stopped_at = t = _find_root(dense, self._compute_sine, solver.t_old, t)
                 new = dense(t)
             self._report(t, dense)

@@ -78,7 +78,7 @@ class Path(NamedTuple):
         u2 = vector(half.kk - half.ss, 2.0 * half.sk) if along else direction(q)
         if along and self.bar == 4:
             u2 = -u2
-        if along and is_any(turned := self.theta_1 != 0.0):  # of linkages
+        if along and is_any(turned := self.theta_1 != 0.0):  # many linkages, some on level ground
             u2 = select(turned, direction(q), u2)
         at = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
@@ -123,7 +123,7 @@ class Path(NamedTuple):
         else:
             u1, u2, u3, u4, a = -at.u1, at.u4, -at.u3, at.u2, c
         diagonal = (d * self.unit) * u1 - (a * self.unit) * u2
-        # a root that is withheld, for speeds that are 0/0, is that of the sine
+        # the root is NaN where speeds are 0/0; the sine still has its value
         closed = at._replace(root=at.sin_mu * (2.0 * self.lengths.b * self.lengths.c))
         return Position(u1, u2, u3, u4, self.drive_sine(closed, 2), diagonal, at.e2, at.root, at.half)
 
@@ -135,11 +135,11 @@ class Path(NamedTuple):
         if role == 2:
             return at.sin_mu if self.bar == 2 else at.root * (0.5 / (self.lengths.b * self.lengths.c))
         sine = drive_sine_of_triangle(self.lengths, at, role)
-        if self.may_stay_parallel:  # with the sine of the angle that all of them make
+        if self.may_stay_parallel:  # all bars make one angle, whose sine is exact
             first, second = find_parallel_pairs(self.lengths, at.half, sign(at.root))
             with_first, with_second = (0.0, 2.0 * at.half.sk) if role == 3 else (-2.0 * at.half.sk, 0.0)
             sine = select(first, with_first, select(second, with_second, sine))
-        return -sine if self.bar + drive_bar == 7 else sine  # there the two bars have changed places
+        return -sine if self.bar + drive_bar == 7 else sine  # the two bars have changed places
 
 
 def prepare_path(lengths: Loop, theta_1: Number, bar: int = 2) -> Path:

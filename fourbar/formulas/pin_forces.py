@@ -134,7 +134,7 @@ def pin_forces(
     d, a, b, c, _, _ = lengths
     R2, R3, R4, M2, M3, M4, C = w
     of_3 = M3 - C
-    along, across = mass_at_A.real, mass_at_A.imag  # bar 2: apart, for each would cancel in a sum that it is no part of
+    along, across = mass_at_A.real, mass_at_A.imag  # bar 2; separate, because a sum of both loses digits
     if drive_bar == 4:
         F32 = solve_between(-M2 / a, moment_of_F32 / b, at.u2, at.u3, sine)
         F43 = solve_between(-of_3 / b, -M2 / a - cross(at.u2, R3) - across, at.u3, at.u2, -sine)
@@ -142,12 +142,12 @@ def pin_forces(
         of_4 = M4 + C
         F43 = solve_between(-M2 / a - cross(at.u2, R3) - across, of_4 / c, at.u2, at.u4, sine)
         F32 = solve_between(-M2 / a - across, of_4 / c + cross(at.u4, R3), at.u2, at.u4, sine)
-        F32 = (dot(at.u2, F32) + along - 1j * (M2 / a)) * at.u2  # across bar 2 its own moment knows it best
+        F32 = (dot(at.u2, F32) + along - 1j * (M2 / a)) * at.u2  # the moment on bar 2 gives the component across it
     else:
         k = 1.0 / (c * sine)
         F43 = (of_3 * k * (1.0 / b)) * at.diagonal - ((M3 + M4) * k) * at.u3
         F32 = R3 + F43 + mass_at_A * at.u2
         short = d < a
-        if is_any(short):  # all bars turn as one, and the sum loses the small component across bar 2
+        if is_any(short):  # the bars turn together; the sum loses the small component across bar 2
             F32 = F32 + select(short, moment_of_F32 / a - cross(at.u2, F32), 0.0) * 1j * at.u2
     return PinForces(-1.0 * (R2 + F32), F32, F43, F43 - R4)  # NumPy negates complex numbers slowly

@@ -128,7 +128,7 @@ def compute_factors(lengths: Loop, ss: Number, kk: Number, sk: Number) -> HalfAn
     four_ad, four_bc = 4.0 * lengths.a * lengths.d, 4.0 * lengths.b * lengths.c
     outer, inner = lengths.E1 + four_ad * kk, lengths.E2 + four_ad * ss
     short = four_ad > four_bc
-    if is_any(short):  # outer + inner = 4 b c: of the two, the one that changes less over psi has the digits
+    if is_any(short):  # outer + inner = 4 b c: the smaller change over psi keeps the digits
         outer, inner = (
             select(short & (ss < kk), four_bc - inner, outer),
             select(short & (kk <= ss), four_bc - outer, inner),
@@ -166,7 +166,7 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     root = branch * square_root(half.outer * half.inner)
     twice_a = 2.0 * a * unit
     diagonal = vector((d - a) * unit + twice_a * half.ss, -twice_a * half.sk) * u1
-    # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 from the factor that the root is made of, so that u3, u4 keep their length
+    # e^2 + b^2 - c^2 and b^2 - e^2 - c^2 use the factor in the root, so that u3 and u4 keep their length
     at_A, at_O4 = half.inner + 2.0 * b * (b - c), 2.0 * c * (b - c) - half.inner
     part = (0.5 / unit) / e2
     to_3, to_4 = (1.0 / b) * part, (1.0 / c) * part

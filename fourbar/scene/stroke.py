@@ -79,7 +79,7 @@ def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
         drives = "no cylinder" if drive is None else f"one from bar {drive.start.bar} to bar {drive.end.bar}"
         raise InputError("motion.stroke", drives, "is of a cylinder ([drive]) between the ground and bar 2 or 4")
     moving, fixed = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
-    if moving.bar == 2:  # the ground's points are polar about its pin
+    if moving.bar == 2:  # points of the ground are polar about O2
         reach, towards = abs(fixed.distance), fixed.angle + linkage.ground_angle + _reverse(fixed)
     else:
         end = polar(fixed.distance, fixed.angle + linkage.ground_angle)
@@ -102,5 +102,5 @@ def find_round_off(
 
 def _reverse(point: "SpringEnd") -> Any:
     """Return half a turn for a point at a distance that is negative."""
-    forwards = 0.0 * point.distance  # of its kind
+    forwards = 0.0 * point.distance  # zero of the same kind of number
     return select(point.distance >= 0.0, forwards, np.pi + forwards + PI_LOW)

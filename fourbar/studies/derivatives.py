@@ -189,7 +189,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
     status = np.array(STATUS_NAMES, dtype="<U16")[solution.status_code]
     with np.errstate(all="ignore"):
         _, decided = Case.of(scene, commanded.bar).half_angle(commanded.angle, None)
-        status[decided] = STATUS_NAMES[SINGULAR]  # on a limit: so near that doubles cannot tell the factors from zero
+        status[decided] = STATUS_NAMES[SINGULAR]  # doubles cannot tell the factors from zero
         regular = np.flatnonzero(~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)]))
         seeded = _seed(scene, keys)
         for start in range(0, len(regular), AT_ONCE):

@@ -171,7 +171,7 @@ def _describe(
 def _find_sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
     """Find the zeros between samples at which Q changes its sign."""
     idle = curve.level(points)
-    points = points[~idle | np.roll(idle, 1) | np.roll(idle, -1)]  # but for a zero that falls on a sample
+    points = points[~idle | np.roll(idle, 1) | np.roll(idle, -1)]  # a zero may fall on a sample
     tau, row = curve.tau(points)
     Q, size, one, idle = curve.force(points), curve.size(points), np.arange(len(points)), curve.level(points)
     following = np.concatenate([np.roll(one[row == number], -1) for number in range(len(curve.rows))])
@@ -185,7 +185,7 @@ def _find_sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
         low, high = np.where(before, middle, low), np.where(before, high, middle)
     zeros = curve.in_rows(high, branch)
     real = np.abs(curve.force(zeros)) <= A_JUMP * size[between]
-    for point in curve.singular:  # where Q vanishes because nothing moves
+    for point in curve.singular:  # nothing moves there, so that Q vanishes
         real &= ~(np.abs(np.sin(0.5 * (zeros - point))) < AT_CHANGE_POINT).all(axis=1)
     zeros = zeros[real]
     level = np.abs(curve.slope(zeros)) <= A_JUMP * curve.size(zeros)

@@ -89,7 +89,7 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
     def solve_for(*values: Any) -> dict[str, Any]:
         numbers = _check_given(keys, values, shape)
         alone = numbers.xp is np and numbers.zero.shape == ()
-        if alone:  # as arrays, for a number of Python's own is not divided by 0
+        if alone:  # arrays of one entry, because Python's numbers raise on division by 0
             numbers = _check_given(keys, [np.atleast_1d(value) for value in numbers.values.values()], shape)
         with np.errstate(all="ignore"):
             changed, q, holds = _replace_given(scene, entries, numbers)
@@ -170,7 +170,7 @@ def _evaluate(
         power = xp.where(xp.isfinite(done.drive), done.work * speed, xp.nan)
         forces = {**done.pins._asdict(), case.names.value: done.drive, "power": power}
         lever = case.drive_condition(state)
-        held = lever > NO_DIGIT_LEFT * given.eps  # what is 0 for `solve` compilers and other libraries round
+        held = lever > NO_DIGIT_LEFT * given.eps  # compilers and other libraries round what is exactly 0 in `solve`
         quantities |= {name: xp.where(held, force, xp.nan) for name, force in forces.items()} | {
             "drive_condition": lever
         }

@@ -126,7 +126,7 @@ class _Beam(NamedTuple):
         places, moments = [feet, feet], [self.at(feet)[2], self.at(feet, before=True)[2]]
         if self.density > 0.0:
             across, bend = self.pull.imag[:, None], 0.5 * self.alpha[:, None]
-            single = self.at(feet)[1] / self.density + feet * (across + bend * feet)  # of the forces at feet alone
+            single = self.at(feet)[1] / self.density + feet * (across + bend * feet)  # forces at feet only
             roots = _solve_quadratic(bend, across, -single)
             after = np.concatenate([feet[:, 1:], feet[:, -1:]], axis=1)
             for root in roots:

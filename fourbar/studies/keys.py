@@ -189,7 +189,7 @@ def replace_place(holder: Any, place: Place, values: Any) -> Any:
     if isinstance(name, int):
         parts = [replace_place(part, tuple(rest), values) if i == name else part for i, part in enumerate(holder)]
         return tuple(parts)
-    if isinstance(holder, tuple):  # a named one
+    if isinstance(holder, tuple):  # a named tuple
         tuple_of_names: Any = holder
         return tuple_of_names._replace(**{name: replace_place(getattr(tuple_of_names, name), tuple(rest), values)})
     old = getattr(holder, name)

@@ -200,7 +200,7 @@ _hull = np.frompyfunc(_unite, 2, 1)
 
 
 def _choose_where(mask: Any, x: Any, y: Any) -> Sloped:
-    if isinstance(mask, Undecided):  # there it may jump
+    if isinstance(mask, Undecided):  # the function may jump
         return mask._choose(x, y, math.nan)
     return Sloped(np.where(mask, take_values(x), take_values(y)), np.where(mask, take_slopes(x), take_slopes(y)))
 

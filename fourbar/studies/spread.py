@@ -228,7 +228,7 @@ def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
 def _fill(spread: Spread, columns: slice, sampled: Array) -> None:
     """Fill in the samples' figures at some positions; where not all members have a value, those of the others."""
     if np.isfinite(sampled).all():
-        # of the differences: the sum of many equal numbers is rounded, and so would be their mean
+        # standard deviation of differences: a mean of equal numbers is rounded
         spread.deviation[columns] = (sampled - np.nan_to_num(spread.nominal[columns])).std(axis=0)
         spread.low[columns], spread.high[columns] = np.percentile(sampled, BAND, axis=0)
         spread.least[columns], spread.greatest[columns] = sampled.min(axis=0), sampled.max(axis=0)

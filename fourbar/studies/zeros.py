@@ -75,7 +75,7 @@ def find_zeros(
     grid = np.meshgrid(*(0.5 * (x[1:] + x[:-1]) for x in ends), indexing="ij")
     centres = np.stack([x.ravel() for x in grid], axis=1)
     radii = np.broadcast_to([0.5 * (x[1] - x[0]) * (1.0 + MARGIN) for x in ends], centres.shape)
-    solved: list[tuple[Array, Array, Array]] = []  # the zero, and centre and radius of where it is alone
+    solved: list[tuple[Array, Array, Array]] = []  # zero, and centre and radius of the box in which it is the only one
     undecided: list[Array] = []
     evaluated = 0
     while len(centres):
