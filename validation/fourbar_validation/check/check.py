@@ -86,16 +86,16 @@ def judge_table(scene: Scene, table: TheirTable, tolerance: Allowance | None = N
     """
     judge = Judge(scene, table, tolerance)
     findings = judge.findings()
-    result = {finding.quantity for finding in findings if finding.judged and not finding.agrees}
-    differing = sorted(key for key in table.values if table.label(key) in result)
-    known = explain(judge, differing) if differing else []
-    return Judgement(findings, judge.without_answer(), known, tolerance)
+    differing_quantities = {finding.quantity for finding in findings if finding.judged and not finding.agrees}
+    differing = sorted(key for key in table.values if table.label(key) in differing_quantities)
+    explanations = explain(judge, differing) if differing else []
+    return Judgement(findings, judge.without_answer(), explanations, tolerance)
 
 
 def write_json(judgement: Judgement, table: TheirTable) -> str:
     """Return one object in SI: the counts, every number that differs with theirs and ours, and what explains it."""
     tolerance = judgement.tolerance
-    result = {
+    document = {
         "schema": 1,
         "verdict": judgement.sentence(),
         "holds": judgement.status == 0,
@@ -112,7 +112,7 @@ def write_json(judgement: Judgement, table: TheirTable) -> str:
         ],
         "explanations": [asdict(explanation) for explanation in judgement.explanations],
     }
-    return json.dumps(result, indent=1, allow_nan=False) + "\n"
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
 def write_junit(judgement: Judgement, name: str) -> str:

@@ -63,14 +63,14 @@ def find_differences(generated: Mapping[str, ModelEntry], theirs: Mapping[str, M
     length = max(float(entry.value) for key, entry in generated.items() if _is_length(key))  # type: ignore[arg-type]
     differences = []
     for key in [*theirs, *(key for key in generated if key not in theirs)]:
-        ours, other = generated.get(key), theirs.get(key)
-        if (ours is None or other is None) and not (key.startswith(ONE_SIDED) or key.endswith(".motor")):
+        ours, yours_entry = generated.get(key), theirs.get(key)
+        if (ours is None or yours_entry is None) and not (key.startswith(ONE_SIDED) or key.endswith(".motor")):
             continue  # what one of the files has no use for, such as the solver parameters of no friction
         nothing = next((value for end, value in NOTHING.items() if key.endswith(end)), None)
-        mine, yours = (nothing if entry is None else entry.value for entry in (ours, other))
+        mine, yours = (nothing if entry is None else entry.value for entry in (ours, yours_entry))
         if _is_same(key, mine, yours, length):
             continue
-        written = f"{other.element} {other.attribute}".strip() if other is not None else ""
+        written = f"{yours_entry.element} {yours_entry.attribute}".strip() if yours_entry is not None else ""
         differences.append(Difference(key, mine, yours, _remark(key, mine, yours), written))
     return differences
 

@@ -67,19 +67,19 @@ def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     """Columns that are one number times ours: a unit, by name where a pair of units has that ratio."""
     by_ratio: dict[tuple[str, float], set[str]] = {}
     for key in differing:
-        where = judge.where(key)
-        ours, theirs = judge.ours(key)[where], judge.table.values[key][where]
-        there = np.isfinite(theirs)
-        ours, theirs = ours[there], theirs[there]
-        if not where.any() or not (squares := float(ours @ ours)):
+        mask = judge.where(key)
+        ours, theirs = judge.ours(key)[mask], judge.table.values[key][mask]
+        stated = np.isfinite(theirs)
+        ours, theirs = ours[stated], theirs[stated]
+        if not mask.any() or not (squares := float(ours @ ours)):
             continue
         announced, unit = judge.table.units[key], UNITS[name_quantity(key)]
         near = float(ours @ theirs) / squares
-        named = _name_ratio(judge, key, announced.text, announced.factor, unit, near)
-        if named is None and np.count_nonzero(ours) >= ENOUGH and near:
-            named = _round_ratio(judge, key, near)
-        if named is not None:
-            group = next((g for g in by_ratio if g[0] == named[0]), named)
+        ratio_found = _name_ratio(judge, key, announced.text, announced.factor, unit, near)
+        if ratio_found is None and np.count_nonzero(ours) >= ENOUGH and near:
+            ratio_found = _round_ratio(judge, key, near)
+        if ratio_found is not None:
+            group = next((g for g in by_ratio if g[0] == ratio_found[0]), ratio_found)
             by_ratio.setdefault(group, set()).add(name_quantity(key))
     for (text, ratio), quantities in by_ratio.items():
         yield Mistake(
@@ -95,11 +95,14 @@ def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
 def _name_ratio(
     judge: Judge, key: str, announced: str, factor: float, unit: str, near: float
 ) -> tuple[str, float] | None:
-    for other in OTHER_UNITS.get(unit, ()):
-        ratio = math.copysign(factor / find_factor(unit, other), near)
+    for unit_tried in OTHER_UNITS.get(unit, ()):
+        ratio = math.copysign(factor / find_factor(unit, unit_tried), near)
         if abs(near / ratio - 1.0) < PLAIN and abs(ratio) != 1.0 and judge.explained(key, ratio * judge.ours(key)):
             reversed_too = ", and reversed" if near < 0.0 else ""
-            return f"units: numbers in {other} where {announced} was announced ({ratio:.6g} times){reversed_too}", ratio
+            return (
+                f"units: numbers in {unit_tried} where {announced} was announced ({ratio:.6g} times){reversed_too}",
+                ratio,
+            )
     return None
 
 
@@ -117,21 +120,21 @@ def _round_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | Non
 
 def _try_exchanged(differing: list[str]) -> Iterator[Mistake]:
     """Two columns of one unit, each under the name of the other."""
-    for one, other in combinations(dict.fromkeys(map(name_quantity, differing)), 2):
-        if UNITS[one] == UNITS[other] and (one in VECTORS) == (other in VECTORS):
-            taken = {one: other, other: one}
+    for one, second in combinations(dict.fromkeys(map(name_quantity, differing)), 2):
+        if UNITS[one] == UNITS[second] and (one in VECTORS) == (second in VECTORS):
+            taken = {one: second, second: one}
             yield Mistake(
-                f"the columns {one} and {other} are exchanged",
+                f"the columns {one} and {second} are exchanged",
                 lambda quantity, right, taken=taken: getattr(right, taken.get(quantity, ""), None),  # type: ignore[misc]
                 whole=False,
             )
 
 
-def _compute_residual(judge: Judge, key: str, one: Array, other: Array) -> Array:
+def _compute_residual(judge: Judge, key: str, one: Array, base: Array) -> Array:
     scale = judge.size(key)
-    where = judge.where(key) & (scale > 0.0)
-    scaled = (one[where] - other[where]) / (scale[where][:, None] if one.ndim == 2 else scale[where])
-    stated = np.isfinite(judge.table.values[key][where])
+    mask = judge.where(key) & (scale > 0.0)
+    scaled = (one[mask] - base[mask]) / (scale[mask][:, None] if one.ndim == 2 else scale[mask])
+    stated = np.isfinite(judge.table.values[key][mask])
     return np.asarray(np.where(stated, scaled, 0.0)).ravel()
 
 
@@ -148,7 +151,10 @@ def _try_factors(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
     mass = ("mass", lambda bar, f: replace(bar, mass=f * bar.mass))
     of_bars = [
         (f"{which[0] if len(which) == 1 else 'every bar'}: {word}", word, partial(_scale_bars, scene, which, change))
-        for which, (word, change) in (*(((bar,), each) for bar in bars for each in (inertia, mass)), (bars, inertia))
+        for which, (word, change) in (
+            *(((bar,), property_) for bar in bars for property_ in (inertia, mass)),
+            (bars, inertia),
+        )
     ]
     of_loads = [
         (f"load {number} (bar {load.bar})", "load", partial(_scale_load, scene, load))
@@ -183,7 +189,8 @@ def _scale_bars(scene: Scene, which: Sequence[str], change: Callable[[Bar, float
 
 def _scale_gravity(scene: Scene, f: float) -> Scene:
     scaled = (
-        replace(each, magnitude=f * each.magnitude) if isinstance(each, Gravity) else each for each in scene.effects
+        replace(effect, magnitude=f * effect.magnitude) if isinstance(effect, Gravity) else effect
+        for effect in scene.effects
     )
     return replace(scene, effects=tuple(scaled))
 
@@ -191,7 +198,7 @@ def _scale_gravity(scene: Scene, f: float) -> Scene:
 def _scale_load(scene: Scene, load: Load, f: float) -> Scene:
     force = None if load.force is None else (f * load.force[0], load.force[1])
     scaled = replace(load, force=force, moment=f * load.moment)
-    return replace(scene, loads=tuple(scaled if each is load else each for each in scene.loads))
+    return replace(scene, loads=tuple(scaled if candidate is load else candidate for candidate in scene.loads))
 
 
 def _try_offset(judge: Judge) -> Iterator[Mistake]:
@@ -228,10 +235,10 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
     for _ in range(NEWTON):
         here, more, less = residuals(offset + np.array([0.0, STEP, -STEP]), everything)
         slope = (more - less) / (2.0 * STEP)
-        there = np.isfinite(here) & np.isfinite(slope)
-        if not there.any() or not (size := float(slope[there] @ slope[there])):
+        finite = np.isfinite(here) & np.isfinite(slope)
+        if not finite.any() or not (size := float(slope[finite] @ slope[finite])):
             return
-        step = float(slope[there] @ here[there]) / size
+        step = float(slope[finite] @ here[finite]) / size
         offset -= step
         if abs(step) < STEP**2:
             break
@@ -254,8 +261,8 @@ def _try_order(judge: Judge) -> Iterator[Mistake]:
     for key in keys:
         ours, theirs, scale = judge.ours(key), table.values[key], judge.size(key).max()
         for i in range(n):
-            there = np.where(np.isnan(theirs[i]), ours, theirs[i]) if ours.ndim == 2 else np.full(n, theirs[i])
-            apart[i] += compute_difference(name_quantity(key), ours, there) / scale
+            filled = np.where(np.isnan(theirs[i]), ours, theirs[i]) if ours.ndim == 2 else np.full(n, theirs[i])
+            apart[i] += compute_difference(name_quantity(key), ours, filled) / scale
     nearest = np.argmin(apart, axis=1)
     if len(np.unique(nearest)) < n - 1 or np.array_equal(nearest, np.arange(n)):  # a revolution ends where it began
         return

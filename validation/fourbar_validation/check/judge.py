@@ -85,8 +85,10 @@ class Judge:
     def __init__(self, scene: Scene, table: TheirTable, tolerance: Allowance | None) -> None:
         self.scene, self.tolerance = scene, tolerance
         self.at = make_command(scene, table)
-        given = OWN_MOTION if _moves_itself(scene, table) else ()
-        self.table = replace(table, values={key: value for key, value in table.values.items() if key not in given})
+        command_names = OWN_MOTION if _moves_itself(scene, table) else ()
+        self.table = replace(
+            table, values={key: value for key, value in table.values.items() if key not in command_names}
+        )
         self.stage = "position" if self.at.omega_2 is None else "force"
         self.right = solve(scene, self.stage, at=self.at)
         self.ok = self.right.status_code == OK
@@ -131,11 +133,11 @@ class Judge:
         apart = compute_difference(quantity, ours, theirs)
         condition = find_condition(quantity, self.scene.linkage, self.right)
         # the number a mistake would have printed is rounded at its own size, however much larger
-        there = self.ours(key)
+        unchanged = self.ours(key)
         larger: Array | float = 1.0
-        if ours is not there and not quantity.startswith("theta"):
+        if ours is not unchanged and not quantity.startswith("theta"):
             larger = np.maximum(np.nanmax(magnitude(ours)[self.ok], initial=0.0) / scale, 1.0)
-        moves = [compute_difference(quantity, there, self.ours(key, other)) for other in self.near]
+        moves = [compute_difference(quantity, unchanged, self.ours(key, other)) for other in self.near]
         spread = divide(np.fmax.reduce(moves), scale) if moves else 0.0
         exact = np.where(size == 0.0, 0.0, EQUIVALENCE.allowed(condition))
         allowed = (exact + spread) * larger + divide(self.table.rounding[key], scale)
@@ -149,17 +151,17 @@ class Judge:
 
     def explained(self, key: str, predicted: Array, times: float = 1.0) -> bool:
         """Return whether all numbers of a key are as `predicted`, within `times` the allowed error."""
-        where = self.where(key)
-        error, allowed, apart = (values[where] for values in self.judged(key, predicted))
+        mask = self.where(key)
+        error, allowed, apart = (values[mask] for values in self.judged(key, predicted))
         within = error <= times * allowed
         permitted = self.permitted(key, predicted)
         if permitted is not None:
-            within |= apart <= permitted[where]
-        return bool(where.any() and np.all(within))
+            within |= apart <= permitted[mask]
+        return bool(mask.any() and np.all(within))
 
     def findings(self) -> list[Discrepancy]:
         """List every number that the table states where the formulas have one."""
-        result = []
+        findings = []
         for key, theirs in self.table.values.items():
             ours, label = self.ours(key), self.table.label(key)
             error, allowed, apart = self.judged(key, ours)
@@ -169,10 +171,10 @@ class Judge:
                 yours, mine = (tuple(np.atleast_1d(values[i])[stated].tolist()) for values in (theirs, ours))
                 numbers = (float(error[i]), float(allowed[i]), float(apart[i]))
                 most = None if permitted is None else float(permitted[i])
-                result.append(
+                findings.append(
                     Discrepancy(self.table.lines[i], label, yours, mine, *numbers, most, float(self.at.theta_2[i]))
                 )
-        return result
+        return findings
 
     def without_answer(self) -> list[int]:
         """Lines that state a number where this linkage does not assemble, or is singular: none is right there."""
@@ -180,8 +182,8 @@ class Judge:
         return [self.table.lines[i] for i in np.flatnonzero(np.any(missing, axis=0))]
 
     def _answer(self, key: str) -> Mask:
-        there = np.isfinite(self.ours(key))
-        return np.asarray(there.all(axis=1) if there.ndim == 2 else there)
+        finite = np.isfinite(self.ours(key))
+        return np.asarray(finite.all(axis=1) if finite.ndim == 2 else finite)
 
 
 def make_command(scene: Scene, table: TheirTable) -> Command:

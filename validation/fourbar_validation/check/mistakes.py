@@ -219,7 +219,7 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
 
     A mistake that breaks a quantity which agreed as it was is none.
     """
-    result: list[Explanation] = []
+    explanations: list[Explanation] = []
     table = judge.table
     for mistake in chain(list_hypotheses(judge.scene, judge.at), find_fitted(judge, differing)):
         explained, nearer, broken = [], [], False
@@ -235,11 +235,11 @@ def explain(judge: Judge, differing: list[str]) -> list[Explanation]:
             else:
                 before, allowed, _ = judge.judged(key, judge.ours(key))
                 after = judge.judged(key, predicted)[0]
-                where = judge.where(key)
-                enough = int((before > allowed)[where].sum()) >= min(ENOUGH, int(where.sum()))
-                if enough and np.all((after <= np.maximum(before / NEARER, allowed))[where]):
+                mask = judge.where(key)
+                enough = int((before > allowed)[mask].sum()) >= min(ENOUGH, int(mask.sum()))
+                if enough and np.all((after <= np.maximum(before / NEARER, allowed))[mask]):
                     nearer.append(table.label(key))
         if (explained or nearer) and not broken:
             complete = len(explained) == len(differing)
-            result.append(Explanation(mistake.text, tuple(explained), complete, tuple(nearer)))
-    return sorted(result, key=lambda e: (-len(e.quantities), -len(e.nearer)))[:SHOWN]
+            explanations.append(Explanation(mistake.text, tuple(explained), complete, tuple(nearer)))
+    return sorted(explanations, key=lambda e: (-len(e.quantities), -len(e.nearer)))[:SHOWN]

@@ -54,12 +54,12 @@ def read_problem(path: str | Path) -> dict[str, Any]:
 
 def read_result(path: str | Path, problem: dict[str, Any]) -> dict[str, Any]:
     """Read somebody's answers to a problem; InputError names what is wrong."""
-    result = _read(path, RESULT)
-    if not isinstance(result.get("answers"), dict):
-        raise InputError("answers", result.get("answers"), "must be an object: a list for each quantity", str(path))
-    if result.get("problem") != problem["problem"]:
-        raise InputError("problem", result.get("problem"), f"must be {problem['problem']!r}", str(path))
-    return result
+    answered = _read(path, RESULT)
+    if not isinstance(answered.get("answers"), dict):
+        raise InputError("answers", answered.get("answers"), "must be an object: a list for each quantity", str(path))
+    if answered.get("problem") != problem["problem"]:
+        raise InputError("problem", answered.get("problem"), f"must be {problem['problem']!r}", str(path))
+    return answered
 
 
 def _read(path: str | Path, schema: str) -> dict[str, Any]:
@@ -75,12 +75,12 @@ def _read(path: str | Path, schema: str) -> dict[str, Any]:
     return data
 
 
-def judge(problem: dict[str, Any], result: dict[str, Any]) -> list[Judged]:
+def judge(problem: dict[str, Any], answered: dict[str, Any]) -> list[Judged]:
     """Judge every quantity that a problem asks for; one that is missing has the level "-"."""
     answers, errors = problem["answers"], problem["errors"]
-    if result.get("at") is not None:
-        answers, errors = _answer_at(problem, result["at"])
-    return [_judge_quantity(name, answers[name], errors[name], result["answers"].get(name)) for name in answers]
+    if answered.get("at") is not None:
+        answers, errors = _answer_at(problem, answered["at"])
+    return [_judge_quantity(name, answers[name], errors[name], answered["answers"].get(name)) for name in answers]
 
 
 def _answer_at(problem: dict[str, Any], at: Any) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -140,9 +140,9 @@ def check_problem(problem_file: Path, result_file: Path) -> int:
     from fourbar_validation.report.terminal import make_table
 
     problem = read_problem(problem_file)
-    result = read_result(result_file, problem)
-    rows, console = judge(problem, result), Console(soft_wrap=True)
-    engine = escape(make_plain(str(result.get("engine", "")))) or "a result"
+    answered = read_result(result_file, problem)
+    rows, console = judge(problem, answered), Console(soft_wrap=True)
+    engine = escape(make_plain(str(answered.get("engine", "")))) or "a result"
     cells = [
         (row.quantity, "no answer" if row.level == MISSING else f"{row.error:.1e}", str(row.position), row.level)
         for row in rows

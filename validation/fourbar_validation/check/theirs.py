@@ -75,13 +75,13 @@ class TheirTable:
     def label(self, key: str) -> str:
         """Name the quantity, or the one component of it that the table has."""
         values = self.values[key]
-        there = [letter for letter, gone in zip("xy", np.isnan(values).T, strict=False) if not gone.all()]
-        return f"{key}_{there[0]}" if values.ndim == 2 and len(there) == 1 else key
+        letters = [letter for letter, gone in zip("xy", np.isnan(values).T, strict=False) if not gone.all()]
+        return f"{key}_{letters[0]}" if values.ndim == 2 and len(letters) == 1 else key
 
     def stated(self, key: str) -> NDArray[np.bool_]:
         """Mark the rows in which a quantity has any number, (n,)."""
-        there = np.isfinite(self.values[key])
-        return np.asarray(there.any(axis=1) if there.ndim == 2 else there)
+        finite = np.isfinite(self.values[key])
+        return np.asarray(finite.any(axis=1) if finite.ndim == 2 else finite)
 
 
 def name_quantity(key: str) -> str:
@@ -122,8 +122,10 @@ def read_table(path: Path) -> TheirTable:
         if name != "theta_2" and not np.isnan(numbers[name]).all():
             _put(table, name, units[name], numbers[name], halves[name])
     if not table.values:
-        known = "torque, F12_x and F12_y, or F12 (its magnitude)"
-        raise InputError("header", headings, f"needs a result, such as {known}; known are {_find_known()}", str(path))
+        examples = "torque, F12_x and F12_y, or F12 (its magnitude)"
+        raise InputError(
+            "header", headings, f"needs a result, such as {examples}; known are {_find_known()}", str(path)
+        )
     return table
 
 
@@ -155,14 +157,14 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
     delimiter = next((mark for mark in ";\t" if mark in header), ",")
     try:
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-        result = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+        numbered = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except csv.Error:
         raise InputError("table", path.name, "must be a CSV file", str(path)) from None
-    if len(result) < 2:
+    if len(numbered) < 2:
         raise InputError("table", path.name, "needs a header and at least one row", str(path))
     if delimiter != ",":  # there a comma is a decimal comma
-        result[1:] = [(line, [cell.replace(",", ".") for cell in cells]) for line, cells in result[1:]]
-    return result
+        numbered[1:] = [(line, [cell.replace(",", ".") for cell in cells]) for line, cells in numbered[1:]]
+    return numbered
 
 
 def _is_unit_line(cells: list[str]) -> bool:
@@ -177,16 +179,16 @@ def _read_columns(
     columns: dict[int, tuple[str, Unit]] = {}
     left_out: dict[str, str] = {}
     for index, heading in enumerate(headings):
-        result = HEADING.fullmatch(heading.strip())
-        name = result["name"] + (result["letter"] or "") if result else heading.strip()
+        match = HEADING.fullmatch(heading.strip())
+        name = match["name"] + (match["letter"] or "") if match else heading.strip()
         quantity = name[:-2] if name[-2:] in ("_x", "_y") and name[:-2] in VECTORS else name
         if not name and index >= len(headings) - 1:
             continue  # an empty cell that a spreadsheet leaves at the end of a line
-        if result is None or quantity in NOT_JUDGED or quantity not in UNITS:
+        if match is None or quantity in NOT_JUDGED or quantity not in UNITS:
             left_out[heading.strip() or f"column {index + 1}"] = NOT_JUDGED.get(quantity, "not a known column")
             continue
         below = unit_line[index].strip(" []()") if index < len(unit_line) else ""
-        text = (result["square"] or result["round"] or below).strip()
+        text = (match["square"] or match["round"] or below).strip()
         columns[index] = f"|{name}|" if name in VECTORS else name, _read_unit(path, heading, quantity, text)
     return columns, left_out
 

@@ -138,8 +138,8 @@ def _read_text(path: Path, columns: list[str], files: ExitStack) -> Any:
     )
 
 
-def _read_words(cells: list[str], known: dict[str, str]) -> list[str]:
+def _read_words(cells: list[str], words: dict[str, str]) -> list[str]:
     for cell in dict.fromkeys(cells):
-        if cell not in known:
-            known[cell] = sys.intern(make_plain(read_cell_text(cell)))
-    return [known[cell] for cell in cells]
+        if cell not in words:
+            words[cell] = sys.intern(make_plain(read_cell_text(cell)))
+    return [words[cell] for cell in cells]

@@ -122,7 +122,7 @@ class Comparison:
             return [Row.unmeasured(self.name, answer.engine, answer.setting, "assembled", FAILS, what)]
         names = set(self.held.quantities)
         if self.scene.drive is not None:
-            names |= {line for line, other in OF_THE_LINE.items() if other in names or line in answer.quantities}
+            names |= {line for line, quantity in OF_THE_LINE.items() if quantity in names or line in answer.quantities}
         judged = [one for name in STAGE_OF if name in names and (one := self._compare(name)) is not None]
         alarms = [self._row("watch", FAILS, alarm) for alarm in answer.alarms]
         numbers, decided = sum(one.numbers for one in judged), sum(one.decided for one in judged)
@@ -197,21 +197,21 @@ class Comparison:
         jumps = int(np.count_nonzero(jumping))  # the forces of either side of a reversal are right
         note = f"; not judged: {withheld}" if withheld else ""
         note += f"; {jumps} positions at which dry friction reverses not judged" if jumps else ""
-        where = answerable & ~jumping
-        if not where.any():
+        mask = answerable & ~jumping
+        if not mask.any():
             nowhere = "no position at which both may be held to it" + note
             return _Judged(self._row(quantity, UNDECIDED, nowhere), numbers, jumps)
-        row, decided = self._judge(quantity, ours, theirs, where, note)
+        row, decided = self._judge(quantity, ours, theirs, mask, note)
         return _Judged(row, numbers, jumps + decided)
 
-    def _judge(self, quantity: str, ours: Array, theirs: Array, where: Mask, note: str) -> tuple[Row, int]:
+    def _judge(self, quantity: str, ours: Array, theirs: Array, mask: Mask, note: str) -> tuple[Row, int]:
         """Judge the errors at the positions `where`; return the row, and the number of positions with a verdict."""
         size, condition = self._scale(quantity)
         allowed = self.held.tolerance.allowed(condition)
         if self.held.predicted is not None:
             allowed, size = np.where(size == 0.0, 0.0, allowed), replace_zero_size(size)
         error = find_error(quantity, ours, theirs, size)
-        beyond, mended = where & (error > allowed), np.zeros_like(where)
+        beyond, mended = mask & (error > allowed), np.zeros_like(mask)
         retried = np.full_like(error, np.nan)
         if self.held.nearby is not None and beyond.any():
             retried = find_error(quantity, ours, self._answered_nearby[quantity], size)
@@ -224,7 +224,7 @@ class Comparison:
                 share = divide(predicted(quantity, positions), size)
                 return np.where(np.isfinite(retried), np.fmin(share, allowed), share)
 
-        worst = _judge_errors(error, condition, where, allowed, self.held.tolerance, predict)
+        worst = _judge_errors(error, condition, mask, allowed, self.held.tolerance, predict)
         reason, i = worst.reason, worst.position
         if mended.any():
             reason += f"; {np.count_nonzero(mended)} positions within the rounding of theta_2"
@@ -257,7 +257,7 @@ class _Worst(NamedTuple):
 def _judge_errors(
     error: Array,
     condition: Array,
-    where: Mask,
+    mask: Mask,
     allowed: Array,
     tolerance: ErrorBound,
     predict: Callable[[Mask], Array] | None,
@@ -266,12 +266,12 @@ def _judge_errors(
 
     NaN at any of them fails. `allowed` is 0 where the quantity vanishes; the error is in its own unit there.
     """
-    decidable = where & (condition * NOTHING_TO_TELL > EPS) if tolerance.conditioned else where
-    undecided = int(np.count_nonzero(where & ~decidable))
+    decidable = mask & (condition * NOTHING_TO_TELL > EPS) if tolerance.conditioned else mask
+    undecided = int(np.count_nonzero(mask & ~decidable))
     note = f"; {undecided} positions with eps/condition > {NOTHING_TO_TELL:g} not judged" if undecided else ""
-    beyond = (decidable & ~(error <= allowed)) | (where & ~np.isfinite(error))
+    beyond = (decidable & ~(error <= allowed)) | (mask & ~np.isfinite(error))
     if not (decidable | beyond).any():
-        index = int(np.flatnonzero(where)[0])
+        index = int(np.flatnonzero(mask)[0])
         return _Worst(index, UNDECIDED, f"eps/condition = {EPS / condition[index]:.1e}", allowed[index], 0)
     if not beyond.any():
         index = int(np.argmax(np.where(decidable, find_used(error, allowed), -1.0)))

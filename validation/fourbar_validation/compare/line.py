@@ -50,11 +50,11 @@ class DriveLine(NamedTuple):
     @property
     def lever(self) -> Array:
         """Distance of a cylinder's line from the ground pin of its bar 2 or 4, over the longer of both arms."""
-        own, other = (0, 1) if self.drive.start.bar != 1 else (1, 0)
-        point = (self.drive.start, self.drive.end)[own]
-        to_ground = self.arms[other] - (0.0 if point.bar == 2 else self.linkage.ground * self.directions[1])
-        longer = np.maximum(np.abs(self.arms[own]), np.abs(to_ground))
-        return np.asarray(np.abs((np.conj(self.unit) * self.arms[own]).imag) / longer)
+        on_bar, on_ground = (0, 1) if self.drive.start.bar != 1 else (1, 0)
+        point = (self.drive.start, self.drive.end)[on_bar]
+        to_ground = self.arms[on_ground] - (0.0 if point.bar == 2 else self.linkage.ground * self.directions[1])
+        longer = np.maximum(np.abs(self.arms[on_bar]), np.abs(to_ground))
+        return np.asarray(np.abs((np.conj(self.unit) * self.arms[on_bar]).imag) / longer)
 
     @property
     def most(self) -> float:

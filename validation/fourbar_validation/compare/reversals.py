@@ -40,8 +40,8 @@ class Reversal:
     def __str__(self) -> str:
         most = max(PIN_FORCE.values(), key=self.jump)
         ends = [" ".join(f"{x:.6g}" for x in getattr(side, most)[0]) for side in (self.before, self.after)]
-        where = f"pin {self.pin}, theta_2 = {np.degrees(self.theta_2):.6g} deg"
-        return f"dry friction reverses at {where}: {most} jumps from ({ends[0]}) to ({ends[1]}) N"
+        place = f"pin {self.pin}, theta_2 = {np.degrees(self.theta_2):.6g} deg"
+        return f"dry friction reverses at {place}: {most} jumps from ({ends[0]}) to ({ends[1]}) N"
 
 
 def find_reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
@@ -52,7 +52,7 @@ def find_reversals(scene: Scene, at: Command, solution: Solution) -> list[Revers
     pins = [pin for effect in scene.effects for pin in effect.dry_pins]
     if not pins or at.omega_2 is None or solution.omega_3 is None or np.ndim(at.omega_2) or np.ndim(at.alpha_2):
         return []
-    result = []
+    reversals = []
     for pin in dict.fromkeys(pins):
         slip = compute_slip(solution, pin)
         at_rest = _mark_resting(solution, pin, EPS * K)
@@ -62,9 +62,9 @@ def find_reversals(scene: Scene, at: Command, solution: Solution) -> list[Revers
                 last = None
             elif not at_rest[i]:
                 if last is not None and slip[last] * slip[i] < 0.0 and at.branch[last] == at.branch[i]:
-                    result.append(_bisect(scene, at, pin, last, i, float(slip[last])))
+                    reversals.append(_bisect(scene, at, pin, last, i, float(slip[last])))
                 last = i
-    return sorted(result, key=lambda reversal: reversal.position)
+    return sorted(reversals, key=lambda reversal: reversal.position)
 
 
 def mark_reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bool = False) -> NDArray[np.bool_]:
@@ -74,20 +74,20 @@ def mark_reversing(scene: Scene, solution: Solution, slip: float, *, in_time: bo
     that runs through the motion `in_time` has no convention at rest either: 0 is as good as any couple up to the
     friction's.
     """
-    where = np.zeros(len(solution), dtype=bool)
+    mask = np.zeros(len(solution), dtype=bool)
     for pin in {pin for effect in scene.effects for pin in effect.dry_pins}:
-        where |= _mark_resting(solution, pin, slip)
+        mask |= _mark_resting(solution, pin, slip)
         if in_time:
             speeds = np.max([np.abs(_compute_speeds(solution)[bar]) for bar in MOVING_BARS], axis=0)
             speeds = np.nan_to_num(speeds)
-            where |= speeds <= slip * speeds.max()
-    return where
+            mask |= speeds <= slip * speeds.max()
+    return mask
 
 
 def _mark_resting(solution: Solution, pin: str, slip: float) -> NDArray[np.bool_]:
-    one, other = (_compute_speeds(solution)[bar] for bar in PINS[pin])
-    speeds = np.abs(one) + np.abs(other) + np.abs(_compute_speeds(solution)[2])
-    return np.asarray((np.abs(other - one) * solution.condition**2 <= slip * speeds) & (speeds > 0.0))
+    one, second = (_compute_speeds(solution)[bar] for bar in PINS[pin])
+    speeds = np.abs(one) + np.abs(second) + np.abs(_compute_speeds(solution)[2])
+    return np.asarray((np.abs(second - one) * solution.condition**2 <= slip * speeds) & (speeds > 0.0))
 
 
 def break_curve(
@@ -108,8 +108,8 @@ def break_curve(
 
 def compute_slip(solution: Solution, pin: str) -> Array:
     """Return omega_j - omega_i of the bars that meet at a pin, rad/s, (n,)."""
-    one, other = (_compute_speeds(solution)[bar] for bar in PINS[pin])
-    return np.asarray(other - one)
+    one, second = (_compute_speeds(solution)[bar] for bar in PINS[pin])
+    return np.asarray(second - one)
 
 
 def _compute_speeds(solution: Solution) -> dict[int, Any]:
@@ -120,8 +120,8 @@ def _bisect(scene: Scene, at: Command, pin: str, i: int, j: int, slip: float) ->
     """Halve the interval between positions i and j; there, friction in the sense of either side."""
 
     def look(theta_2: float, side: int, stage: str) -> Solution:
-        where = at._replace(angle=np.array([theta_2]), branch=at.branch[i : i + 1], remainder=None, time=None)
-        return solve(scene, stage, at=where, side=side)
+        moved = at._replace(angle=np.array([theta_2]), branch=at.branch[i : i + 1], remainder=None, time=None)
+        return solve(scene, stage, at=moved, side=side)
 
     low, high = float(at.theta_2[i]), float(at.theta_2[j])
     for _ in range(HALVINGS):

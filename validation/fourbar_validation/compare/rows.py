@@ -93,12 +93,12 @@ class Row:
         errors = errors if where is None else np.where(where, errors, 0.0)
         index = int(np.argmax(find_used(errors, allowed)))
         numbers = (np.ravel(x) for x in (allowed, theta_2, condition))
-        bound, place, at = (float(x[index] if len(x) > 1 else x[0]) for x in numbers)
+        bound, place, worst_condition = (float(x[index] if len(x) > 1 else x[0]) for x in numbers)
         worst = float(errors[index])
         verdict = AGREES if math.isfinite(worst) and worst <= bound else FAILS
         if where is not None and not where.any():
             verdict = UNDECIDED
-        return cls(*who, quantity, worst, bound, verdict, make_plain(reason), place, at)
+        return cls(*who, quantity, worst, bound, verdict, make_plain(reason), place, worst_condition)
 
     @property
     def compared(self) -> bool:
@@ -273,14 +273,14 @@ class Counts:
         apart = self._write_worded((UNDECIDED, REFUSES))
         if apart and not self.nothing:
             apart[0] = "not compared: " + apart[0]
-        parts = "; ".join(", ".join(each) for each in (held, apart) if each)
+        parts = "; ".join(", ".join(part) for part in (held, apart) if part)
         return f"{verdict}: {parts}" if parts else verdict
 
     def _write_where(self) -> str:
         if not self.scenes:
             return ""
-        of = "" if self.nothing or self.scenes_compared == self.scenes else f"{self.scenes_compared} of "
-        return f" on {of}{self.scenes} scene{'s' if self.scenes != 1 else ''}"
+        share = "" if self.nothing or self.scenes_compared == self.scenes else f"{self.scenes_compared} of "
+        return f" on {share}{self.scenes} scene{'s' if self.scenes != 1 else ''}"
 
     def _write_worded(self, verdicts: Iterable[str]) -> list[str]:
-        return [f"{self[each]} {WORDING[each][self[each] != 1]}" for each in verdicts if self[each]]
+        return [f"{self[verdict]} {WORDING[verdict][self[verdict] != 1]}" for verdict in verdicts if self[verdict]]

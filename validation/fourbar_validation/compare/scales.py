@@ -37,12 +37,12 @@ def scale_of(quantity: str, scene: Scene, formulas: Solution, values: Array) -> 
     if UNITS[quantity] in ("N m", "W") or quantity == LINE.value:  # its poles are not where sin_mu vanishes
         assert formulas.drive_condition is not None
         well &= formulas.drive_condition >= WELL_CONDITIONED
-    own = np.where(size < VANISHING * terms, terms, size)
+    nonzero = np.where(size < VANISHING * terms, terms, size)
     if not well.any():
-        return own
+        return nonzero
     scale = float(size[well].max())
     most = float(terms[well].max())
-    return np.where(well, most if scale < VANISHING * most else scale, own)
+    return np.where(well, most if scale < VANISHING * most else scale, nonzero)
 
 
 def sum_terms(quantity: str, scene: Scene, formulas: Solution) -> Array:
@@ -170,14 +170,14 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     """Make a solution of an answer, its conditions by the sines between its own angles; None without angles."""
     if answer.at is None or not has_angles(answer):
         return None
-    known = answer.quantities
-    theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else known["theta_2"]
-    theta = {2: theta_2, 3: known["theta_3"], 4: known["theta_4"]}
+    answered = answer.quantities
+    theta_2 = answer.at.angle if answer.at.commanded == "theta_2" else answered["theta_2"]
+    theta = {2: theta_2, 3: answered["theta_3"], 4: answered["theta_4"]}
     code = np.full(len(theta_2), OK, dtype=np.uint8)
     reference = Solution(scene.title, scene.drive_bar, code, answer.at.branch, theta_2=theta_2)
     for name in UNITS:
-        if name in known:
-            setattr(reference, name, known[name])
+        if name in answered:
+            setattr(reference, name, answered[name])
     reference.at = answer.at
     if answer.at.speed is not None:
         rates = (("omega", answer.at.speed), ("alpha", answer.at.acceleration))
@@ -189,15 +189,15 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     if scene.drive is not None:
         _add_line(scene.linkage, scene.drive, theta, reference)
     reference.sin_mu = np.sin(theta[4] - theta[3])
-    one, other = (theta[bar] for bar in theta if bar != answer.at.bar)
-    reference.condition = np.abs(np.sin(other - one))
+    one, second = (theta[bar] for bar in theta if bar != answer.at.bar)
+    reference.condition = np.abs(np.sin(second - one))
     if answer.at.stroke is not None and scene.drive is not None:
         lever = place_line(scene.linkage, scene.drive, theta).lever
         reference.at, reference.condition = answer.at._replace(condition=lever), reference.condition * lever
     if reference.drive_condition is None:  # one that knows how near friction is to jamming answers it
-        one, other = (theta[bar] for bar in theta if bar != scene.drive_bar)
+        one, second = (theta[bar] for bar in theta if bar != scene.drive_bar)
         # not of their difference: of an angle many turns away that has fewer digits than its sine
-        reference.drive_condition = np.abs(np.sin(other) * np.cos(one) - np.cos(other) * np.sin(one))
+        reference.drive_condition = np.abs(np.sin(second) * np.cos(one) - np.cos(second) * np.sin(one))
     return reference
 
 

@@ -118,7 +118,7 @@ def find_lever(linkage: FourBar, bar: int = 2) -> float:
 
     Without it 28 of 10 008 comparisons on 300 random linkages exceed K = 50 (at most 83); with it none exceeds 17.
     """
-    return min(linkage.bar(each).length for each in MOVING_BARS if each != bar) / max(linkage.lengths)
+    return min(linkage.bar(number).length for number in MOVING_BARS if number != bar) / max(linkage.lengths)
 
 
 def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array:
@@ -158,9 +158,9 @@ def sum_lengths(linkage: FourBar) -> float:
 
 def find_margin(linkage: FourBar, theta: Array, bar: int = 2) -> Array:
     """Compute by what part of the sum of the lengths the loop closes (> 0) or misses (< 0) at a bar's angle."""
-    own = linkage.bar(bar).length * (-1.0 if bar == 4 else 1.0)
-    b, c = (linkage.bar(each).length for each in MOVING_BARS if each != bar)
-    e = np.abs(linkage.ground * np.exp(1j * linkage.ground_angle) - own * np.exp(1j * theta))
+    held = linkage.bar(bar).length * (-1.0 if bar == 4 else 1.0)
+    b, c = (linkage.bar(number).length for number in MOVING_BARS if number != bar)
+    e = np.abs(linkage.ground * np.exp(1j * linkage.ground_angle) - held * np.exp(1j * theta))
     return np.asarray(np.minimum(b + c - e, e - abs(b - c)) / sum_lengths(linkage))
 
 

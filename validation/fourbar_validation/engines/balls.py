@@ -99,12 +99,12 @@ def closure(x: Values, branch: int) -> tuple[Complex, Complex, Complex] | None:
     d e^{i theta_1} + c e^{i theta_4}, spanned by bars 3 and 2 with bar 2 reversed.
     """
     bar, d = find_commanded(x), x["d"]
-    own, b, c = {2: ("a", "b", "c"), 3: ("b", "a", "c"), 4: ("c", "b", "a")}[bar]
-    own, b, c, side = x[own], x[b], x[c], 1 if bar == 4 else -1
+    held, b, c = {2: ("a", "b", "c"), 3: ("b", "a", "c"), 4: ("c", "b", "a")}[bar]
+    held, b, c, side = x[held], x[b], x[c], 1 if bar == 4 else -1
     w = polar(arb(1), x[f"theta_{bar}"])
-    D = polar(d, x["theta_1"]) + side * own * w
+    D = polar(d, x["theta_1"]) + side * held * w
     # |D|^2 by the angle between ground and input: where they are in line it is exact, and so is a loop that just closes
-    squared = d**2 + own**2 + side * 2 * d * own * (x[f"theta_{bar}"] - x["theta_1"]).cos()
+    squared = d**2 + held**2 + side * 2 * d * held * (x[f"theta_{bar}"] - x["theta_1"]).cos()
     K = squared + b * b - c * c
     discriminant = 4 * b * b * squared - K * K
     if discriminant < 0:  # an undecided one has no root, and what follows is NaN
@@ -360,16 +360,16 @@ def compute_response(base: Values, changed: Iterable[Values | None]) -> dict[str
     for moved in changed:
         if moved is None:
             continue
-        result = {}
+        response = {}
         for output, y in base.items():
             if output not in moved:  # singular there
-                result[output] = math.inf
+                response[output] = math.inf
                 continue
             change = abs(moved[output] - y)
             if output.startswith("theta") and change > 3:
                 change = 2 * arb.pi() - change
-            result[output] = abs(float((change * arb(2) ** STEP_BITS).mid()))
-        return result
+            response[output] = abs(float((change * arb(2) ** STEP_BITS).mid()))
+        return response
     return {}
 
 
@@ -411,9 +411,9 @@ def turn_by_stroke(scene: Scene, x: Values) -> Values | None:
     """
     drive, motion = scene.drive, scene.motion
     assert drive is not None and motion.side is not None
-    (_, other), (bar, own) = sorted(zip((drive.start.bar, drive.end.bar), ENDS, strict=True))
-    held = polar(x[own], x[f"{own}_angle"])
-    fixed = polar(x[other], x[f"{other}_angle"] + x["theta_1"])
+    (_, on_ground), (bar, on_bar) = sorted(zip((drive.start.bar, drive.end.bar), ENDS, strict=True))
+    held = polar(x[on_bar], x[f"{on_bar}_angle"])
+    fixed = polar(x[on_ground], x[f"{on_ground}_angle"] + x["theta_1"])
     if bar == 4:
         fixed -= polar(x["d"], x["theta_1"])
     s, speed, length, reach = x["stroke"], x["stroke_speed"], abs(held), abs(fixed)

@@ -116,19 +116,19 @@ def list_parts(linkage: FourBar) -> list[Part]:
     """Describe bars 2, 3 on 2, and 4."""
     theta_1, d = linkage.ground_angle, linkage.ground
     first_pins = {2: (1, (0.0, 0.0)), 3: (2, (linkage.input.length, 0.0)), 4: (1, resolve(d, theta_1))}
-    result = []
+    parts_of_bars = []
     for number in MOVING_BARS:
         bar = linkage.bar(number)
         ends = {"first_pin": (0.0, 0.0), "G": resolve(*find_centre(bar)), "end": (bar.length, 0.0)}
-        points = {f"{name}{number}": at for name, at in ends.items()}
-        result.append(Part(number, *first_pins[number], bar.mass, find_inertia(bar), bar.length, points))
-    return result
+        points = {f"{name}{number}": place_of for name, place_of in ends.items()}
+        parts_of_bars.append(Part(number, *first_pins[number], bar.mass, find_inertia(bar), bar.length, points))
+    return parts_of_bars
 
 
 def place(point: Any, ground_angle: float) -> tuple[float, float]:
     """Locate an end of a spring along and across its bar's line from the first pin, on the ground in world axes, m."""
-    at = resolve(point.distance, point.angle)
-    return rotate(ground_angle, *at) if point.bar == 1 else at
+    offset = resolve(point.distance, point.angle)
+    return rotate(ground_angle, *offset) if point.bar == 1 else offset
 
 
 def list_speeds(at: Command) -> tuple[Array, Array]:

@@ -26,14 +26,14 @@ def _set_gravity(effect: "Gravity", bars: Loaded) -> None:
 
 def _compute_slip(bars: Loaded, pin: str) -> float:
     """Return how much faster the first bar of a pin spins than the second, rad/s."""
-    one, other = PINS[pin]
-    return bars.velocity(one) - bars.velocity(other)
+    one, second = PINS[pin]
+    return bars.velocity(one) - bars.velocity(second)
 
 
 def _apply_twist(bars: Loaded, pin: str, couple: float) -> None:
     """Apply a couple to the second bar of a pin, and its opposite to the first."""
-    one, other = PINS[pin]
-    bars.twist(other, couple)
+    one, second = PINS[pin]
+    bars.twist(second, couple)
     bars.twist(one, -couple)
 
 
@@ -58,16 +58,16 @@ def _pin_friction(effect: "PinFriction", bars: Loaded) -> None:
 def _apply_torsion(effect: "Torsion", bars: Loaded) -> None:
     """Apply couples from the engine's own angles of the two bars."""
     for pin, k, rest, preload in effect.springs:
-        one, other = PINS[pin]
-        twist = math.remainder(bars.angle(one) - bars.angle(other) + rest, math.tau)
+        one, second = PINS[pin]
+        twist = math.remainder(bars.angle(one) - bars.angle(second) + rest, math.tau)
         _apply_twist(bars, pin, k * twist - preload)
 
 
 def _apply_springs(effect: "Springs", bars: Loaded) -> None:
     """Pull at the engine's own places of the two points."""
     for spring in effect.springs:
-        one, other = bars.end(spring.start), bars.end(spring.end)
-        vector = np.asarray(other - one)
+        one, second = bars.end(spring.start), bars.end(spring.end)
+        vector = np.asarray(second - one)
         distance = math.hypot(*vector)
         if spring.preload == spring.stiffness * spring.length:
             vector = spring.stiffness * vector
@@ -75,7 +75,7 @@ def _apply_springs(effect: "Springs", bars: Loaded) -> None:
             tension = spring.preload + spring.stiffness * (distance - spring.length)
             vector = vector * (tension / distance) if distance else np.full(2, np.nan)
         bars.push(spring.start.bar, vector, one)
-        bars.push(spring.end.bar, -vector, other)
+        bars.push(spring.end.bar, -vector, second)
 
 
 def _apply_flywheel(effect: "Flywheel", bars: Loaded) -> None:
@@ -88,10 +88,10 @@ def _load(load: "Load", bars: Loaded) -> None:
     force, arm = np.array(resolve(*(load.force or (0.0, 0.0)))), np.array(resolve(*load.at))
     factor = 1.0 if load.table is None else look_up(load.table, bars.angle(2))
     if load.frame == "bar":
-        f, at = bars.rotate(load.bar, *force), bars.rotate(load.bar, *arm)
+        f, point = bars.rotate(load.bar, *force), bars.rotate(load.bar, *arm)
     else:
-        f, at = force, arm
-    bars.push(load.bar, factor * f, bars.point(f"G{load.bar}") + at)
+        f, point = force, arm
+    bars.push(load.bar, factor * f, bars.point(f"G{load.bar}") + point)
     bars.twist(load.bar, factor * load.moment)
 
 

@@ -53,11 +53,11 @@ class Entry:
 
 def read_engines(folders: Iterable[Path]) -> dict[str, Entry]:
     """Read engines.toml of these folders, of the package and of the lab, by name; InputError for what is no entry."""
-    result: dict[str, Entry] = {}
+    entries: dict[str, Entry] = {}
     for file in dict.fromkeys(folder / FILE for folder in (*folders, Path(__file__).parent, *FOLDERS)):
         if file.is_file():
-            result = result | {name: entry for name, entry in read_engines_of(file).items() if name not in result}
-    return result
+            entries = entries | {name: entry for name, entry in read_engines_of(file).items() if name not in entries}
+    return entries
 
 
 def read_engines_of(file: Path) -> dict[str, Entry]:
@@ -67,11 +67,11 @@ def read_engines_of(file: Path) -> dict[str, Entry]:
         tables = tomllib.loads(text).get("engine", [])
     except tomllib.TOMLDecodeError as error:
         raise InputError("engine", None, f"is no TOML: {error}", str(file)) from None
-    result: dict[str, Entry] = {}
+    entries: dict[str, Entry] = {}
     for table in tables:
         entry = _read_entry(file, table)
-        result.setdefault(entry.name, entry)
-    return result
+        entries.setdefault(entry.name, entry)
+    return entries
 
 
 def _read_entry(file: Path, table: object) -> Entry:
@@ -104,8 +104,8 @@ def make_environment(entry: Entry, cache: Path = CACHE) -> str:
     python = shutil.which(entry.python) if entry.python else sys.executable
     if python is None:
         raise DependencyError(f"{entry.name}: no {entry.python} is found")
-    own = [text for text in requires("fourbar") or [] if "extra ==" not in text] if entry.python else []
-    wanted = [*entry.requires, *own]
+    needed = [text for text in requires("fourbar") or [] if "extra ==" not in text] if entry.python else []
+    wanted = [*entry.requires, *needed]
     key = hashlib.sha256(repr((python, sys.version_info[:2], sys.prefix, wanted)).encode()).hexdigest()[:12]
     folder = cache / f"{re.sub(r'[^a-zA-Z0-9.]+', '-', ' '.join(entry.requires) or entry.python)[:40]}-{key}"
     inside = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")

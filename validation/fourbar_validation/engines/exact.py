@@ -72,12 +72,12 @@ def compute_sines(linkage: FourBar, command: Command) -> Array:
     ctx.prec = BITS
     x = {name: arb(length) for name, length in zip("dabc", linkage.lengths, strict=True)}
     x["theta_1"] = arb(linkage.ground_angle)
-    result = np.full(len(command.theta_2), np.nan)
+    sines = np.full(len(command.theta_2), np.nan)
     for i, (theta_2, branch) in enumerate(zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)):
         closed = closure(x | {"theta_2": arb(theta_2)}, branch)
         # bars 3 and 4 have no direction if A is on O4
-        result[i] = math.nan if closed is None else np.nan_to_num(_to_double(wedge(*closed[1:])))
-    return result
+        sines[i] = math.nan if closed is None else np.nan_to_num(_to_double(wedge(*closed[1:])))
+    return sines
 
 
 def shift_to(linkage: FourBar, theta_2: float, sin_mu: float) -> Any:

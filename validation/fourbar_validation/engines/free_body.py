@@ -101,11 +101,13 @@ def _compute_places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: A
     unit = {2: np.exp(1j * theta_2), 3: np.exp(1j * theta_3), 4: np.exp(1j * theta_4)}
     O4 = linkage.ground * np.exp(1j * linkage.ground_angle)
     first_pin = {2: 0.0, 3: linkage.input.length * unit[2], 4: O4}
-    result = {"theta_2": theta_2, "theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
-    result |= {"A": _split_components(first_pin[3]), "B": _split_components(O4 + linkage.output.length * unit[4])}
+    quantities = {"theta_2": theta_2, "theta_3": theta_3, "theta_4": theta_4, "sin_mu": np.sin(theta_4 - theta_3)}
+    quantities |= {"A": _split_components(first_pin[3]), "B": _split_components(O4 + linkage.output.length * unit[4])}
     for bar in MOVING_BARS:
-        result[f"G{bar}"] = _split_components(first_pin[bar] + make_vector(find_centre(linkage.bar(bar))) * unit[bar])
-    return result
+        quantities[f"G{bar}"] = _split_components(
+            first_pin[bar] + make_vector(find_centre(linkage.bar(bar))) * unit[bar]
+        )
+    return quantities
 
 
 def _answer_positions(
@@ -117,17 +119,17 @@ def _answer_positions(
     drive = COUPLE if scene.drive is None else LINE
     if (gone := find_wound(scene, motion)) is not None:
         unknowns[gone] = np.nan
-    result = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
+    forces = {name: unknowns[:, COLUMN[name] : COLUMN[name] + 2] for name in FORCE_AT.values()}
     for bar in MOVING_BARS:
-        result |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
+        forces |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
     a_A = motion.swing(2, motion.first_pin[3])
-    result["drive_condition"] = _compute_drive_condition(scene, motion) * from_jamming
-    result |= {
+    forces["drive_condition"] = _compute_drive_condition(scene, motion) * from_jamming
+    forces |= {
         "a_A": _split_components(a_A),
         "a_B": _split_components(motion.swing(4, scene.linkage.output.length * motion.unit[4])),
     }
     for bar in MOVING_BARS:
-        result[f"a_G{bar}"] = _split_components(motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0))
+        forces[f"a_G{bar}"] = _split_components(motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0))
     if any(effect.dry for effect in scene.effects):
         ends = []
         for side in (1.0, -1.0):
@@ -135,18 +137,18 @@ def _answer_positions(
                 scene.linkage, theta_2, np.full_like(theta_2, side), 0.0 * theta_2, theta_3, theta_4, commanded
             )
             ends.append(balance(scene, motion._replace(beginning=begins.omega))[0][:, DRIVE])
-        result |= {drive.low: np.minimum(*ends), drive.high: np.maximum(*ends)}
+        forces |= {drive.low: np.minimum(*ends), drive.high: np.maximum(*ends)}
     if scene.loads or scene.effects:
-        result[f"{drive.value}_inertia"] = balance(replace(scene, loads=(), effects=()), motion)[0][:, DRIVE]
-    return result | {drive.value: unknowns[:, DRIVE]}, residual
+        forces[f"{drive.value}_inertia"] = balance(replace(scene, loads=(), effects=()), motion)[0][:, DRIVE]
+    return forces | {drive.value: unknowns[:, DRIVE]}, residual
 
 
 def _compute_drive_condition(scene: Scene, motion: BodyMotion) -> Array:
     """Compute the sine between the bars that are not driven, or the leverage of a line."""
     if (line := _place_line(scene, motion)) is not None:
         return line.condition
-    one, other = (motion.unit[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
-    return np.asarray(np.abs(cross(one, other)))
+    one, second = (motion.unit[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
+    return np.asarray(np.abs(cross(one, second)))
 
 
 def _place_line(scene: Scene, motion: BodyMotion) -> DriveLine | None:
@@ -164,17 +166,17 @@ def move(
     u_1, u_2 = np.exp(1j * linkage.ground_angle), np.exp(1j * theta_2)
     u_3, u_4 = np.exp(1j * theta_3), np.exp(1j * theta_4)
     length, round_ = {2: a, 3: b, 4: c}, {2: u_2, 3: u_3, 4: -u_4}  # bar 4 is gone along from B to O4
-    others = [each for each in MOVING_BARS if each != bar]
-    jacobian = np.stack([_split_components(round_[each]) for each in others], axis=-1)
+    others = [number for number in MOVING_BARS if number != bar]
+    jacobian = np.stack([_split_components(round_[number]) for number in others], axis=-1)
 
     def rates(stated: Array, centripetal: Complex) -> dict[int, Array]:
         right = _split_components(-length[bar] * stated * round_[bar] - 1j * centripetal)
-        found = solve_system(jacobian, right[..., None])[0][..., 0].T
-        return {bar: stated} | {each: v / length[each] for each, v in zip(others, found, strict=True)}
+        solved = solve_system(jacobian, right[..., None])[0][..., 0].T
+        return {bar: stated} | {number: v / length[number] for number, v in zip(others, solved, strict=True)}
 
     zero = np.zeros(n, dtype=complex)
     omega = {1: np.zeros(n), **rates(speed, zero)}
-    pull = sum((length[each] * omega[each] ** 2 * round_[each] for each in MOVING_BARS), zero)
+    pull = sum((length[number] * omega[number] ** 2 * round_[number] for number in MOVING_BARS), zero)
     alpha = {1: np.zeros(n), **rates(acceleration, pull)}
     first_pin = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
     return BodyMotion(linkage, theta_2, {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4}, first_pin, omega, alpha)
@@ -234,11 +236,11 @@ def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
     x = size * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1)) * rng.uniform(0.0, 1.0, (n, len(k)))
     many = (np.broadcast_to(F, (n, *F.shape)), np.broadcast_to(C, (n, *C.shape)))
     x, settled, _ = _improve_couples(*many, k, x)
-    result: list[Array] = []
-    for each in x[settled & (x >= 0.0).all(axis=1)]:
-        if all(np.abs(each - other).max() > APART * max(each.max(), other.max()) for other in result):
-            result.append(each)
-    return len(result)
+    solutions: list[Array] = []
+    for loads in x[settled & (x >= 0.0).all(axis=1)]:
+        if all(np.abs(loads - other).max() > APART * max(loads.max(), other.max()) for other in solutions):
+            solutions.append(loads)
+    return len(solutions)
 
 
 def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
@@ -291,13 +293,13 @@ def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
     One step of refinement makes each equation hold to the rounding of its own terms.
     """
     x = np.full(right.shape, np.nan)
-    known = np.asarray(np.isfinite(matrix).all(axis=(1, 2)))
-    known[known] = np.linalg.det(matrix[known]) != 0.0
-    matrix, right = matrix[known], right[known]
-    x[known] = np.linalg.solve(matrix, right)
-    x[known] += np.linalg.solve(matrix, right - matrix @ x[known])
-    terms = np.abs(matrix) @ np.abs(x[known]) + np.abs(right)
-    remaining = np.abs(right - matrix @ x[known]) / np.where(terms == 0.0, 1.0, terms)
+    finite = np.asarray(np.isfinite(matrix).all(axis=(1, 2)))
+    finite[finite] = np.linalg.det(matrix[finite]) != 0.0
+    matrix, right = matrix[finite], right[finite]
+    x[finite] = np.linalg.solve(matrix, right)
+    x[finite] += np.linalg.solve(matrix, right - matrix @ x[finite])
+    terms = np.abs(matrix) @ np.abs(x[finite]) + np.abs(right)
+    remaining = np.abs(right - matrix @ x[finite]) / np.where(terms == 0.0, 1.0, terms)
     return x, float(np.max(remaining, initial=0.0, where=np.isfinite(remaining)))
 
 
@@ -329,8 +331,8 @@ def compute_distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) ->
     with np.errstate(invalid="ignore"):
         _, matrix = _compute_slope(F, C, k, x)
     far = np.full(len(x), np.nan)
-    known = np.isfinite(matrix).all(axis=(1, 2))
-    far[known] = np.minimum(np.linalg.svd(matrix[known], compute_uv=False)[:, -1], 1.0)
+    finite = np.isfinite(matrix).all(axis=(1, 2))
+    far[finite] = np.minimum(np.linalg.svd(matrix[finite], compute_uv=False)[:, -1], 1.0)
     return far
 
 

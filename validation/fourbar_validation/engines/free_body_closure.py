@@ -53,20 +53,22 @@ def close(linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2
     """
     d, a, b, c = linkage.lengths
     ground = d * np.exp(1j * linkage.ground_angle)
-    own = {2: -a, 3: -b, 4: c}[bar]
+    held = {2: -a, 3: -b, 4: c}[bar]
     b, c = {2: (b, c), 3: (a, c), 4: (b, a)}[bar]
-    diagonal = ground + own * np.exp(1j * theta)
+    diagonal = ground + held * np.exp(1j * theta)
     e, phi = np.abs(diagonal), np.angle(diagonal)
     closed = ROUNDING * sum(linkage.lengths)
     # the gap is least where bars 3 and 4 lie along the diagonal
     possible = np.maximum(e - (b + c), abs(b - c) - e) <= closed
-    found, gap = np.full((2, len(e)), np.nan), np.full(len(e), np.nan)
+    angles, gap = np.full((2, len(e)), np.nan), np.full(len(e), np.nan)
     for alpha, beta in [(_compute_angle_between(e, b, c), _compute_angle_between(e, c, b)), *np.radians(STARTS)]:
         remaining = np.flatnonzero(possible & np.isnan(gap))
         if not len(remaining):
             break
         start = np.array([phi + branch * alpha, phi + np.pi - branch * beta])[:, remaining]
-        found[:, remaining], gap[remaining] = _solve_newton(diagonal[remaining], b, c, branch[remaining], start, closed)
+        angles[:, remaining], gap[remaining] = _solve_newton(
+            diagonal[remaining], b, c, branch[remaining], start, closed
+        )
     assembled = np.isfinite(gap)
     missed = possible & ~assembled & (np.maximum(e - (b + c), abs(b - c) - e) < -closed)
     if missed.any():
@@ -74,8 +76,8 @@ def close(linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2
             f"the loop closes at theta_{bar} = {theta[np.argmax(missed)]!r}, but Newton's method does not find it"
         )
     if bar == 4:
-        found = np.array([found[1] + np.pi, found[0]])
-    return Closed(assembled, np.angle(np.exp(1j * found)), gap)
+        angles = np.array([angles[1] + np.pi, angles[0]])
+    return Closed(assembled, np.angle(np.exp(1j * angles)), gap)
 
 
 def _compute_angle_between(e: Array, near: float, far: float) -> Array:
@@ -94,10 +96,10 @@ def _solve_newton(
     halved until the gap falls and that sign is kept; so it ends where no smaller gap is to be had.
     """
 
-    def look(theta: Array, at: NDArray[np.intp]) -> tuple[Complex, Complex, Complex, Array]:
+    def look(theta: Array, indices: NDArray[np.intp]) -> tuple[Complex, Complex, Complex, Array]:
         u_3, u_4 = np.exp(1j * theta)
-        gap = b * u_3 - c * u_4 - diagonal[at]
-        inside = cross(u_3, u_4) * branch[at] > 0.0
+        gap = b * u_3 - c * u_4 - diagonal[indices]
+        inside = cross(u_3, u_4) * branch[indices] > 0.0
         return u_3, u_4, gap, np.where(inside, np.abs(gap), np.inf)
 
     theta = theta.copy()
@@ -142,11 +144,13 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     """Measure from the ground pin of its bar, at angle 0, to a cylinder's end on it, and to that on the ground, m."""
     drive = scene.drive
     assert drive is not None
-    own, other = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
+    on_bar, on_ground = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
     pivot = 0.0j
-    if own.bar == 4:
+    if on_bar.bar == 4:
         pivot = complex(*resolve(scene.linkage.ground, scene.linkage.ground_angle))
-    return complex(*resolve(own.distance, own.angle)), complex(*place(other, scene.linkage.ground_angle)) - pivot
+    return complex(*resolve(on_bar.distance, on_bar.angle)), complex(
+        *place(on_ground, scene.linkage.ground_angle)
+    ) - pivot
 
 
 def find_angle(command: Command, motion: Motion, arm: complex, ground: complex) -> Command:

@@ -206,11 +206,11 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     path = np.unique(np.concatenate((ends, np.linspace(ends.min(), ends.max(), steps))))
     closed = close(link, path, np.full(len(path), begins.branch[0]))
     path = path[closed.assembled]
-    if not (known := np.isin(begins.theta_2, path)).any():
+    if not (on_path := np.isin(begins.theta_2, path)).any():
         return gone
     theta = {1: np.full(len(path), link.ground_angle), 2: path}
     theta |= {bar: np.unwrap(closed.theta[bar - 3][closed.assembled]) for bar in (3, 4)}
-    start = begins.theta_2[known][0]
+    start = begins.theta_2[on_path][0]
     first, here = int(np.searchsorted(path, start)), np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1)
     for pin, _, rest, _ in springs:
         i, j = PINS[pin]

@@ -129,8 +129,8 @@ def read_guests(entries: Sequence[str], known: Iterable[str], seconds: float | N
 
 def name_guests(entries: Sequence[tuple[str, str, Program]], known: Iterable[str]) -> tuple[Guest, ...]:
     """Read the hello of programs, each with its entry and the name that it is given, and name them apart."""
-    names, result = {FORMULAS, *known}, list[Guest]()
-    for entry, given, program in entries:
+    names, guests = {FORMULAS, *known}, list[Guest]()
+    for entry, chosen, program in entries:
         hello, trouble = Hello(_name_program(entry, program)), ""
         try:
             hello = ask_hello(program)
@@ -140,14 +140,14 @@ def name_guests(entries: Sequence[tuple[str, str, Program]], known: Iterable[str
             trouble = str(error)
             if CLASS.fullmatch(entry) and trouble.startswith(f"exit status {NOT_FOUND}: "):
                 raise InputError("--witness", entry, trouble.partition(": ")[2]) from None
-        name = stem = given or hello.name
+        name = stem = chosen or hello.name
         for count in range(2, 2 + len(names)):
             if name not in names:
                 break
             name = f"{stem}-{count}"
         names.add(name)
-        result.append(_make_guest(name, program, hello, trouble, number=len(names)))
-    return tuple(result)
+        guests.append(_make_guest(name, program, hello, trouble, number=len(names)))
+    return tuple(guests)
 
 
 def _make_guest(name: str, program: Program, hello: Hello, trouble: str, number: int) -> Guest:

@@ -121,8 +121,8 @@ class Loaded(EngineBars, Protocol):
 
     def rotate(self, bar: int, x: float, y: float) -> Array:
         """Rotate (x, y) along and across a bar's line into world axes, (2,)."""
-        result = rotate(self.ground_angle, x, y) if bar == 1 else rotate_by(self.rotation(bar).tolist(), x, y)
-        return np.array(result)
+        rotated = rotate(self.ground_angle, x, y) if bar == 1 else rotate_by(self.rotation(bar).tolist(), x, y)
+        return np.array(rotated)
 
     def first_pin(self, bar: int) -> Array:
         """Locate the first pin of a bar (O2, O2, A, O4 of bars 1, 2, 3, 4), m, (2,)."""
@@ -143,16 +143,16 @@ class Loaded(EngineBars, Protocol):
     def line(self) -> tuple[Array, Array, Array]:
         """Place the linear drive: both ends, m, and the unit vector from the one to the other."""
         assert self.linear is not None
-        one, other = self.end(self.linear.start), self.end(self.linear.end)
-        return one, other, (other - one) / math.hypot(*(other - one))
+        one, second = self.end(self.linear.start), self.end(self.linear.end)
+        return one, second, (second - one) / math.hypot(*(second - one))
 
     def work(self, size: float) -> None:
         """Let the drive act with a torque, N m, or a force, N."""
         if self.linear is None:
             return self.twist(self.drive_bar, size)
-        one, other, along = self.line()
+        one, second, along = self.line()
         self.push(self.linear.start.bar, -size * along, one)
-        return self.push(self.linear.end.bar, size * along, other)
+        return self.push(self.linear.end.bar, size * along, second)
 
     def gravity(self, field: tuple[float, float]) -> None:
         """Set a field (g_x, g_y) for the engine's own gravity, m/s^2."""
@@ -213,16 +213,16 @@ class Loaded(EngineBars, Protocol):
         for share in np.arange(1, STAGES + 1) / STAGES:
             before = math.inf
             for _ in range(STEPS):
-                forces, result = passed(share * loads)
-                most, change = float(result.max()), float(np.abs(result - loads).max())
+                forces, settled_loads = passed(share * loads)
+                most, change = float(settled_loads.max()), float(np.abs(settled_loads - loads).max())
                 if not most < DIVERGED or change <= REPEATED * most or before <= change <= ROUNDED * most:
                     break
                 nudge, before = NUDGE * most, change
-                moved = [(passed(share * (loads + nudge * one))[1] - result) / nudge for one in unit]
+                moved = [(passed(share * (loads + nudge * one))[1] - settled_loads) / nudge for one in unit]
                 matrix = unit - np.stack(moved, axis=1)
                 if np.linalg.det(matrix) <= 0.0:  # 1 without friction: beyond zero the growth has turned back
                     return {}
-                loads = loads + np.linalg.solve(matrix, result - loads)
+                loads = loads + np.linalg.solve(matrix, settled_loads - loads)
             if not change <= ROUNDED * most or (loads < 0.0).any():
                 return {}
         return forces

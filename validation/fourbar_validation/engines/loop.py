@@ -48,14 +48,14 @@ class Assembler:
         tree, bar = self.tree, self.bar
         theta = theta if bar == 2 else reduce_angle(theta)
         tree.place([theta if each == bar else 0.0 for each in (2, 3, 4)])
-        at = tree.positions()
-        along = {2: at.get("A2", at["A"]), 3: at["B"] - at["A"], 4: at["B4"] - at["O4"]}
-        diagonal = at["O4"] + along[4] if bar == 4 else at["O4"] - along[bar]
-        e, d, near, far, own = (
+        points = tree.positions()
+        along = {2: points.get("A2", points["A"]), 3: points["B"] - points["A"], 4: points["B4"] - points["O4"]}
+        diagonal = points["O4"] + along[4] if bar == 4 else points["O4"] - along[bar]
+        e, d, near, far, held = (
             math.hypot(*vector.tolist())
-            for vector in (diagonal, at["O4"], *(along[other] for other in CLOSING[bar]), along[bar])
+            for vector in (diagonal, points["O4"], *(along[other] for other in CLOSING[bar]), along[bar])
         )
-        closed = ROUNDING * (own + d + near + far)
+        closed = ROUNDING * (held + d + near + far)
         # the gap with a bar held is stationary only where the others lie along the diagonal: this is its least value
         if max(e - (near + far), abs(near - far) - e) > closed:
             return None
@@ -67,9 +67,9 @@ class Assembler:
             around = {2: (theta, one, other), 3: (one, theta, other), 4: (other + math.pi, one, theta)}
             theta_2, theta_3, theta_4 = around[bar]
             q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
-            result = close_gap(tree, q, branch, closed, bar)
-            if result is not None:
-                return result
+            assembled = close_gap(tree, q, branch, closed, bar)
+            if assembled is not None:
+                return assembled
         if max(e - (near + far), abs(near - far) - e) < -closed:
             raise ArithmeticError(f"the loop closes at theta_{bar} = {theta!r}, but Newton's method does not find it")
         return None
@@ -100,23 +100,23 @@ def close_gap(tree: Assembled, q: Angles, branch: int, closed: float, bar: int =
             b, d = e - a, f - c
         return x, y, a, b, c, d, a * d - b * c
 
-    def moved(q: Angles, one: float, other: float) -> Angles:
+    def moved(q: Angles, one: float, turned: float) -> Angles:
         if bar == 2:
-            return q[0], q[1] + one, q[2] + other
+            return q[0], q[1] + one, q[2] + turned
         if bar == 3:
-            return q[0] + one, theta_3 - (q[0] + one), q[2] + other
-        return q[0] + other, q[1] + (one - other), q[2]
+            return q[0] + one, theta_3 - (q[0] + one), q[2] + turned
+        return q[0] + turned, q[1] + (one - turned), q[2]
 
     here = look(q)
     if here[6] * branch >= 0.0:
         return None
     for _ in range(NEWTON_STEPS):
         x, y, a, b, c, d, det = here
-        one, other = (b * y - d * x) / det, (c * x - a * y) / det
+        one, second = (b * y - d * x) / det, (c * x - a * y) / det
         size = math.hypot(x, y)
-        part = min(1.0, LONGEST_STEP / max(abs(one), abs(other), LONGEST_STEP))
+        part = min(1.0, LONGEST_STEP / max(abs(one), abs(second), LONGEST_STEP))
         while True:
-            trial = moved(q, part * one, part * other)
+            trial = moved(q, part * one, part * second)
             there = look(trial)
             if math.hypot(there[0], there[1]) < size and there[6] * branch < 0.0:
                 break
@@ -145,9 +145,9 @@ class Exact:
             return Answer(self.name, "exact", refusal=str(error))
         start, moves, asked = time.perf_counter(), command.speed is not None, command
         wanted = STAGES if moves else ("position",)
-        found = () if command.bar == 2 and command.stroke is None else MADE[: 3 if moves else 1]
+        solved_motion = () if command.bar == 2 and command.stroke is None else MADE[: 3 if moves else 1]
         names = [name for name, stage in STAGE_OF.items() if stage in wanted and name not in NOT_ANSWERED]
-        names += [name for name in found if name not in names]
+        names += [name for name in solved_motion if name not in names]
         if command.stroke is not None:
             command = find_angle(command, scene.motion, *bars.cylinder(command.bar))
         names = list_unknowns(scene, names)
@@ -157,7 +157,7 @@ class Exact:
             points, theta_3, theta_4 = bars.positions(), bars.angle(3), bars.angle(4)
             values: Values = {name: points[name] for name in ("A", "B", "G2", "G3", "G4")}
             values |= {"theta_3": theta_3, "theta_4": theta_4, "sin_mu": math.sin(theta_4 - theta_3)}
-            values |= {"theta_2": bars.angle(2)} if found else {}
+            values |= {"theta_2": bars.angle(2)} if solved_motion else {}
             return values | (bars.move(command.bar, speed, acceleration) if moves else {})
 
         out, assembled, gap = read_each(bars, command, names, read)

@@ -39,9 +39,9 @@ class PinocchioTree(Tree):
             # nothing is appended, no frame either: below 2.2e-16 kg the sum of two inertias has another mass centre
             about_g = np.diag([0.0, 0.0, part.inertia])
             model.inertias[joint] = pin.Inertia(part.mass, np.array([*part.centre, 0.0]), about_g)
-            for name, at in part.points.items():
+            for name, place in part.points.items():
                 self.frame[name] = model.addFrame(
-                    pin.Frame(name, joint, 0, _place_at(*at), pin.FrameType.OP_FRAME), False
+                    pin.Frame(name, joint, 0, _place_at(*place), pin.FrameType.OP_FRAME), False
                 )
         self.data = data = model.createData()
         self.q = np.zeros(3)
@@ -214,8 +214,8 @@ class PinocchioForward:
                 break
             for name, value in self._read(q, v, self.acceleration(q, v)).items():
                 out[name][row] = value
-        at, quantities = split_answer(out, self.command.branch[order])
-        return Trial(at, quantities, done, 2.0 * np.pi / self.run.fastest / self.h, stepping)
+        motion, quantities = split_answer(out, self.command.branch[order])
+        return Trial(motion, quantities, done, 2.0 * np.pi / self.run.fastest / self.h, stepping)
 
     def _read(self, q: Array, v: Array, a: Array) -> dict[str, Array | float]:
         """Compute torque and pin forces at a state, with the multiplier of the closure that the engine solved for."""

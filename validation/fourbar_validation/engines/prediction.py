@@ -30,27 +30,27 @@ FIRST_ORDER = 0.1
 forces and the torque undetermined; the torque's own first order can cancel."""
 
 
-def predict_from_data(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
+def predict_from_data(scene: Scene, at: Command, quantity: str, mask: Mask | None = None) -> Array:
     """Predict for a derivation that works in angles and lengths themselves."""
-    return predict_error(scene, at, quantity, 0.0, where)
+    return predict_error(scene, at, quantity, 0.0, mask)
 
 
-def predict_in_world_axes(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
+def predict_in_world_axes(scene: Scene, at: Command, quantity: str, mask: Mask | None = None) -> Array:
     """Predict for an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
-    return predict_error(scene, at, quantity, sum_lengths(scene.linkage), where)
+    return predict_error(scene, at, quantity, sum_lengths(scene.linkage), mask)
 
 
-def predict_about_mass_centre(scene: Scene, at: Command, quantity: str, where: Mask | None = None) -> Array:
+def predict_about_mass_centre(scene: Scene, at: Command, quantity: str, mask: Mask | None = None) -> Array:
     """Predict for an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
 
     Every bar is accelerated with the first of its tree and back again by its own joint.
     """
     furthest = max(abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
-    return predict_error(scene, at, quantity, sum_lengths(scene.linkage) + furthest, where, carried=True)
+    return predict_error(scene, at, quantity, sum_lengths(scene.linkage) + furthest, mask, carried=True)
 
 
 def predict_error(
-    scene: Scene, at: Command, quantity: str, reach: float, where: Mask | None = None, *, carried: bool = False
+    scene: Scene, at: Command, quantity: str, reach: float, mask: Mask | None = None, *, carried: bool = False
 ) -> Array:
     """Predict the absolute error of a quantity at each position, or at those of a mask, (n,).
 
@@ -59,7 +59,7 @@ def predict_error(
     """
     n, (omega, alpha) = len(at.theta_2), list_speeds(at)
     errors = np.full(n, np.nan)
-    for i in range(n) if where is None else np.flatnonzero(where).tolist():
+    for i in range(n) if mask is None else np.flatnonzero(mask).tolist():
         moved = _compute_sensitivity(scene, float(at.theta_2[i]), int(at.branch[i]), float(omega[i]), float(alpha[i]))
         if moved is None:
             continue

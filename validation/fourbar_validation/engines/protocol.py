@@ -221,10 +221,10 @@ def answer_to_json(scene: Scene, command: Command, answer: Answer) -> dict[str, 
 
 def _write_array(array: Array) -> list[Any]:
     """Write numbers or pairs of them; null where there is no finite number."""
-    given = np.asarray(array)
-    if given.dtype.kind not in "iuf":
-        raise TypeError(f"an answer holds real numbers, not {given.dtype}")
-    array = given.astype(float)
+    numbers = np.asarray(array)
+    if numbers.dtype.kind not in "iuf":
+        raise TypeError(f"an answer holds real numbers, not {numbers.dtype}")
+    array = numbers.astype(float)
     finite = np.isfinite(array)
     values: Any = array if finite.all() else np.where(finite, array, np.full(array.shape, None))
     return values.tolist()  # type: ignore[no-any-return]
@@ -330,7 +330,7 @@ def read_motion(data: Any, command: Command) -> Command:
     names, n = _find_names(data), len(command.angle)
     if names not in (KINDS_OF_COMMAND[:-1] if command.stroke is not None else (COMMANDS[command.bar],)):
         raise InputError("at", sorted(data), f"must have {command.commanded}, or for a stroke an angle of its bar")
-    bar = next(bar for bar, each in COMMANDS.items() if each == names)
+    bar = next(bar for bar, commanded_names in COMMANDS.items() if commanded_names == names)
     branch = _read_branch(data["branch"], n) if "branch" in data else command.branch
     speed, acceleration = (_read_rate(key, data[key], n) if data.get(key) is not None else None for key in names[1:])
     if acceleration is None:
@@ -339,10 +339,10 @@ def read_motion(data: Any, command: Command) -> Command:
     if command.stroke is not None:  # a stroke commands no motion of the bar: the caller knows its motion
         return made
     require_near(made, command)
-    own: dict[str, Any] = {"angle": made.angle, "speed": speed, "acceleration": acceleration}
-    if all(np.array_equal(value, getattr(command, name)) for name, value in own.items()):
+    stated: dict[str, Any] = {"angle": made.angle, "speed": speed, "acceleration": acceleration}
+    if all(np.array_equal(value, getattr(command, name)) for name, value in stated.items()):
         return command
-    return command._replace(**own, remainder=None)
+    return command._replace(**stated, remainder=None)
 
 
 def require_near(made: Command, command: Command) -> None:
@@ -393,10 +393,10 @@ def release_from_json(scene: Scene, command: Any, times: Any) -> Scene:
     if not isinstance(command, dict) or "theta_2" not in command:
         raise InputError("command", command, "must be an object with theta_2, omega_2, branch and through")
     _refuse_unknown(command, ("theta_2", "omega_2", "branch", "through"))
-    at = _read_list("times", times)
+    instants = _read_list("times", times)
     theta, omega = (float(_read_list(name, [command.get(name, 0.0)])[0]) for name in ("theta_2", "omega_2"))
     branch = int(_read_branch(command.get("branch", 1), 1)[0])
-    free = Free(float(at[-1]), len(at) - 1)
+    free = Free(float(instants[-1]), len(instants) - 1)
     return replace(scene, motion=Motion(theta, omega, 0.0, branch, command.get("through", "sign"), free))
 
 

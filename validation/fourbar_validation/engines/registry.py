@@ -221,13 +221,13 @@ def make_prediction(engine: Engine, scene: Scene, at: Command, answer: Answer) -
     if engine.residuals:
         if answer.alarms:
             return None
-        return lambda quantity, where: answer.predicted.get(quantity, np.zeros(len(where)))
+        return lambda quantity, mask: answer.predicted.get(quantity, np.zeros(len(mask)))
     predict = engine.predictor
     if at.bar != 2 or at.stroke is not None:
         return None  # the prediction knows the command of bar 2 alone
     if predict is None or (engine.tolerance.conditioned and (find_missing("flint") or find_refusal(scene))):
         return None  # the law in the condition stands alone
-    return lambda quantity, where: predict(scene, at, quantity, where)
+    return lambda quantity, mask: predict(scene, at, quantity, mask)
 
 
 def make_nearby(engine: Engine, scene: Scene, at: Command, formulas: Solution) -> Nearby | None:
@@ -242,9 +242,9 @@ def make_nearby(engine: Engine, scene: Scene, at: Command, formulas: Solution) -
         return None
     omega, alpha = list_speeds(at)
 
-    def answer(where: Mask) -> dict[str, Array]:
-        adapter, out = engine.start(), make_blank(len(where), COMPARED)
-        for i in np.flatnonzero(where & np.isfinite(formulas.sin_mu)).tolist():
+    def answer(mask: Mask) -> dict[str, Array]:
+        adapter, out = engine.start(), make_blank(len(mask), COMPARED)
+        for i in np.flatnonzero(mask & np.isfinite(formulas.sin_mu)).tolist():
             shift = shift_to(scene.linkage, float(at.theta_2[i]), float(formulas.sin_mu[i]))
             if shift is not None:
                 one = slice(i, i + 1)

@@ -189,5 +189,5 @@ def solve_multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
     if det == 0.0:
         raise np.linalg.LinAlgError("the torque is at a pole")
     one = x * (e * r - f * q) + y * (f * p - d * r) + z * (d * q - e * p)
-    other = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
-    return np.array([one / det, other / det, (x * u + y * v + z * w) / det])
+    permanent = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
+    return np.array([one / det, permanent / det, (x * u + y * v + z * w) / det])

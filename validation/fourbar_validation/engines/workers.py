@@ -251,10 +251,10 @@ def yield_done(chunks: Iterable[Chunk], workers: Workers, instead: Instead) -> I
             except (StalledError, DependencyError):
                 raise
             except Exception as error:
-                result = error
-            if getattr(result, "exitcode", None) not in FROM_OUTSIDE:
+                outcome = error
+            if getattr(outcome, "exitcode", None) not in FROM_OUTSIDE:
                 break  # otherwise somebody killed it: that is not the item's doing
-        return result
+        return outcome
 
     waiting = iter(chunks)
     running: dict[Any, Chunk] = {}
@@ -276,5 +276,5 @@ def yield_done(chunks: Iterable[Chunk], workers: Workers, instead: Instead) -> I
             except Exception as error:  # the worker died or hung, or the function failed; find out on whose account
                 clear = len(items) == 1 and getattr(error, "exitcode", None) not in FROM_OUTSIDE
                 tried = [(item, error if clear else attempt(item)) for item in items]
-                results = [instead(*each, attempt) if isinstance(each[1], Exception) else each[1] for each in tried]
+                results = [instead(*job, attempt) if isinstance(job[1], Exception) else job[1] for job in tried]
             yield number, results

@@ -55,7 +55,7 @@ class Finding(NamedTuple):
 
 def make_worst_row(name: str, answer: Answer, quantity: str, findings: Sequence[Finding]) -> Row:
     """Make the row of a quantity of the finding that exceeds what it is allowed by most."""
-    error, allowed, theta_2 = (np.array(column) for column in zip(*(each[:3] for each in findings), strict=True))
+    error, allowed, theta_2 = (np.array(column) for column in zip(*(finding[:3] for finding in findings), strict=True))
     worst = findings[int(np.argmax(find_used(error, allowed)))]
     condition = EQUIVALENCE.factor / np.maximum(allowed, EQUIVALENCE.factor)
     who = (name, answer.engine, answer.setting)
@@ -65,15 +65,15 @@ def make_worst_row(name: str, answer: Answer, quantity: str, findings: Sequence[
 def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
     """Ask an engine at some places where bar 2 turns at 1 rad/s; the bars are uniform: masses play no part."""
     # neighbours in turn: an engine starts from the position before
-    each = sorted(set(places), key=lambda place: place[::-1])
-    if not each:
+    ordered = sorted(set(places), key=lambda place: place[::-1])
+    if not ordered:
         return {}
     bars = uniform(*linkage.lengths)
     scene = Scene(FourBar(bars.ground, bars.input, bars.coupler, bars.output, linkage.ground_angle), Motion(0.0, 1.0))
-    theta_2, branch = (np.array(column) for column in zip(*each, strict=True))
+    theta_2, branch = (np.array(column) for column in zip(*ordered, strict=True))
     answer = require_answer(engine, scene, Command(theta_2, branch.astype(np.int8), 1.0, 0.0)).quantities
     names = [name for name in OF_BARS if name in answer]
-    return {place: {name: float(answer[name][i]) for name in names} for i, place in enumerate(each)}
+    return {place: {name: float(answer[name][i]) for name in names} for i, place in enumerate(ordered)}
 
 
 def require_answer(engine: Adapter, scene: Scene, at: Command) -> Answer:
@@ -84,11 +84,11 @@ def require_answer(engine: Adapter, scene: Scene, at: Command) -> Answer:
     return answer
 
 
-def compare_angles(what: str, stated: Sequence[float], found: Sequence[float], linkage: FourBar) -> Finding:
+def compare_angles(what: str, stated: Sequence[float], answered: Sequence[float], linkage: FourBar) -> Finding:
     """Compare lists of angles, modulo 2 pi in any order: the largest distance of one from the nearest of the other."""
-    if not stated or not found:
-        return Finding(0.0 if len(stated) == len(found) else math.inf, 0.0, 0.0, what)
-    apart = np.abs(wrap_angle(np.subtract.outer(np.array(stated), np.array(found))))
+    if not stated or not answered:
+        return Finding(0.0 if len(stated) == len(answered) else math.inf, 0.0, 0.0, what)
+    apart = np.abs(wrap_angle(np.subtract.outer(np.array(stated), np.array(answered))))
     error = float(max(apart.min(axis=0).max(), apart.min(axis=1).max()))
     return Finding(
         error, EQUIVALENCE.factor * count_half_turns(linkage.ground_angle, np.array(stated)), stated[0], what
@@ -110,14 +110,14 @@ def _compare_change_points(linkage: FourBar) -> Finding:
     """Decide by exact sums of the lengths in which of the two positions with input and ground in line all bars are."""
     d, a, b, c = (Fraction(length) for length in linkage.lengths)
     missing = {0.0: abs(abs(d - a) - abs(b - c)), math.pi: abs(d + a - b - c)}
-    stated, wrong, known = mobility.change_points(linkage), 0, 0
+    stated, wrong, decided = mobility.change_points(linkage), 0, 0
     for psi, gap in missing.items():
         part, angle = float(gap / (d + a + b + c)), linkage.ground_angle + psi
         allowed = EQUIVALENCE.factor * max(1.0, abs(angle))
         here = any(abs(math.remainder(point - angle, TURN)) <= allowed for point in stated)
-        known += here
+        decided += here
         wrong += part > LENGTHS_ROUNDED[1] if here else part < LENGTHS_ROUNDED[0]
-    return Finding(float(wrong + len(stated) - known), 0.0, linkage.ground_angle, "change points")
+    return Finding(float(wrong + len(stated) - decided), 0.0, linkage.ground_angle, "change points")
 
 
 def compute_step_beyond(linkage: FourBar, theta_2: float) -> float:
@@ -186,7 +186,7 @@ def _compute_inwards(linkage: FourBar, theta_2: float) -> float:
 def _mark_collinear(linkage: FourBar, bar: int) -> list[bool]:
     """Return for each limit of a bar whether all bars are collinear there, apart from rounding."""
     angles = np.array([limit.theta_2 for limit in mobility.limit_positions(linkage, bar)])
-    return [bool(each) for each in np.abs(find_margin(linkage, angles)) <= TOUCHING_MARGIN]
+    return [bool(touches) for touches in np.abs(find_margin(linkage, angles)) <= TOUCHING_MARGIN]
 
 
 class Stated(NamedTuple):
@@ -219,9 +219,9 @@ def compare_ranges(stated: Stated, engine: Adapter) -> Iterator[Finding]:
         closes = require_answer(engine, tried.scene, tried.command).assembled
         assert closes is not None
         wrong = tried.decidable & (closes != tried.inside)
-        where = float(tried.angles[int(np.argmax(wrong))])
-        what = f"bar {bar} at {where!r} rad: the engine finds the opposite" if wrong.any() else "closes where stated"
-        yield Finding(float(np.count_nonzero(wrong)), 0.0, where, what)
+        angle = float(tried.angles[int(np.argmax(wrong))])
+        what = f"bar {bar} at {angle!r} rad: the engine finds the opposite" if wrong.any() else "closes where stated"
+        yield Finding(float(np.count_nonzero(wrong)), 0.0, angle, what)
         yield from tried.findings
     yield _compare_change_points(stated.linkage)
 
@@ -275,8 +275,8 @@ def _check_dead_centres(stated: Stated, bar: int, seen: Seen) -> Iterator[Findin
     """Check that the other two bars are in one line there, and the bar is at rest."""
     linkage = stated.linkage
     for limit, collinear in zip(mobility.limit_positions(linkage, bar), stated.collinear[bar], strict=True):
-        known = (0, 1, -1) if collinear else (1, -1)  # all bars collinear: rounding decides
-        yield Finding(float(limit.branch not in known), 0.0, limit.theta_2, f"branch of a limit of bar {bar}")
+        signs = (0, 1, -1) if collinear else (1, -1)  # all bars collinear: rounding decides
+        yield Finding(float(limit.branch not in signs), 0.0, limit.theta_2, f"branch of a limit of bar {bar}")
     for limit in stated.dead_centres(bar):
         what, place = f"bar {bar} at theta_2 = {limit.theta_2!r}", (limit.theta_2, limit.branch)
         theta_3, theta_4, omega_3, omega_4 = (seen[place][q] for q in ("theta_3", "theta_4", "omega_3", "omega_4"))

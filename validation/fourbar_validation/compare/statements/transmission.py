@@ -65,17 +65,17 @@ def _compare_over(scene: Scene, answer: Answer, predicted: Predicted | None) -> 
     at = answer.at
     assert at is not None
     for claim in _list_claims(scene, answer):
-        allowed, where = claim.allowed, claim.where & ~(claim.allowed >= NOTHING_TO_TELL)
-        beyond = where & ~(claim.error <= allowed)
+        allowed, mask = claim.allowed, claim.where & ~(claim.allowed >= NOTHING_TO_TELL)
+        beyond = mask & ~(claim.error <= allowed)
         if predicted is not None and beyond.any():
             if claim.rates:
                 lost = predicted("omega_4", beyond) / np.abs(answer.quantities["omega_4"])
             else:
                 lost = predicted("theta_3", beyond) + predicted("theta_4", beyond)
             allowed = np.where(beyond, np.fmax(allowed, DEGRADED * lost), allowed)
-            where = where & ~(allowed >= NOTHING_TO_TELL)
-        if where.any():
-            most = np.flatnonzero(where)[find_worst(find_used(claim.error[where], allowed[where]))]
+            mask = mask & ~(allowed >= NOTHING_TO_TELL)
+        if mask.any():
+            most = np.flatnonzero(mask)[find_worst(find_used(claim.error[mask], allowed[mask]))]
             yield Finding(float(claim.error[most]), float(allowed[most]), float(at.theta_2[most]), claim.what)
     yield _compare_distance(scene, at)
 
@@ -145,8 +145,8 @@ def _compute_to_singular(scene: Scene, theta_2: Array, branch: Array) -> Array:
 
 def _find_ends(linkage: FourBar) -> tuple[tuple[float, float, float], ...]:
     """Least and greatest angle between bars 3 and 4, theta_2 there, and what the angle is where they are collinear."""
-    of = transmission.transmission_extremes(linkage)
-    return (of.least, of.theta_2_least, 0.0), (of.greatest, of.theta_2_greatest, math.pi)
+    extremes = transmission.transmission_extremes(linkage)
+    return (extremes.least, extremes.theta_2_least, 0.0), (extremes.greatest, extremes.theta_2_greatest, math.pi)
 
 
 def _compare_extremes(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
@@ -159,9 +159,9 @@ def _compare_extremes(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
         digits = find_lever(linkage) * math.sin(angle)
         if not digits * NOTHING_TO_TELL <= EPS:
             yield Finding(abs(angle - value), find_roundoff(linkage) / digits, theta_2, "extreme of the angle at B")
-    of = transmission.transmission_extremes(linkage)
-    smallest = min(of.least, math.pi - of.greatest)
-    yield Finding(abs(of.worst - smallest), EPS, of.theta_2_least, "smallest transmission angle")
+    extremes = transmission.transmission_extremes(linkage)
+    smallest = min(extremes.least, math.pi - extremes.greatest)
+    yield Finding(abs(extremes.worst - smallest), EPS, extremes.theta_2_least, "smallest transmission angle")
 
 
 def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
@@ -172,20 +172,20 @@ def _find_strokes(linkage: FourBar) -> tuple[float, tuple[float, float]] | None:
     dead = [limit.theta_2 for limit in mobility.limit_positions(linkage, 4) if limit.branch == -1]
     if len(dead) != 2 or not mobility.turns_fully(linkage) or mobility.change_points(linkage):
         return None
-    there = (dead[1] - dead[0]) % TURN
-    return there, (dead[0] + there / 2.0, dead[1] + (TURN - there) / 2.0)
+    stroke = (dead[1] - dead[0]) % TURN
+    return stroke, (dead[0] + stroke / 2.0, dead[1] + (TURN - stroke) / 2.0)
 
 
 def _compare_time_ratio(linkage: FourBar, seen: Seen) -> Iterator[Finding]:
     ratio, strokes, theta_1 = mobility.time_ratio(linkage), _find_strokes(linkage), linkage.ground_angle
-    known = (strokes is None) == (ratio is None)
-    yield Finding(float(not known), 0.0, theta_1, "whether there is a time ratio")
+    agree = (strokes is None) == (ratio is None)
+    yield Finding(float(not agree), 0.0, theta_1, "whether there is a time ratio")
     if strokes is not None and ratio is not None:
-        there, middles = strokes
-        one, other = (seen[(theta_2, -1)]["omega_4"] for theta_2 in middles)
+        stroke, middles = strokes
+        one, second = (seen[(theta_2, -1)]["omega_4"] for theta_2 in middles)
         place = middles[0]
-        yield Finding(float(not one * other < 0.0), 0.0, place, "bar 4 turns in both senses")
-        shorter, longer = sorted((there, TURN - there))
+        yield Finding(float(not one * second < 0.0), 0.0, place, "bar 4 turns in both senses")
+        shorter, longer = sorted((stroke, TURN - stroke))
         # both angles are differences of two that were rounded
         yield Finding(
             abs(ratio / (longer / shorter) - 1.0), find_roundoff(linkage) * TURN / shorter, place, "time ratio"

@@ -55,8 +55,8 @@ class ClosedLoop(Assembled):
         self.body = {name: self.model.body(name).id for name in ("input", "coupler", "output")}
         loads = [i for i in range(self.model.nu) if self.model.actuator(i).name.startswith("load_")]
         self.loads = [(i, self.model.site_bodyid[self.model.actuator_trnid[i, 0]]) for i in loads]
-        named = {self.model.actuator(i).name: i for i in range(self.model.nu)}
-        self.drive, self.ram = named.get("drive"), named.get(CYLINDER)
+        actuators = {self.model.actuator(i).name: i for i in range(self.model.nu)}
+        self.drive, self.ram = actuators.get("drive"), actuators.get(CYLINDER)
         self._jac = np.zeros((3, self.model.nv))
 
     def gap(self) -> tuple[float, float]:

@@ -191,9 +191,11 @@ def _describe_loads(topology: Topology) -> Described:
             described[f"actuators.{model.actuator(i).name or i}"] = ModelEntry("acts on no pin, bar or tendon", element)
     for key, (fx, fy, couple, turning, along) in sums.items():
         squared = fx * fx + fy * fy
-        at = ((fx * along + fy * turning) / squared, (fy * along - fx * turning) / squared) if squared else (0.0, 0.0)
+        point = (
+            ((fx * along + fy * turning) / squared, (fy * along - fx * turning) / squared) if squared else (0.0, 0.0)
+        )
         described[f"{key}.force"] = ModelEntry((float(fx), float(fy)))
-        described[f"{key}.point"] = ModelEntry((float(at[0]), float(at[1])))
+        described[f"{key}.point"] = ModelEntry((float(point[0]), float(point[1])))
         described[f"{key}.couple"] = ModelEntry(float(couple) if squared else float(couple + turning))
     return described
 

@@ -188,13 +188,13 @@ class Lead:
             command = find_angle(command, motion, *loop.cylinder(command.bar))
         self.command, self.values = command, command.angle if command.stroke is None else command.stroke
         self.speed, self.acceleration = float(np.max(motion.speed or 0.0)), float(np.max(motion.acceleration))
-        found = find_assembled(Assembler(loop, command.bar), command, range(len(self.values)))
-        self.closes = np.array([q is not None for q in found])
+        assembled = find_assembled(Assembler(loop, command.bar), command, range(len(self.values)))
+        self.closes = np.array([q is not None for q in assembled])
         if not self.closes.any():
             raise LimitError("the loop closes at none of the positions")
-        self.input, branch = np.full((3, len(found)), np.nan), command.branch.copy()
+        self.input, branch = np.full((3, len(assembled)), np.nan), command.branch.copy()
         """theta_2, omega_2, alpha_2."""
-        for index, q in enumerate(found):
+        for index, q in enumerate(assembled):
             if q is not None:
                 try:
                     loop.set_state(q, self.speed, self.bar)

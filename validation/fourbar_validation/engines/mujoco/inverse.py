@@ -42,8 +42,8 @@ class MujocoTree(Tree):
             body.explicitinertial = True
             body.mass, body.ipos, body.inertia = part.mass, [*part.centre, 0.0], [part.inertia] * 3
             body.add_joint(name=FIRST_PIN[part.bar], type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
-            for name, at in part.points.items():
-                body.add_site(name=name, pos=[*at, 0.0])
+            for name, place in part.points.items():
+                body.add_site(name=name, pos=[*place, 0.0])
         with warnings.catch_warnings():
             # the warning is about the mass matrix at q = 0, which inverse dynamics never divides by
             warnings.filterwarnings("ignore", "Inertia matrix is too close to singular")

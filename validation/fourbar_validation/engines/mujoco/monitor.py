@@ -151,11 +151,11 @@ class ResidualMonitor:
         for name, x in (("theta", q), ("omega", v), ("alpha", a)):
             answer[f"{name}_3"], answer[f"{name}_4"] = x[O2] + x[A], x[O4]
         try:
-            result = solve_multipliers(jacobian, drive, needed)
+            multipliers = solve_multipliers(jacobian, drive, needed)
         except np.linalg.LinAlgError:
-            result = np.full(3, np.inf)
-        answer |= {"F43": result[:2], self.drive: result[2]}
-        answer |= self._compute_pins(result[:2], float(result[2]))
+            multipliers = np.full(3, np.inf)
+        answer |= {"F43": multipliers[:2], self.drive: multipliers[2]}
+        answer |= self._compute_pins(multipliers[:2], float(multipliers[2]))
         jerk = jacobian @ a + (rate_3 - rate_4) @ v
         a_B = bars.jacobian_at("B4") @ a + rate_4 @ v
         return _Motion(gap, jacobian @ v, jerk, a_B, jacobian, drive, needed, answer)
@@ -176,8 +176,8 @@ class ResidualMonitor:
         q, v, a = q.copy(), v.copy(), a.copy()
         others = [A, O4]
         q[others] -= np.linalg.solve(self.bars.jacobian()[:, others], seen.gap)
-        at = self._motion(q, v, a)
-        v[others] -= np.linalg.solve(self.bars.jacobian()[:, others], at.slip)
-        at = self._motion(q, v, a)
-        a[others] -= np.linalg.solve(self.bars.jacobian()[:, others], at.jerk)
+        motion = self._motion(q, v, a)
+        v[others] -= np.linalg.solve(self.bars.jacobian()[:, others], motion.slip)
+        motion = self._motion(q, v, a)
+        a[others] -= np.linalg.solve(self.bars.jacobian()[:, others], motion.jerk)
         return self._motion(q, v, a)

@@ -83,5 +83,5 @@ class _Work:
     def _compute_power(self) -> float:
         d = self.data
         rubbing = np.isin(d.efc_type, FRICTION)
-        own = float(d.qvel @ (d.qfrc_actuator + d.qfrc_damper))
-        return own + float(d.efc_force[rubbing] @ d.efc_vel[rubbing])
+        power = float(d.qvel @ (d.qfrc_actuator + d.qfrc_damper))
+        return power + float(d.efc_force[rubbing] @ d.efc_vel[rubbing])

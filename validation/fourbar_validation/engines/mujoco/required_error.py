@@ -83,9 +83,9 @@ def compute_expected_error(scene: Scene, answer: Answer) -> float:
             continue
         values = answer.quantities[name]
         sizes = np.where(np.isfinite(values), 1.0, np.nan) if name.startswith("theta") else magnitude(values)
-        known = np.isfinite(sizes)
+        finite = np.isfinite(sizes)
         if name == "torque" and scene.drive_bar != 2:
-            known &= mark_turning(answer.quantities[f"omega_{scene.drive_bar}"])
-        if known.any() and sizes[known].max() > 0.0:
-            worst = float(np.maximum(worst, divide(predicted[known].max(), sizes[known].max())))  # NaN stays NaN
+            finite &= mark_turning(answer.quantities[f"omega_{scene.drive_bar}"])
+        if finite.any() and sizes[finite].max() > 0.0:
+            worst = float(np.maximum(worst, divide(predicted[finite].max(), sizes[finite].max())))  # NaN stays NaN
     return worst if np.isfinite(worst) else float("inf")

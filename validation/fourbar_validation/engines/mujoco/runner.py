@@ -77,8 +77,8 @@ class Lawful:
         steps = turned / (2.0 * math.pi) * settings.steps_per_revolution
         if 0.0 < self.width < FULL_TURN:
             steps = max(steps, settings.steps_per_window * turned / self.width)
-        each = math.ceil(steps / self.intervals * (1.0 - 1e-9))
-        return self.duration / (self.intervals * each) * settings.timestep_scale
+        pieces = math.ceil(steps / self.intervals * (1.0 - 1e-9))
+        return self.duration / (self.intervals * pieces) * settings.timestep_scale
 
     def seconds(self, index: int) -> float:
         """Return it as the law was sampled."""
@@ -90,9 +90,9 @@ class Lawful:
 
     def alpha(self, seconds: float) -> float:
         """Interpolate linearly, as the second derivative of cubic pieces is."""
-        at, t, f = self.began + seconds, self.knots, self.at_knots
-        k = min(max(bisect.bisect_right(t, at), 1), len(t) - 1)
-        part = (at - t[k - 1]) / (t[k] - t[k - 1])
+        instant, t, f = self.began + seconds, self.knots, self.at_knots
+        k = min(max(bisect.bisect_right(t, instant), 1), len(t) - 1)
+        part = (instant - t[k - 1]) / (t[k] - t[k - 1])
         return float(f[k - 1] + part * (f[k] - f[k - 1]))
 
 
@@ -188,20 +188,20 @@ class SimulatedRun:
 
 def find_assembled(position: Assembler, command: Command, order: Iterable[int]) -> list[Found]:
     """Own joint angles of every commanded position, found one after the other in an order."""
-    result: list[Found] = [None] * len(command.angle)
+    assembled: list[Found] = [None] * len(command.angle)
     for index in order:
-        result[index] = position.find(float(command.angle[index]), int(command.branch[index]))
-    return result
+        assembled[index] = position.find(float(command.angle[index]), int(command.branch[index]))
+    return assembled
 
 
 def split_segments(
-    found: list[Found], order: Iterable[int], joined: Callable[[int, int], bool] = lambda one, other: True
+    assembled: list[Found], order: Iterable[int], joined: Callable[[int, int], bool] = lambda one, other: True
 ) -> list[list[int]]:
     """Split the positions, in order of time, where the loop does not close, or two neighbours are not joined."""
     split: list[list[int]] = [[]]
     for index in order:
-        if found[index] is None or (split[-1] and not joined(split[-1][-1], index)):
+        if assembled[index] is None or (split[-1] and not joined(split[-1][-1], index)):
             split.append([])
-        if found[index] is not None:
+        if assembled[index] is not None:
             split[-1].append(int(index))
     return [segment for segment in split if segment]

@@ -35,13 +35,13 @@ def compare_shipped(name: str, scene: Scene, at: Command) -> Row | None:
     except (InputError, LimitError, NotAssembledError):  # no file is shipped; the simulation's own row says why
         return None
     d, size = loop.data, math.fsum(scene.linkage.lengths)
-    result: list[tuple[float, str]] = []
+    errors: list[tuple[float, str]] = []
 
     def closed(what: str) -> None:
         mujoco.mj_forward(loop.model, d)
-        result.append((math.hypot(*loop.gap()) / (OPEN * size), f"{what}: the loop is open"))
-        other = float(loop.branch() != at.branch[0]) if scene.motion.through == "sign" else 0.0
-        result.append((math.inf if other else 0.0, f"{what}: not {BRANCH_NAMES[int(at.branch[0])]}"))
+        errors.append((math.hypot(*loop.gap()) / (OPEN * size), f"{what}: the loop is open"))
+        wrong_branch = float(loop.branch() != at.branch[0]) if scene.motion.through == "sign" else 0.0
+        errors.append((math.inf if wrong_branch else 0.0, f"{what}: not {BRANCH_NAMES[int(at.branch[0])]}"))
 
     mujoco.mj_resetData(loop.model, d)
     closed("as it opens")
@@ -49,10 +49,10 @@ def compare_shipped(name: str, scene: Scene, at: Command) -> Row | None:
     closed("keyframe")
     first = at.theta_2[np.argmin(np.abs(np.angle(np.exp(1j * (at.theta_2 - d.qpos[O2])))))]
     apart = abs(math.remainder(float(first - d.qpos[O2]), math.tau))
-    result.append((apart / (K * EPS * max(1.0, abs(float(first)))), "keyframe: theta_2 is none of the scene's"))
-    result.append((abs(float(d.qvel[O2]) / omega - 1.0) / (K * EPS), "keyframe: omega_2"))
+    errors.append((apart / (K * EPS * max(1.0, abs(float(first)))), "keyframe: theta_2 is none of the scene's"))
+    errors.append((abs(float(d.qvel[O2]) / omega - 1.0) / (K * EPS), "keyframe: omega_2"))
     slip = float(np.hypot(*(loop.jacobian() @ d.qvel[:3])))
-    result.append((slip / (OPEN * size * float(np.abs(d.qvel).max())), "keyframe: the bars' speeds open the loop"))
+    errors.append((slip / (OPEN * size * float(np.abs(d.qvel).max())), "keyframe: the bars' speeds open the loop"))
     moving = 0.0
     if scene.motion.alpha_2 == 0.0:  # a servo; from rest as the file opens
         mujoco.mj_resetData(loop.model, d)
@@ -60,19 +60,19 @@ def compare_shipped(name: str, scene: Scene, at: Command) -> Row | None:
     else:  # a motor: on from the keyframe
         moving = omega + scene.motion.alpha_2 * STEPS * loop.model.opt.timestep
     if (beyond := _find_not_driven(scene, omega, float(d.qpos[O2]), STEPS * loop.model.opt.timestep)) is not None:
-        error, reason = _find_worst(result)
+        error, reason = _find_worst(errors)
         verdict, reason = (FAILS, reason) if error > 1.0 else (UNDECIDED, f"the drive is not run: {beyond}")
         return Row(name, NAME, "shipped", QUANTITY, error, 1.0, verdict, reason, float(d.qpos[O2]), 1.0)
     mujoco.mj_step(loop.model, d, STEPS)
     lost = d.time < 0.5 * STEPS * loop.model.opt.timestep
     speed = math.inf if lost else abs(float(d.qvel[O2]) - moving) / (SPEED * max(abs(omega), abs(moving)))
-    result.append((speed, f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of {moving:.6g} rad/s"))
-    error, reason = _find_worst(result)
+    errors.append((speed, f"after {STEPS} steps the input turns at {d.qvel[O2]:.6g} of {moving:.6g} rad/s"))
+    error, reason = _find_worst(errors)
     return Row.judged((name, NAME, "shipped"), QUANTITY, error, 1.0, reason, float(d.qpos[O2]))
 
 
-def _find_worst(found: list[tuple[float, str]]) -> tuple[float, str]:
-    return max(found, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
+def _find_worst(errors: list[tuple[float, str]]) -> tuple[float, str]:
+    return max(errors, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
 
 
 def _find_not_driven(scene: Scene, omega_2: float, theta_2: float, seconds: float) -> str | None:

@@ -161,15 +161,15 @@ class _Simulation:
         """Answer over all positions."""
         bar, linkage = self.command.bar, self.scene.linkage
         position = Assembler(ClosedLoop(self._write_text(1e-3)), bar)  # kinematics alone: the timestep plays no part
-        result = find_assembled(position, self.command, self.order)
-        closes = np.array([angles is not None for angles in result])
+        assembled = find_assembled(position, self.command, self.order)
+        closes = np.array([angles is not None for angles in assembled])
         least = (
             compute_least_sine(linkage, self.command.theta_2, closes) if self.lead is None else self.lead.least_sine()
         )
         if self.bounded and least < NEAREST_TOGGLE.boundary:
             raise LimitError(f"|sin(theta_4 - theta_3)| falls to {least:.1e}; {NEAREST_TOGGLE.reason}")
-        for segment in split_segments(result, self.order, partial(self._closes_between, position)):
-            start = result[segment[0]]
+        for segment in split_segments(assembled, self.order, partial(self._closes_between, position)):
+            start = assembled[segment[0]]
             assert start is not None
             self._run(segment, start)
         self.out["theta_2"] = clip_angles(self.scene, self.out["theta_2"])
@@ -177,13 +177,13 @@ class _Simulation:
         commanded = zip(COMMANDS[bar], (self.command.angle, *list_speeds(self.command)), strict=True)
         made = [np.where(np.isnan(self.out[name]), x, self.out[name]) for name, x in commanded]
         made[0] = made[0] + 2.0 * np.pi * np.round((self.command.angle - made[0]) / (2.0 * np.pi))
-        at = Command(made[0], self.branch, made[1], made[2], bar=bar)
+        motion = Command(made[0], self.branch, made[1], made[2], bar=bar)
         values = {name: x for name, x in self.out.items() if bar != 2 or name not in MADE}
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
         return Answer(
             "mujoco-simulated",
             setting,
-            at,
+            motion,
             closes,
             values,
             predicted=self.predicted,
@@ -212,9 +212,9 @@ class _Simulation:
         settings = replace(self.settings, timestep=timestep, timestep_scale=1.0, flywheel=heavy)
         return write_mjcf(take_full_size(self.scene), settings, keyframe=False)
 
-    def _closes_between(self, position: Assembler, one: int, other: int) -> bool:
+    def _closes_between(self, position: Assembler, one: int, second: int) -> bool:
         """Tell whether the loop closes everywhere between two positions."""
-        start, stop = float(self.command.angle[one]), float(self.command.angle[other])
+        start, stop = float(self.command.angle[one]), float(self.command.angle[second])
         pieces = int(np.ceil(abs(stop - start) / FINE))
         branch = int(self.command.branch[one])
         return all(

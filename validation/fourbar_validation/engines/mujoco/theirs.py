@@ -156,8 +156,8 @@ class UserLoop(Assembled):
             self.notes.append(f"its drive {model.actuator(i).name!r} on pin O2 is taken off: the torque is solved for")
         cylinders = self.topology.cylinders() if self.scene.drive is not None else []
         if self.scene.drive is not None and len(cylinders) != 1:
-            found = f"{len(cylinders)} actuators with a control on tendons"
-            raise InputError("MJCF", found, "the scene's drive is a cylinder: must be one")
+            counted = f"{len(cylinders)} actuators with a control on tendons"
+            raise InputError("MJCF", counted, "the scene's drive is a cylinder: must be one")
         for i in cylinders:  # takes the force itself as its control
             model.actuator_gaintype[i], model.actuator_biastype[i] = mujoco.mjtGain.mjGAIN_FIXED, NO_BIAS
             model.actuator_gainprm[i], model.actuator_dyntype[i] = 0.0, mujoco.mjtDyn.mjDYN_NONE
@@ -187,8 +187,8 @@ class UserLoop(Assembled):
         """Return the derivative of the gap by x, (2, 3)."""
         rows = []
         for bar in PINS[self.topology.cut]:
-            body, at = self.topology.root[bar], self.topology.world(self.data, bar, self.topology.cut)
-            mujoco.mj_jac(self.model, self.data, self._jac, None, at, body)
+            body, place = self.topology.root[bar], self.topology.world(self.data, bar, self.topology.cut)
+            mujoco.mj_jac(self.model, self.data, self._jac, None, place, body)
             rows.append(self._jac[list(self.topology.axes)] @ self.to_joints)
         return np.asarray(rows[0] - rows[1])
 
@@ -329,8 +329,8 @@ def answer_through_time(loop: UserLoop, at: Command) -> Answer:
         for name, array in out.items():
             array[i] = values[name]
     model.dof_armature[loop.crank] = loop.armature
-    known = np.isfinite(out["theta_2"])
-    out = {name: array[known] for name, array in out.items()}
-    where, _ = split_answer(out, at.branch[segment][known])
+    finite = np.isfinite(out["theta_2"])
+    out = {name: array[finite] for name, array in out.items()}
+    motion, _ = split_answer(out, at.branch[segment][finite])
     setting = f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')} {timestep:g} s"
-    return Answer(THROUGH_TIME, setting, where, np.ones(known.sum(), dtype=bool), out, evidence=seen, alarms=alarms)
+    return Answer(THROUGH_TIME, setting, motion, np.ones(finite.sum(), dtype=bool), out, evidence=seen, alarms=alarms)

@@ -96,9 +96,9 @@ class TrialSetup:
         self.scene, self.command = replace(scene, motion=motion), command
         order = order_in_time(command.theta_2, None, self.omega)
         position = Assembler(ClosedLoop(write_mjcf(self.scene, Settings(timestep=1e-3), keyframe=False)))
-        result = find_assembled(position, command, order)
-        self.segments = [segment for segment in split_segments(result, order) if len(segment) > 1]
-        self.start = {index: angles for index, angles in enumerate(result) if angles is not None}
+        assembled = find_assembled(position, command, order)
+        self.segments = [segment for segment in split_segments(assembled, order) if len(segment) > 1]
+        self.start = {index: angles for index, angles in enumerate(assembled) if angles is not None}
         if not self.segments:
             raise LimitError("the loop closes at no two neighbouring positions: nothing to run through in time")
 
