@@ -70,7 +70,7 @@ def test_every_scene_and_command_comes_back_bit_for_bit():
         told, command = protocol.command_from_json(back, through_text(protocol.command_to_json(scene, at)))
         if scene.motion.stroke is not None:
             at = at._replace(
-                angle=np.full_like(at.angle, np.nan), acceleration=np.full_like(at.angle, np.nan), lever=None
+                angle=np.full_like(at.angle, np.nan), acceleration=np.full_like(at.angle, np.nan), condition=None
             )
             at = at._replace(speed=None if at.speed is None else np.full_like(at.angle, np.nan), lost=None)
             assert told.motion.side == scene.motion.side
