@@ -82,7 +82,7 @@ def _find_least_steps(setup: TrialSetup, kind: tuple[str, bool], tc: float, most
     n = FEWEST_STEPS
     while n < most:
         if _serves(setup, kind, tc, n, error):
-            finer = (each for each in (n / FINE**2, n / FINE) if _serves(setup, kind, tc, each, error))
+            finer = (steps for steps in (n / FINE**2, n / FINE) if _serves(setup, kind, tc, steps, error))
             return int(next(finer, n) + 0.5)
         n *= COARSE
     return None
@@ -201,14 +201,14 @@ def study(count: int, seed: int, out: Path) -> int:
     from rich.progress import track
 
     cases = list(track(measure(seed, count, out), "advising", total=count, console=Console(stderr=True)))
-    met, cheap = sum(each.met for each in cases), sum(each.cheap for each in cases)
-    unreachable = sum(not each.reached for each in cases)
-    ratios = sorted(each.cost / each.cheapest for each in cases if each.reached and each.cheapest == each.cheapest)
+    met, cheap = sum(case.met for case in cases), sum(case.cheap for case in cases)
+    unreachable = sum(not case.reached for case in cases)
+    ratios = sorted(case.cost / case.cheapest for case in cases if case.reached and case.cheapest == case.cheapest)
     bound = compute_wilson(met, len(cases))
     click.echo(f"met: {met} of {len(cases)}, lower Wilson bound {bound:.3f} (needed {NEEDED_MET})")
     if bound < NEEDED_MET and (more := find_enough(len(cases) - met)) > len(cases):
         click.echo(f"undecided: with {len(cases) - met} not met the bound is reached from --count {more} on")
-    wrongly = sum(not each.met for each in cases if not each.reached)
+    wrongly = sum(not case.met for case in cases if not case.reached)
     click.echo(f"called unreachable: {unreachable}, of which the search reached {wrongly}")
     share = cheap / len(cases)
     click.echo(f"within {CHEAP:g} times the cheapest: {cheap} of {len(cases)}, {share:.3f} (needed {NEEDED_CHEAP})")

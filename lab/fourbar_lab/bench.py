@@ -182,10 +182,10 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
         line = [sys.executable, "-m", "fourbar_lab", "bench", *map(str, arguments)]
         status = subprocess.run(line, env=os.environ | dict.fromkeys(ONE_THREAD, "1"), check=False).returncode
         return status if status >= 0 else BROKEN  # below 0: a signal ended it
-    result = measure(positions, rounds, largest)
+    measurement = measure(positions, rounds, largest)
     rows: list[tuple[str, ...]] = []
     broken: list[str] = []
-    for what, measured in result.rows.items():
+    for what, measured in measurement.rows.items():
         limit = LIMITS.get(what)
         if limit is None:
             rows.append((what, f"{1e-6 * measured:.1f} ms" if what == JUDGED else f"{measured:.1f} ns/position"))
@@ -196,15 +196,15 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
     console = Console()
     title = f"{positions} positions, one core, medians of {rounds} interleaved rounds; {name_machine()}"
     console.print(make_table(("what", "measured", "needed", ""), rows, title=title))
-    for title, times in ((OVER_POSITIONS, result.over_positions), (OVER_LINKAGES, result.over_linkages)):
-        counts = sorted({n for own in times.values() for n in own})
+    for title, times in ((OVER_POSITIONS, measurement.over_positions), (OVER_LINKAGES, measurement.over_linkages)):
+        counts = sorted({n for timed in times.values() for n in timed})
         head = ["ns each", *(f"{n:.0e}".replace("e+0", "e") for n in counts)]
-        each = [[who, *(f"{own[n]:.4g}" if n in own else "" for n in counts)] for who, own in times.items()]
-        console.print(make_table(head, each, title=title))
-    for who, reason in result.not_run.items():
+        cells = [[who, *(f"{timed[n]:.4g}" if n in timed else "" for n in counts)] for who, timed in times.items()]
+        console.print(make_table(head, cells, title=title))
+    for who, reason in measurement.not_run.items():
         click.echo(f"not run: {who}: {reason}")
     if picture is not None:
-        draw_bench(result.over_positions, result.over_linkages, picture)
+        draw_bench(measurement.over_positions, measurement.over_linkages, picture)
     for what in broken:
         click.echo(f"fails: {what}")
     return FAILED if broken else HOLDS
@@ -255,6 +255,8 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
 def time_judging(engines: list[Engine], scenes: int) -> float:
     """Time the check of a random scene as `run` does it, nothing drawn: median CPU time in s."""
     suite = Random(scenes + 1, 0, tuple(DrawnType))
-    each = (partial(judge_for_report, suite.name(i), suite.scene(i), engines, draw=False) for i in range(scenes + 1))
-    times = [time_call(action) for action in each]
+    judgings = (
+        partial(judge_for_report, suite.name(i), suite.scene(i), engines, draw=False) for i in range(scenes + 1)
+    )
+    times = [time_call(action) for action in judgings]
     return median(times[1:])  # the first one imports the engines

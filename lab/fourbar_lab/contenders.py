@@ -80,10 +80,10 @@ def time_interleaved(actions: Mapping[str, Callable[[], object]], rounds: int, c
 
 def collect_loops() -> Peers:
     """Collect the closed formulas by several hands: each writes into arrays that are there."""
-    result: dict[str, Loop | str] = {"NumPy": _make_solve_loop(), "C": compile_loop()}
-    result |= {name: _make_library_loop(name) for name in ("JAX", "PyTorch")}
-    reasons = {name: each for name, each in result.items() if isinstance(each, str)}
-    return Peers({name: each for name, each in result.items() if not isinstance(each, str)}, reasons)
+    loops: dict[str, Loop | str] = {"NumPy": _make_solve_loop(), "C": compile_loop()}
+    loops |= {name: _make_library_loop(name) for name in ("JAX", "PyTorch")}
+    reasons = {name: loop for name, loop in loops.items() if isinstance(loop, str)}
+    return Peers({name: loop for name, loop in loops.items() if not isinstance(loop, str)}, reasons)
 
 
 def _make_solve_loop() -> Loop:
@@ -116,12 +116,12 @@ def _make_library_loop(name: str) -> Loop | str:
     def call(theta_2: Any, out: Any) -> None:
         if name == "JAX":
             with jax.enable_x64(True):
-                found = run(jax.numpy.asarray(theta_2))
+                evaluated = run(jax.numpy.asarray(theta_2))
         else:
-            found = run(torch.from_numpy(theta_2))
+            evaluated = run(torch.from_numpy(theta_2))
         row = 0
         for unknown in UNKNOWNS:
-            values = np.atleast_2d(np.asarray(found[unknown]).T)
+            values = np.atleast_2d(np.asarray(evaluated[unknown]).T)
             out[row : row + len(values)] = values
             row += len(values)
 
@@ -154,8 +154,8 @@ def time_positions(peers: dict[str, Loop], largest: int, rounds: int) -> Times:
     for n in [10**k for k in range(3, 9) if 10**k <= largest]:
         at_once, calls = min(n, AT_ONCE), max(1, SHORTEST // n, n // AT_ONCE)
         theta_2, out = make_command(at_once).theta_2, np.zeros((15, at_once))
-        own = {name: partial(loop, theta_2, out) for name, loop in peers.items()}
-        for name, value in time_interleaved(own, rounds if n <= AT_ONCE else 1, calls).items():
+        actions = {name: partial(loop, theta_2, out) for name, loop in peers.items()}
+        for name, value in time_interleaved(actions, rounds if n <= AT_ONCE else 1, calls).items():
             times[name][n] = 1e9 * value / at_once
     return times
 
@@ -193,16 +193,16 @@ def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(8.4, 4.0), layout="constrained")
-        left, right = figure.subplots(1, 2)
-        _draw_panel(left, over_positions, "ns per position, every unknown", "positions")
-        _draw_panel(right, over_linkages, "ns per linkage, every force at one position", "linkages")
+        positions_axes, linkages_axes = figure.subplots(1, 2)
+        _draw_panel(positions_axes, over_positions, "ns per position, every unknown", "positions")
+        _draw_panel(linkages_axes, over_linkages, "ns per linkage, every force at one position", "linkages")
         figure.supxlabel(f"One core: {name_machine()}", size=6.8, x=0.012, ha="left", parse_math=False)
         save(figure, path, kind)
 
 
 def _draw_panel(axes: "Axes", times: Times, title: str, over: str) -> None:
-    for (who, own), (colour, mark) in zip(times.items(), LOOKS, strict=False):
-        axes.loglog(list(own), list(own.values()), color=colour, marker=mark, ms=3.5, lw=1.1, label=who)
+    for (who, timed), (colour, mark) in zip(times.items(), LOOKS, strict=False):
+        axes.loglog(list(timed), list(timed.values()), color=colour, marker=mark, ms=3.5, lw=1.1, label=who)
     axes.set_title(title)
     axes.set_xlabel(over)
     axes.set_ylabel("ns")

@@ -79,8 +79,8 @@ def make_scene(effect: str, positions: int) -> Scene:
 
 def prepare_formulas(effect: str) -> Callable[[int], Any]:
     """Prepare pin forces and torque at POSITIONS positions, a given number of times."""
-    given = make_scene(effect, POSITIONS)
-    return lambda amount: [solve(given, "force") for _ in range(amount)]
+    scene = make_scene(effect, POSITIONS)
+    return lambda amount: [solve(scene, "force") for _ in range(amount)]
 
 
 def prepare_simulation(effect: str) -> Callable[[int], Any]:
@@ -98,8 +98,8 @@ def prepare_simulation(effect: str) -> Callable[[int], Any]:
 @cache
 def list_flags() -> dict[str, str]:
     """List the flags that the MJCF of a bare scene switches off, by the name of the workload that leaves one on."""
-    result = re.findall(r'(\w+)="disable"', write_mjcf(make_scene("none", 91)))
-    return {LEFT_ON.format(flag): flag for flag in result}
+    flags = re.findall(r'(\w+)="disable"', write_mjcf(make_scene("none", 91)))
+    return {LEFT_ON.format(flag): flag for flag in flags}
 
 
 def prepare_answers(name: str, effect: str) -> Callable[[int], Any]:
@@ -107,8 +107,8 @@ def prepare_answers(name: str, effect: str) -> Callable[[int], Any]:
     adapter = next(engine for engine in ENGINES if engine.name == name).start()
 
     def work(amount: int) -> None:
-        given = make_scene(effect, amount)
-        adapter.answer(given, command(given))
+        scene = make_scene(effect, amount)
+        adapter.answer(scene, command(scene))
 
     return work
 
@@ -140,9 +140,11 @@ def measure(engine: str, effect: str, rounds: int = ROUNDS) -> EffectCost:
     for work in works.values():
         work()
     clocks = {which: partial(time_call, work) for which, work in works.items()}
-    bare, own = map(np.array, time_in_turns(clocks, rounds).values())
+    bare, loaded = map(np.array, time_in_turns(clocks, rounds).values())
     units = amount * (POSITIONS if engine == "formulas" else 1)
-    return EffectCost(engine, effect, float(np.median(bare)) / units, *np.percentile(own / bare, [25, 50, 75]).tolist())
+    return EffectCost(
+        engine, effect, float(np.median(bare)) / units, *np.percentile(loaded / bare, [25, 50, 75]).tolist()
+    )
 
 
 def list_rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[str]]]:
@@ -159,7 +161,7 @@ def list_rows(costs: Iterable[EffectCost]) -> tuple[list[str], list[list[str]]]:
             elif effect == "none":
                 cells.append(f"{1e6 * one.seconds:.3g} us")
             else:
-                low, median, high = (f"{100.0 * (each - 1.0):+.0f}" for each in one[3:])
+                low, median, high = (f"{100.0 * (ratio - 1.0):+.0f}" for ratio in one[3:])
                 cells.append(f"{median} % [{low}, {high}]")
         table.append(cells)
     return engines, table

@@ -136,9 +136,9 @@ def massless(rng: np.random.Generator) -> Scene:
 def springs(rng: np.random.Generator) -> Scene:
     """Draw a spring near the length at which its force is zero, with a preload in every other scene."""
     scene = massless(rng)
-    one, other = (int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False))
-    start, end = (SpringEnd(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()) for bar in (one, other))
-    marked = replace(scene, points=(Point("P", one, start[1:]), Point("Q", other, end[1:])))
+    first, second = (int(bar) for bar in rng.choice((1, *MOVING_BARS), 2, replace=False))
+    start, end = (SpringEnd(bar, *rng.uniform((0.0, -3.0), (1.0, 3.0)).tolist()) for bar in (first, second))
+    marked = replace(scene, points=(Point("P", first, start[1:]), Point("Q", second, end[1:])))
     places = solve(marked, "position").points
     distance = math.hypot(*(places["Q"] - places["P"])[0])
     stiffness, preload = float(rng.uniform(10.0, 1000.0)), 0.0
@@ -157,9 +157,9 @@ def torsion(rng: np.random.Generator) -> Scene:
     an error that is zero by chance says nothing of the bar.
     """
     scene = massless(rng)
-    result, pin = solve(scene, "position"), str(rng.choice(["A", "B", "O4"]))
-    assert result.theta_3 is not None and result.theta_4 is not None
-    theta = (scene.linkage.ground_angle, result.theta_2[0], result.theta_3[0], result.theta_4[0])
+    solution, pin = solve(scene, "position"), str(rng.choice(["A", "B", "O4"]))
+    assert solution.theta_3 is not None and solution.theta_4 is not None
+    theta = (scene.linkage.ground_angle, solution.theta_2[0], solution.theta_3[0], solution.theta_4[0])
     first, second = PINS[pin]
     stiffness, preload = float(rng.uniform(0.1, 10.0)), 0.0
     if rng.random() < 0.5:
@@ -199,17 +199,17 @@ def strokes(rng: np.random.Generator) -> Scene:
     """Command the stroke of a cylinder from the ground to bar 2 or 4, as it comes out where the input is."""
     bar = int(rng.choice([2, 4]))
     scene = _put_cylinder(ANYWHERE.draw(rng), rng, 1, bar)
-    found = solve(scene, "acceleration")
-    assert found.stroke is not None and found.stroke_speed is not None
-    assert found.theta_3 is not None and found.theta_4 is not None and found.omega_4 is not None
-    one, other = (found.theta_3, found.theta_4) if bar == 2 else (found.theta_2, found.theta_3)
-    grows = found.stroke_speed[0] * (float(scene.motion.speed or 0.0) if bar == 2 else found.omega_4[0]) > 0.0
+    solution = solve(scene, "acceleration")
+    assert solution.stroke is not None and solution.stroke_speed is not None
+    assert solution.theta_3 is not None and solution.theta_4 is not None and solution.omega_4 is not None
+    first, second = (solution.theta_3, solution.theta_4) if bar == 2 else (solution.theta_2, solution.theta_3)
+    grows = solution.stroke_speed[0] * (float(scene.motion.speed or 0.0) if bar == 2 else solution.omega_4[0]) > 0.0
     motion = Motion(
-        stroke=float(found.stroke[0]),
-        stroke_speed=float(found.stroke_speed[0]),
+        stroke=float(solution.stroke[0]),
+        stroke_speed=float(solution.stroke_speed[0]),
         stroke_acceleration=float(rng.uniform(-2.0, 2.0)),
         side="left" if grows else "right",
-        branch=1 if math.sin(other[0] - one[0]) > 0.0 else -1,
+        branch=1 if math.sin(second[0] - first[0]) > 0.0 else -1,
     )
     return replace(scene, motion=motion)
 

@@ -32,16 +32,16 @@ def try_faults(numbers: Sequence[int]) -> list[Failing] | str:
     return done.why or [json.loads(each) for each in done.out.splitlines()[-max(1, len(numbers)) :]]
 
 
-def explain_survival(entry: dict[str, Any], found: Failing | str) -> str | None:
+def explain_survival(entry: dict[str, Any], failing: Failing | str) -> str | None:
     """Say why an entry does not count as caught on each of its test scenes; None where it does."""
-    if isinstance(found, str):
-        return f"it raises, which is no physical fault: {found}"
-    for scene, rows in found.items():
-        named = [row.partition(":")[0].partition(" ")[2] for row in rows]
+    if isinstance(failing, str):
+        return f"it raises, which is no physical fault: {failing}"
+    for scene, rows in failing.items():
+        quantities = [row.partition(":")[0].partition(" ")[2] for row in rows]
         if not rows:
             return f"nothing fails on {scene!r}"
-        if not set(named) & set(entry["caught_by"]):
-            return f"on {scene!r} {', '.join(sorted(set(named)))} fail, none of {', '.join(entry['caught_by'])}"
+        if not set(quantities) & set(entry["caught_by"]):
+            return f"on {scene!r} {', '.join(sorted(set(quantities)))} fail, none of {', '.join(entry['caught_by'])}"
     return None
 
 
@@ -57,12 +57,12 @@ def try_in_turn(numbers: Sequence[int]) -> list[Failing | str]:
 def try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
     """Try every fault: the reason why it survives, or None; first the tree without a fault."""
     entries, rows = read_faults(), try_faults(())
-    failing = rows if isinstance(rows, str) else [row for result in rows[0].values() for row in result]
+    failing = rows if isinstance(rows, str) else [row for outcome in rows[0].values() for row in outcome]
     yield "no fault", f"the harness fails without one: {failing}" if failing else None
     chunks = [range(start, min(start + CHUNK, len(entries))) for start in range(0, len(entries), CHUNK)]
-    for chunk, found in zip(chunks, apply_each(try_in_turn, chunks, workers, seconds=None), strict=True):
-        for number, result in zip(chunk, found, strict=True):
-            why = explain_survival(entries[number], result)
+    for chunk, outcomes in zip(chunks, apply_each(try_in_turn, chunks, workers, seconds=None), strict=True):
+        for number, outcome in zip(chunk, outcomes, strict=True):
+            why = explain_survival(entries[number], outcome)
             yield entries[number]["fault"], None if why and "harmless" in entries[number] else why
 
 

@@ -163,9 +163,9 @@ def shrink_scene(scene: Scene, fails: Callable[[Scene], bool]) -> Scene:
         for number in reversed(range(len(lines))):  # lines that a change removes lie behind
             for simpler in _list_simpler(lines, number):
                 try:
-                    other = loads("\n".join(simpler))
-                    if fails(other):
-                        scene, lines = other, simpler
+                    simpler_scene = loads("\n".join(simpler))
+                    if fails(simpler_scene):
+                        scene, lines = simpler_scene, simpler
                         break
                 except FourBarError:  # no scene any more
                     continue
@@ -184,7 +184,7 @@ def _list_simpler(lines: list[str], number: int) -> Iterator[list[str]]:
     key, _, value = line.partition(" = ")
     entries = [f"{key} = {json.dumps(each)}" for each in json.loads(value)] if value.startswith('["') else []
     for digits in DIGITS:
-        entries.append(NUMBER.sub(lambda found, digits=digits: f"{float(found[0]):.{digits}g}", line))  # type: ignore[misc]
+        entries.append(NUMBER.sub(lambda match, digits=digits: f"{float(match[0]):.{digits}g}", line))  # type: ignore[misc]
     for entry in entries:
         if entry != line:
             yield [*lines[:number], entry, *lines[number + 1 :]]
@@ -220,16 +220,16 @@ def _check_assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
     """Compare by ball arithmetic: no position where the loop does not close, none missing where it does."""
     from fourbar_validation.engines.balls import closure, make_balls
 
-    result = []
+    problems = []
     margin = np.abs(find_margin(scene.linkage, at.theta_2))
     for i, theta_2 in enumerate(at.theta_2):
         closes = closure(make_balls(scene, float(theta_2)), int(at.branch[i])) is not None
         if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
-            result.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
+            problems.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
         angles = (solution.theta_3[i], solution.theta_4[i])
         if np.isfinite(angles).any() and not solution.assembled[i]:
-            result.append(f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}")
-    return result
+            problems.append(f"assembled: angles where the loop does not close, theta_2 = {theta_2!r}")
+    return problems
 
 
 def _check_engines(question: Question) -> list[str]:
@@ -267,8 +267,8 @@ def run(count: int, seed: int, out: Path, workers: int, bounds: bool = False) ->
         yield from (store.read(stop)[0] for stop in sorted(done))
         todo = [chunk for chunk in chunks.items() if chunk[0] not in done]
         of, longest = partial(examine, seed, bounds), None if bounds else processes.SECONDS
-        for stop, result in processes.apply_over_processes(of, todo, workers, seconds=longest, instead=_find_lost):
-            wrong = {str(number): each for number, each in zip(chunks[stop], result, strict=True) if each}
+        for stop, outcomes in processes.apply_over_processes(of, todo, workers, seconds=longest, instead=_find_lost):
+            wrong = {str(number): outcome for number, outcome in zip(chunks[stop], outcomes, strict=True) if outcome}
             store.put(stop, [wrong])
             yield wrong
 
@@ -289,8 +289,8 @@ def fuzz(scenes: int, bounds: bool, seed: int, workers: int, out: Path) -> int:
     console = Console(stderr=True)
     wrong: dict[str, list[str]] = {}
     chunks = -(-scenes // (CHUNK_OF_PROOFS if bounds else CHUNK))
-    for result in track(run(scenes, seed, out, workers, bounds), "fuzzing", total=chunks, console=console):
-        wrong |= result
+    for chunk in track(run(scenes, seed, out, workers, bounds), "fuzzing", total=chunks, console=console):
+        wrong |= chunk
     for number in sorted(wrong, key=int)[:SHOWN]:
         source, name = wrong[number][0], "bounds_seed" if bounds else "seed"
         scene = (outside.draw_scene if bounds else draw_fuzz_scene)(seed, int(number))

@@ -54,8 +54,8 @@ def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> st
         case 4:  # a line twice
             return "".join([*lines[:line], lines[line], *lines[line:]])
         case 5:  # two files in one
-            other = originals[int(rng.integers(len(originals)))]
-            return text[:at] + other[int(rng.integers(len(other))) :]
+            donor = originals[int(rng.integers(len(originals)))]
+            return text[:at] + donor[int(rng.integers(len(donor))) :]
         case _:  # a digit changed
             digits = [i for i, character in enumerate(text) if character.isdigit()]
             at = digits[int(rng.integers(len(digits)))] if digits else 0

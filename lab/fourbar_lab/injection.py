@@ -84,14 +84,14 @@ def list_failing(names: list[str]) -> dict[str, list[str]]:
     from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES
     from fourbar_validation.run.judge import judge
 
-    result = {}
+    failing = {}
     for name in names or FAULT_SCENES:
         simulated = name.startswith("simulated")
-        own = HARD_ENGINES if name.startswith("to full accuracy") else ENGINES
-        engines = [engine for engine in own if simulated or not engine.through_time]
+        offered = HARD_ENGINES if name.startswith("to full accuracy") else ENGINES
+        engines = [engine for engine in offered if simulated or not engine.through_time]
         rows = judge(name, FAULT_SCENES[name], engines, shipped=name.startswith("shipped")).rows
-        result[name] = [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
-    return result
+        failing[name] = [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
+    return failing
 
 
 def main() -> None:
@@ -104,11 +104,11 @@ def main() -> None:
         entry = read_faults()[number]
         finder = FaultFinder(entry)
         sys.meta_path.insert(0, finder)
-        result = list_failing(entry["scenes"])
+        failing = list_failing(entry["scenes"])
         sys.meta_path.remove(finder)
         if finder.left:
             raise RuntimeError(f"the scenes use no {', '.join(finder.left)}")
-        print(json.dumps(result))
+        print(json.dumps(failing))
 
 
 if __name__ == "__main__":

@@ -97,21 +97,21 @@ def _list_changes(node: ast.AST) -> Iterator[tuple[str, Any]]:
         yield "value", not node.value
     elif isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         yield "value", node.value + 1
-    if (other := OTHER.get(type(getattr(node, "op", None)))) is not None:
-        yield "op", other()
+    if (opposite := OTHER.get(type(getattr(node, "op", None)))) is not None:
+        yield "op", opposite()
     ops = getattr(node, "ops", [])
-    for i, each in enumerate(ops):
-        if type(each) in OTHER:
-            yield "ops", [*ops[:i], OTHER[type(each)](), *ops[i + 1 :]]
+    for i, operator in enumerate(ops):
+        if type(operator) in OTHER:
+            yield "ops", [*ops[:i], OTHER[type(operator)](), *ops[i + 1 :]]
 
 
 def _find_code(within: CodeType, qualified: str) -> CodeType | None:
     """Find the code of a function in that of its module."""
-    for each in within.co_consts:
-        if isinstance(each, CodeType):
-            if each.co_qualname == qualified:
-                return each
-            if (inner := _find_code(each, qualified)) is not None:
+    for constant in within.co_consts:
+        if isinstance(constant, CodeType):
+            if constant.co_qualname == qualified:
+                return constant
+            if (inner := _find_code(constant, qualified)) is not None:
                 return inner
     return None
 
@@ -119,10 +119,10 @@ def _find_code(within: CodeType, qualified: str) -> CodeType | None:
 def _find_function(module: ModuleType, qualified: str) -> FunctionType:
     """Find the function itself, below its decorators."""
     owner, _, name = qualified.rpartition(".")
-    result = inspect.getattr_static(getattr(module, owner) if owner else module, name)
-    result = inspect.unwrap(getattr(result, "fget", None) or getattr(result, "__func__", result))
-    assert isinstance(result, FunctionType)
-    return result
+    function = inspect.getattr_static(getattr(module, owner) if owner else module, name)
+    function = inspect.unwrap(getattr(function, "fget", None) or getattr(function, "__func__", function))
+    assert isinstance(function, FunctionType)
+    return function
 
 
 class HangError(Exception):
@@ -145,27 +145,27 @@ def choose_scenes() -> list[Scene]:
 def compute_numbers(scene: Scene, at: Command) -> dict[str, Any]:
     """Compute every number that the formulas state of a scene and of its linkage."""
     solution = solve(scene, "force", at=at)
-    result = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
-    result["status"] = solution.status_code.astype(float)
-    return result | collect_stated(scene.linkage) | collect_stated_of_motion(scene, at)
+    numbers = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
+    numbers["status"] = solution.status_code.astype(float)
+    return numbers | collect_stated(scene.linkage) | collect_stated_of_motion(scene, at)
 
 
 def collect_stated(linkage: FourBar) -> dict[str, Any]:
     """Collect what the formulas state of a linkage whatever its motion."""
-    result: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         "default_range": mobility.choose_range(linkage),
         "change_points": mobility.change_points(linkage),
         "time_ratio": mobility.time_ratio(linkage) or math.nan,
         "extremes": [*transmission.transmission_extremes(linkage), transmission.transmission_extremes(linkage).worst],
     }
     for bar in MOVING_BARS:
-        result[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
-        result[f"intervals_{bar}"] = mobility.find_intervals(linkage, bar)
-        result[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
-        result[f"swing_{bar}"] = mobility.swing(linkage, bar)
+        numbers[f"limits_{bar}"] = mobility.limit_positions(linkage, bar)
+        numbers[f"intervals_{bar}"] = mobility.find_intervals(linkage, bar)
+        numbers[f"turns_{bar}"] = mobility.turns_fully(linkage, bar)
+        numbers[f"swing_{bar}"] = mobility.swing(linkage, bar)
     sweep = linkage.ground_angle + np.array([-0.5, 0.5, 4.0, 2.0])  # through both change points, and back
-    result["through"] = mobility.follow_smooth_path(linkage, sweep, 1)
-    return {name: np.array(value, dtype=float) for name, value in result.items()}
+    numbers["through"] = mobility.follow_smooth_path(linkage, sweep, 1)
+    return {name: np.array(value, dtype=float) for name, value in numbers.items()}
 
 
 def collect_stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
@@ -269,10 +269,10 @@ def command(module: str | None, most: int) -> int:
         if most and len(chosen) > most:
             chosen = [chosen[i] for i in np.random.default_rng(0).choice(len(chosen), most, replace=False)]
         verdicts = [judge_mutant(mutant, tried) for mutant in track(chosen, name, console=shown)]
-        own = [mutant.name for mutant, each in zip(chosen, verdicts, strict=True) if each is False]
-        count = sum(each is not None for each in verdicts)
-        click.echo(f"{name}: {count - len(own)} of {count} caught, of {len(chosen)} mutants tried")
-        changing, missed = changing + count, missed + own
+        survivors = [mutant.name for mutant, verdict in zip(chosen, verdicts, strict=True) if verdict is False]
+        count = sum(verdict is not None for verdict in verdicts)
+        click.echo(f"{name}: {count - len(survivors)} of {count} caught, of {len(chosen)} mutants tried")
+        changing, missed = changing + count, missed + survivors
     signal.signal(signal.SIGALRM, before)
     for line in missed:
         click.echo(f"not caught: {line}")

@@ -57,10 +57,10 @@ def draw_scene(seed: int, index: int) -> Scene:
     if rng.random() < 0.3:
         effects.append(Viscous.at(A=rng.uniform(0.0, 1.0)))
     scene = replace(scene, effects=tuple(effects))
-    known = list_entries(scene)
-    stated = [key for key, entry in known.items() if not is_left_out(scene, entry) and not key.startswith("motion")]
+    entries = list_entries(scene)
+    stated = [key for key, entry in entries.items() if not is_left_out(scene, entry) and not key.startswith("motion")]
     keys = rng.choice(stated, rng.choice([0, 0, 1, 2]), replace=False).tolist()
-    widths = {key: abs(float(read_place(scene, known[key].place))) * 10.0 ** rng.uniform(-10, -2.5) for key in keys}
+    widths = {key: abs(float(read_place(scene, entries[key].place))) * 10.0 ** rng.uniform(-10, -2.5) for key in keys}
     return replace(scene, tolerances=tuple(Tolerance(key, width) for key, width in widths.items() if width > 0.0))
 
 
@@ -98,21 +98,21 @@ def _list_outside(scene: Scene, proven: Extremes, name: str, sign: int) -> list[
     extreme = (proven.greatest if sign > 0 else proven.least)[name]
     outer, inner = (extreme.high, extreme.low) if sign > 0 else (extreme.low, extreme.high)
     parts, theta_2 = _climb(scene, proven.parts, name, sign)
-    value, result = _evaluate_ball(scene, name, parts, theta_2), []
+    value, violations = _evaluate_ball(scene, name, parts, theta_2), []
     if not sign * (value - outer) <= 0:
-        result.append(f"extremes {name}: {value} at theta_2 = {theta_2!r}, {parts.tolist()} lies beyond {outer!r}")
+        violations.append(f"extremes {name}: {value} at theta_2 = {theta_2!r}, {parts.tolist()} lies beyond {outer!r}")
     if not scene.tolerances:
         value = _evaluate_ball(scene, name, parts, extreme.theta_2)
         if not sign * (value - inner) >= 0:
-            result.append(f"extremes {name}: {value} at theta_2 = {extreme.theta_2!r} does not reach {inner!r}")
-    return result
+            violations.append(f"extremes {name}: {value} at theta_2 = {extreme.theta_2!r} does not reach {inner!r}")
+    return violations
 
 
 def _move_numbers(scene: Scene, parts: Array) -> dict[str, Any]:
     """Move the toleranced numbers by parts of their tolerances, (k,) or (k, n)."""
-    known = list_entries(scene)
+    entries = list_entries(scene)
     return {
-        tolerance.key: read_place(scene, known[tolerance.key].place) + WITHIN * tolerance.reach * part
+        tolerance.key: read_place(scene, entries[tolerance.key].place) + WITHIN * tolerance.reach * part
         for tolerance, part in zip(scene.tolerances, parts, strict=True)
     }
 
@@ -121,8 +121,8 @@ def _climb(scene: Scene, intervals: tuple[tuple[float, float], ...], name: str, 
     """Parts of the tolerances and theta_2 of the greatest (+1) or least (-1) value found."""
     rng, k = np.random.default_rng(0), len(scene.tolerances)
     low, high = np.array(intervals).T
-    own = rng.integers(0, len(low), DRAWN)
-    theta_2 = np.clip(rng.uniform(low[own] - 0.05, high[own] + 0.05), low[own], high[own])  # some at the ends
+    spots = rng.integers(0, len(low), DRAWN)
+    theta_2 = np.clip(rng.uniform(low[spots] - 0.05, high[spots] + 0.05), low[spots], high[spots])  # some at the ends
     parts = np.clip(rng.uniform(-2.0, 2.0, (k, DRAWN)), -1.0, 1.0)
     values = _evaluate_samples(scene, name, sign, parts, theta_2)
     reach = 0.1
@@ -131,8 +131,8 @@ def _climb(scene: Scene, intervals: tuple[tuple[float, float], ...], name: str, 
         around = np.concatenate([best, np.repeat(best, AROUND)])
         noise = reach * rng.normal(size=(1 + k, len(around)))
         noise[:, :BEST] = 0.0  # the best themselves stay
-        own, reach = own[around], reach * NARROWED
-        theta_2 = np.clip(theta_2[around] + noise[0], low[own], high[own])
+        spots, reach = spots[around], reach * NARROWED
+        theta_2 = np.clip(theta_2[around] + noise[0], low[spots], high[spots])
         parts = np.clip(parts[:, around] + 10.0 * noise[1:], -1.0, 1.0)
         values = _evaluate_samples(scene, name, sign, parts, theta_2)
     at = int(np.argmax(values))

@@ -53,12 +53,12 @@ def make_alike(scene: Scene) -> Scene:
 
     A table goes on to a whole turn, beyond the piece that the position is in.
     """
-    own: dict[type, Any] = {type(effect): effect for effect in scene.effects}
-    if own.keys() <= {Gravity, Viscous, Friction}:
+    by_kind: dict[type, Any] = {type(effect): effect for effect in scene.effects}
+    if by_kind.keys() <= {Gravity, Viscous, Friction}:
         viscous, friction = dict.fromkeys(PINS, 0.0), dict.fromkeys(PINS, 0.0)
-        viscous.update(own.get(Viscous, Viscous(())).coefficients)
-        friction.update(own.get(Friction, Friction(())).torques)
-        gravity = own.get(Gravity, Gravity(0.0))
+        viscous.update(by_kind.get(Viscous, Viscous(())).coefficients)
+        friction.update(by_kind.get(Friction, Friction(())).torques)
+        gravity = by_kind.get(Gravity, Gravity(0.0))
         scene = replace(scene, effects=(gravity, Viscous.at(**viscous), Friction.at(**friction)))
     return replace(scene, loads=tuple(replace(load, table=_close_table(load.table)) for load in scene.loads))
 
@@ -67,13 +67,13 @@ def add_every_load(scene: Scene) -> Scene:
     """Give a scene two loads on every bar in each frame, of size 0 where it has none, so that programs are shared."""
     if any(load.table or load.force is None for load in scene.loads):
         return scene
-    left, loads = list(scene.loads), []
+    remaining, loads = list(scene.loads), []
     for bar, frame in product(MOVING_BARS, ("world", "bar") * 2):
-        own = next((load for load in left if (load.bar, load.frame) == (bar, frame)), None)
-        loads.append(own or Load(bar, (0.0, 0.0), frame=frame))
-        if own is not None:
-            left.remove(own)
-    assert not left
+        stated = next((load for load in remaining if (load.bar, load.frame) == (bar, frame)), None)
+        loads.append(stated or Load(bar, (0.0, 0.0), frame=frame))
+        if stated is not None:
+            remaining.remove(stated)
+    assert not remaining
     return replace(scene, loads=tuple(loads))
 
 
@@ -85,30 +85,33 @@ def _close_table(table: Table | None) -> Table | None:
 
 def list_numbers(scene: Scene) -> dict[str, float]:
     """List every number that a scene of one position states, its angle too, by key."""
-    found = {
+    numbers = {
         key: read_place(scene, entry.place)
         for key, entry in list_entries(scene).items()
         if not is_left_out(scene, entry)
     }
-    return {**found, command_key(scene): float(np.asarray(scene.motion.angle))}
+    return {**numbers, command_key(scene): float(np.asarray(scene.motion.angle))}
 
 
 def evaluate(scene: Scene, library: str, *, derivatives: bool = False) -> dict[str, Any]:
     """Evaluate every quantity of a scene of one position in doubles, or its derivatives by each number, last axis."""
-    own = make_alike(scene)
-    scene = add_every_load(own) if own.loads or len(own.effects) > 1 else own
-    numbers, places = list_numbers(scene), {str(k): str(scene.loads.index(load)) for k, load in enumerate(own.loads)}
+    alike_one = make_alike(scene)
+    scene = add_every_load(alike_one) if alike_one.loads or len(alike_one.effects) > 1 else alike_one
+    numbers, places = (
+        list_numbers(scene),
+        {str(k): str(scene.loads.index(load)) for k, load in enumerate(alike_one.loads)},
+    )
     scene = replace_place(scene, ("motion", "angle"), 0.0)
     xp, doubles = load_library(library)
     with doubles:
         alike = replace_numbers(scene, dict.fromkeys(list_entries(scene).keys() & numbers, 1.0))
-        found = _make_program(alike, library, derivatives)(xp.asarray(list(numbers.values()), dtype=xp.float64))
+        outputs = _make_program(alike, library, derivatives)(xp.asarray(list(numbers.values()), dtype=xp.float64))
     if not derivatives:
-        return {name: np.asarray(value) for name, value in found.items()}
-    parts = (key.split(".") for key in list_numbers(own))
+        return {name: np.asarray(value) for name, value in outputs.items()}
+    parts = (key.split(".") for key in list_numbers(alike_one))
     keys = (".".join(("loads", places[rest[0]], *rest[1:]) if of == "loads" else (of, *rest)) for of, *rest in parts)
     index = [list(numbers).index(key) for key in keys]
-    return {name: np.asarray(value)[..., index] for name, value in found.items()}
+    return {name: np.asarray(value)[..., index] for name, value in outputs.items()}
 
 
 @cache
@@ -147,8 +150,8 @@ def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
         for key in keys:
             changed[key] = changed[key] + steps[key]
         stated = changed.pop(angle)
-        other = replace_numbers(scene, {key: changed[key] for key in set(keys) - {angle}})
-        return compute_outputs(other, scene.motion.branch, make_balls(other, stated)) or {}
+        mate = replace_numbers(scene, {key: changed[key] for key in set(keys) - {angle}})
+        return compute_outputs(mate, scene.motion.branch, make_balls(mate, stated)) or {}
 
     base = moved()
     if ("torque" if scene.drive is None else "drive_force") not in base:
@@ -156,18 +159,18 @@ def compute_exact_slopes(scene: Scene) -> tuple[Values, Slopes]:
     once = {key: moved(key) for key in numbers}
     by: dict[str, dict[str, Any]] = {name: {} for name in base}
     rates: dict[str, dict[str, float]] = {name: dict.fromkeys(numbers, 0.0) for name in base}
-    for one, other in combinations_with_replacement(numbers, 2):
-        if one != other and numbers[one] == numbers[other] == 0.0:  # neither moves the other's derivative
+    for first, mate in combinations_with_replacement(numbers, 2):
+        if first != mate and numbers[first] == numbers[mate] == 0.0:  # neither moves the other's derivative
             continue
-        twice = moved(one, other)
+        twice = moved(first, mate)
         for name, y in base.items():
-            change = twice[name] - once[one][name] - once[other][name] + y
-            second = abs(float((change / (steps[one] * steps[other])).mid()))
-            rates[name][one] += abs(numbers[other]) * second
-            if one == other:  # a difference to second order: where a number is 0 that may be all
-                by[name][one] = (once[one][name] - y - change / 2) / steps[one]
+            change = twice[name] - once[first][name] - once[mate][name] + y
+            second = abs(float((change / (steps[first] * steps[mate])).mid()))
+            rates[name][first] += abs(numbers[mate]) * second
+            if first == mate:  # a difference to second order: where a number is 0 that may be all
+                by[name][first] = (once[first][name] - y - change / 2) / steps[first]
             else:
-                rates[name][other] += abs(numbers[one]) * second
+                rates[name][mate] += abs(numbers[first]) * second
     return base, {name: {key: (by[name][key], rates[name][key]) for key in numbers} for name in base}
 
 
@@ -175,9 +178,9 @@ def differentiate(scene: Scene, library: str) -> dict[str, Any]:
     """Differentiate by every number: NumPy's by `sensitivity`; a row for each number."""
     if library != "numpy":
         return {name: np.moveaxis(of, -1, 0) for name, of in evaluate(scene, library, derivatives=True).items()}
-    found = sensitivity(scene)
-    rows = [list(found.keys).index(key) for key in list_numbers(scene)]
-    return {name: of[rows, 0] for name, of in found.by.items()}
+    derivatives = sensitivity(scene)
+    rows = [list(derivatives.keys).index(key) for key in list_numbers(scene)]
+    return {name: of[rows, 0] for name, of in derivatives.by.items()}
 
 
 def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
@@ -185,10 +188,10 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
     tally.samples += 1
     if library != "numpy":
         scene = make_alike(scene)
-    (values, exact), found, numbers = compute_exact_slopes(scene), differentiate(scene, library), list_numbers(scene)
+    (values, exact), slopes, numbers = compute_exact_slopes(scene), differentiate(scene, library), list_numbers(scene)
     if not values:
         tally.not_assembled += 1
-        if np.nan_to_num(found["F12"]).any():  # a library's are 0: its value is a constant, NaN
+        if np.nan_to_num(slopes["F12"]).any():  # a library's are 0: its value is a constant, NaN
             tally.worst["assembled"] = (math.inf, sample)
         return
     if not exact or _is_held(scene, values):
@@ -198,10 +201,10 @@ def judge_slopes(scene: Scene, tally: Tally, sample: str, library: str) -> None:
         name: math.fsum(abs(number * float(by[key][0].mid())) for key, number in numbers.items())
         for name, by in exact.items()
     }
-    if np.isnan(found["sin_mu"]).any() and is_untold(values["sin_mu"], moves["sin_mu"]):
+    if np.isnan(slopes["sin_mu"]).any() and is_untold(values["sin_mu"], moves["sin_mu"]):
         tally.untold += 1
         return
-    for name, rows in found.items():
+    for name, rows in slopes.items():
         together = max(moves.get(component, 0.0) for component, _ in list_components(name))
         for component, index in list_components(name):
             if component not in exact:

@@ -55,24 +55,24 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
     internal = scene.drive is not None and 1 not in (scene.drive.start.bar, scene.drive.end.bar)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = solve_position(scene, angle) if library == "numpy" else evaluate(scene, library)
+        solution = solve_position(scene, angle) if library == "numpy" else evaluate(scene, library)
     tally.warned += [f"{sample}: {warning.message}" for warning in caught]
     exact = compute_reference(scene, motion.branch, angle)
     if exact is None:
         tally.not_assembled += 1
-        if math.isfinite(found[drive]):
+        if math.isfinite(solution[drive]):
             tally.worst["assembled"] = (math.inf, sample)
         return
     values, sensitivity = exact
-    if library != "numpy" and math.isnan(found["sin_mu"]) and is_untold(values["sin_mu"], sensitivity["sin_mu"]):
+    if library != "numpy" and math.isnan(solution["sin_mu"]) and is_untold(values["sin_mu"], sensitivity["sin_mu"]):
         tally.untold += 1
         return
     errors: dict[str, float] = {}
-    for name in found:
+    for name in solution:
         for component, index in list_components(name):
             if component not in values or name == motion.commanded or name.endswith("_error"):
                 continue
-            own, rate = np.ravel(found[name])[index], sensitivity[component]
+            own, rate = np.ravel(solution[name])[index], sensitivity[component]
             if internal and name in PIN_FORCES:  # a component that the drive has no part in is left of larger ones
                 rate = max(sensitivity[other] for other, _ in list_components(name))
             if library != "numpy":  # lengths are no constants there: no bar rests or stays parallel exactly
@@ -82,15 +82,15 @@ def judge(scene: Scene, tally: Tally, sample: str, library: str = "numpy") -> No
     if drive not in values:
         tally.no_torque += 1
         return
-    if f"{drive}_error" not in found:
+    if f"{drive}_error" not in solution:
         return
     force = max(math.hypot(errors[f"{name}_x"], errors[f"{name}_y"]) for name in PIN_FORCES)
-    strongest = max(math.hypot(*found[name]) for name in PIN_FORCES)
+    strongest = max(math.hypot(*solution[name]) for name in PIN_FORCES)
     for name, error, size in (
-        (f"{drive}_error", errors[drive], abs(found[drive])),
+        (f"{drive}_error", errors[drive], abs(solution[drive])),
         ("force_error", force, strongest),
     ):
-        bar = float(found[name])
+        bar = float(solution[name])
         tally.too_small[name] = max(tally.too_small.get(name, 0.0), float(find_used(error, bar)))
         tally.too_large[name] = tally.too_large.get(name, 0) + (bar > TOO_LARGE * max(error, HALF_A_DIGIT * size))
 
@@ -119,19 +119,19 @@ def feed_back(scene: Scene, bar: int) -> Scene | None:
     """Command bar 2, 3 or 4 to move as it does under the scene's own command; None where that has no motion."""
     if bar == 2:
         return scene
-    found = solve(scene, "acceleration")
-    theta, omega, alpha, sine = read_commanded(found, bar)
-    if found.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
+    solution = solve(scene, "acceleration")
+    theta, omega, alpha, sine = read_commanded(solution, bar)
+    if solution.status_code[0] != OK or abs(sine) <= NO_DIGIT_LEFT:
         return None
     numbers = {f"theta_{bar}": theta, f"omega_{bar}": omega, f"alpha_{bar}": alpha}
     return replace(scene, motion=Motion(branch=1 if sine > 0.0 else -1, **numbers))  # type: ignore[arg-type]
 
 
-def read_commanded(found: Solution, bar: int) -> tuple[float, float, float, float]:
+def read_commanded(solution: Solution, bar: int) -> tuple[float, float, float, float]:
     """Return angle, speed and acceleration of a bar at the first position, and the sine whose sign its branch is."""
-    theta, omega, alpha = (float(getattr(found, f"{name}_{bar}")[0]) for name in ("theta", "omega", "alpha"))
+    theta, omega, alpha = (float(getattr(solution, f"{name}_{bar}")[0]) for name in ("theta", "omega", "alpha"))
     first, second = {2: (3, 4), 3: (2, 4), 4: (2, 3)}[bar]
-    one, other = (float(getattr(found, f"theta_{each}")[0]) for each in (first, second))
+    one, other = (float(getattr(solution, f"theta_{each}")[0]) for each in (first, second))
     return theta, omega, alpha, math.sin(other - one)
 
 

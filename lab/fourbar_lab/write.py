@@ -20,12 +20,12 @@ ROUND_OFF = 1e-12
 
 def find_stale(files: Iterable[Path]) -> list[Path]:
     """Find the scene files whose MJCF is missing or differs from what they generate now, round-off apart."""
-    result = []
+    stale = []
     for file in files:
         xml = file.with_suffix(".xml")
         if not xml.is_file() or not _is_same(xml.read_text(encoding="utf-8"), write_mjcf(load(file))):
-            result.append(file)
-    return result
+            stale.append(file)
+    return stale
 
 
 def _is_same(one: str, other: str) -> bool:

@@ -118,8 +118,8 @@ class DrakeTree(Tree):
             applied.append(force)
         port = self.plant.get_applied_spatial_force_input_port()
         port.FixValue(self.context, Value[list[ExternallyAppliedSpatialForce]](applied))
-        result = self.plant.get_reaction_forces_output_port().Eval(self.context)
-        return {b: self.rotation(b) @ result[int(joint.index())].translational()[:2] for b, joint in self.joint.items()}
+        borne = self.plant.get_reaction_forces_output_port().Eval(self.context)
+        return {b: self.rotation(b) @ borne[int(joint.index())].translational()[:2] for b, joint in self.joint.items()}
 
 
 DrakeInverse = partial(Exact, "drake-inverse", DrakeTree)

@@ -157,8 +157,8 @@ class ExudynBars(Loaded):
 
     def rotation(self, bar: int) -> Array:
         """Return that of the body."""
-        result = self.mbs.GetObjectOutputBody(self.body[bar], exu.OutputVariableType.RotationMatrix, [0.0, 0.0, 0.0])
-        return np.reshape(result, (3, 3))[:2, :2]
+        matrix = self.mbs.GetObjectOutputBody(self.body[bar], exu.OutputVariableType.RotationMatrix, [0.0, 0.0, 0.0])
+        return np.reshape(matrix, (3, 3))[:2, :2]
 
     def velocity(self, bar: int) -> float:
         """Read that of its coordinate; the ground has none."""
@@ -187,8 +187,8 @@ class ExudynBars(Loaded):
             return {}
         self.state.SetODE2Coordinates_tt(a)
         values: Values = {f"a_{name}": self.acceleration(point) for name, point in ON_BARS.items()}
-        for each in MOVING_BARS:
-            values[f"omega_{each}"], values[f"alpha_{each}"] = self.velocity(each), self.alpha(each)
+        for moving in MOVING_BARS:
+            values[f"omega_{moving}"], values[f"alpha_{moving}"] = self.velocity(moving), self.alpha(moving)
         self.solver.ComputeMassMatrix(self.mbs)
         inertial = np.array(self.solver.GetSystemMassMatrix()) @ a
 

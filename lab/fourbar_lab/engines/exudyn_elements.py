@@ -63,9 +63,9 @@ def _add_viscous(effect: Any, bodies: Bodies) -> None:
 def _add_torsion(effect: Any, bodies: Bodies) -> None:
     """`TorsionalSpringDamper`, which measures within half a turn of rest between axes that coincide there."""
     for pin, stiffness, rest, preload in effect.springs:
-        one, other = PINS[pin]
-        line = bodies.ground_angle if one == 1 else 0.0
-        markers = [bodies.axes(one, line + rest), bodies.axes(other)]
+        first, second = PINS[pin]
+        line = bodies.ground_angle if first == 1 else 0.0
+        markers = [bodies.axes(first, line + rest), bodies.axes(second)]
         spring = ObjectConnectorTorsionalSpringDamper(markerNumbers=markers, stiffness=stiffness, torque=preload)
         bodies.mbs.AddObject(spring)
 

@@ -159,8 +159,8 @@ class OpenSimBars(Loaded):
 
     def rotation(self, bar: int) -> Array:
         """Return that of the body."""
-        result = self.body[bar].getTransformInGround(self.state).R()
-        return np.array([[result.get(i, j) for j in (0, 1)] for i in (0, 1)])
+        matrix = self.body[bar].getTransformInGround(self.state).R()
+        return np.array([[matrix.get(i, j) for j in (0, 1)] for i in (0, 1)])
 
     def positions(self) -> dict[str, Array]:
         """Locate the points of the bars."""
@@ -170,8 +170,8 @@ class OpenSimBars(Loaded):
         """Compute speeds and accelerations, pin forces and torque; nothing where a toggle leaves them 0/0."""
         if bar != self.commanded:
             self.commanded, q = bar, self.state.getQ().to_numpy()
-            for each, pin in TURNING.items():
-                self.joint[pin].updCoordinate().setIsPrescribed(self.state, each == bar)
+            for moving, pin in TURNING.items():
+                self.joint[pin].updCoordinate().setIsPrescribed(self.state, moving == bar)
             self.state.setQ(make_vector(q))
             self.model.realizePosition(self.state)
         try:
@@ -272,8 +272,8 @@ class OpenSimBars(Loaded):
         on_bodies, on_mobilities = osim.VectorOfSpatialVec(), osim.Vector()
         multipliers = self.state.getMultipliers()
         self.matter.calcConstraintForcesFromMultipliers(self.state, multipliers, on_bodies, on_mobilities)
-        result = on_bodies.get(int(self.body[2].getMobilizedBodyIndex())).get(1)
-        return np.array([-result.get(0), -result.get(1)])
+        force = on_bodies.get(int(self.body[2].getMobilizedBodyIndex())).get(1)
+        return np.array([-force.get(0), -force.get(1)])
 
 
 OpenSimConstraints = partial(Exact, "opensim-constraints", OpenSimBars, ("theta_2", "theta_4", "stroke"))

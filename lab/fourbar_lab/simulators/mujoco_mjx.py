@@ -88,20 +88,20 @@ def _evaluated(model: Any, state: Any) -> Instant:
 def _slopes(scene: Scene, how: str, theta_2: float, differentiate: Callable[..., Any]) -> dict[str, Any]:
     """Differentiate along the changes of model and state, which as trees differ in what is no number of theirs."""
     model, data, q, v = gradients.assemble(scene, theta_2, "mjx")
-    given, by, state = (mjx.put_model(model), q, v), {}, (0.0,) * 4
+    inputs, by, state = (mjx.put_model(model), q, v), {}, (0.0,) * 4
     for key in gradients.list_keys(scene):
         more, less = (
             jax.tree.leaves((mjx.put_model(side.model), side.qpos, side.qvel))
             for side in gradients.assemble_either_side(scene, theta_2, key, "mjx")
         )
         moves = [gradients.change(x, y) for x, y in zip(more, less, strict=True)]
-        by[key], state = differentiate(given, moves, mjx.put_data(model, data))
+        by[key], state = differentiate(inputs, moves, mjx.put_data(model, data))
     return gradients.collect_answer(scene, how, state, by)
 
 
-def _torque(part: Any, given: Any, moves: Any, data: Any, steps: Any) -> tuple[Any, Any]:
+def _torque(part: Any, inputs: Any, moves: Any, data: Any, steps: Any) -> tuple[Any, Any]:
     """Evaluate the torque where so much of the moves is added to what is given, and the state it is of."""
-    leaves, tree = jax.tree.flatten(given)
+    leaves, tree = jax.tree.flatten(inputs)
     moved = [x + part * y if jax.numpy.issubdtype(x.dtype, float) else x for x, y in zip(leaves, moves, strict=True)]
     model, q, v = jax.tree.unflatten(tree, moved)
     now = data.replace(qpos=q, qvel=v)
@@ -111,13 +111,13 @@ def _torque(part: Any, given: Any, moves: Any, data: Any, steps: Any) -> tuple[A
 
 
 @jax.jit  # type: ignore[untyped-decorator]
-def _forwards(given: Any, moves: Any, data: Any, steps: int) -> Any:
-    _, slope, state = jax.jvp(lambda part: _torque(part, given, moves, data, steps), (0.0,), (1.0,), has_aux=True)
+def _forwards(inputs: Any, moves: Any, data: Any, steps: int) -> Any:
+    _, slope, state = jax.jvp(lambda part: _torque(part, inputs, moves, data, steps), (0.0,), (1.0,), has_aux=True)
     return slope, state
 
 
 @partial(jax.jit, static_argnames="iterations")
-def _backwards(given: Any, moves: Any, data: Any, iterations: int = 10) -> Any:
-    model, *state = given
+def _backwards(inputs: Any, moves: Any, data: Any, iterations: int = 10) -> Any:
+    model, *state = inputs
     once = (model.tree_replace({"opt.iterations": iterations}), *state)
     return jax.grad(lambda part: _torque(part, once, moves, data, None), has_aux=True)(0.0)

@@ -11,9 +11,8 @@ import warp
 from fourbar.effects import Flywheel
 from fourbar.mjcf import size_flywheel
 from fourbar.mjcf.assembly import write_usd
-from fourbar.mjcf.document import SINGLE
 from fourbar.scene import Scene
-from fourbar_lab.simulators.motion import Course, Instant, Readings, Simulator, run_through, start, write_temp
+from fourbar_lab.simulators.motion import LIGHT, Course, Instant, Readings, Simulator, run_through, start, write_temp
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.engines.description import rotate
 
@@ -38,7 +37,7 @@ class NewtonKamino(Simulator):
 
     def through(self, scene: Scene, course: Course) -> Readings:
         """Run through a course; forces are those of a step, with the state in which it began."""
-        begin, inertia = start(scene), size_flywheel(scene, SINGLE)
+        begin, inertia = start(scene), size_flywheel(scene, LIGHT)
         carried = replace(scene, effects=(*scene.effects, Flywheel(inertia, 2)))
         builder = newton.ModelBuilder()
         with write_temp(write_usd(carried, begin), "four_bar.usda") as file:
