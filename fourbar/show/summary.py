@@ -86,7 +86,7 @@ class Between(NamedTuple):
     @property
     def drive(self) -> Solution:
         """Solution that holds the peaks of the drive."""
-        return self.bounded(*list(list_sizes(self.sweep))[:3])
+        return self.bounded(read_drive(self.sweep).keys.value, "power", "speed")
 
     def bounded(self, *names: str) -> Solution:
         """Return the solution that holds the peaks of these sizes: the sweep alone where one of them has none."""
@@ -237,10 +237,6 @@ def _find_largest(
     return places[kept], branch[top][kept], {name for name, grows in zip(names, growing, strict=True) if grows}
 
 
-Stretch = tuple[float | None, float | None]
-"""Places from which and up to which a linkage assembles; None at an end of the motion."""
-
-
 class PinLoad(NamedTuple):
     """Load of one pin over the positions, N."""
 
@@ -264,7 +260,7 @@ class Facts:
     """Smallest and largest angle of bars 2, 3 and 4."""
     transmission: Peak
     """Smallest transmission angle."""
-    stretches: list[Stretch]
+    stretches: list[tuple[float | None, float | None]]
     """Places from and up to which the linkage assembles, None at the ends of the motion; empty: everywhere."""
     drive: Driving | None
     """Drive; None for a released linkage, and where only positions are known."""
@@ -294,7 +290,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     """Collect the facts of a scene solved up to the forces or the error bars; at least one position assembles."""
     between, kind = locate_between(scene, solution), _find_kind(scene, solution)
     places = _list_places(solution)
-    fine, stretches = solution, list[Stretch]()
+    fine, stretches = solution, list[tuple[float | None, float | None]]()
     if smooth := kind in ("sweep", "turn", "law"):
         fine = _solve_positions(scene, np.linspace(places[0], places[-1], FINE + 1), solution)
         stretches = _list_stretches(scene, fine)
@@ -312,24 +308,26 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
     if drive is not None and np.isfinite(drive.values).any():  # type: ignore[arg-type]
         peak = _find_peak(between.drive, read_drive(between.drive).values)
     return Facts(
-        scene,
-        solution,
-        kind,
-        {STATUS_NAMES[code]: int(np.sum(solution.status_code == code)) for code in np.unique(solution.status_code)},
-        (float(places[0]), float(places[-1])),
-        {bar: find_range(getattr(fine, f"theta_{bar}")) for bar in (2, 3, 4)},
-        Peak(mu if mu > IN_LINE else 0.0, least.place),
-        stretches,
-        drive if peak is not None else None,
-        peak,
-        motor_duty(solution, between.drive) if peak is not None and kind != "position" else None,
-        None if drive is None else _find_held(solution, drive),
-        _list_pin_loads(solution, between),
-        locate_bending(scene, between),
-        None if fine.stroke is None else find_range(fine.stroke),
-        None if solution.stroke is None else _find_strokes(scene, solution),
-        between,
-        _find_error(solution, drive),
+        scene=scene,
+        solution=solution,
+        kind=kind,
+        counts={
+            STATUS_NAMES[code]: int(np.sum(solution.status_code == code)) for code in np.unique(solution.status_code)
+        },
+        commanded=(float(places[0]), float(places[-1])),
+        angles={bar: find_range(getattr(fine, f"theta_{bar}")) for bar in (2, 3, 4)},
+        transmission=Peak(mu if mu > IN_LINE else 0.0, least.place),
+        stretches=stretches,
+        drive=drive if peak is not None else None,
+        peak=peak,
+        duty=motor_duty(solution, between.drive) if peak is not None and kind != "position" else None,
+        held=None if drive is None else _find_held(solution, drive),
+        pins=_list_pin_loads(solution, between),
+        bending=locate_bending(scene, between),
+        stroke=None if fine.stroke is None else find_range(fine.stroke),
+        strokes=None if solution.stroke is None else _find_strokes(scene, solution),
+        between=between,
+        error=_find_error(solution, drive),
     )
 
 
@@ -374,7 +372,7 @@ def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak
     return Peak(sign * value, place)
 
 
-def _list_stretches(scene: Scene, fine: Solution) -> list[Stretch]:
+def _list_stretches(scene: Scene, fine: Solution) -> list[tuple[float | None, float | None]]:
     """List where the linkage assembles within a sweep; the ends are cut down to by the position formula."""
     closes, places = fine.assembled, fine.at.places
     if closes.all():
