@@ -359,7 +359,7 @@ def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_wi
     whole, some = save(tmp_path / "whole", rows), save(tmp_path / "some", [rows[7], rows[70]])
     assert status(["compare", str(whole), str(some)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "not run: scene scene 000 (1 rows)" and lines[50] == "not run: and 28 more (28 rows)"
+    assert lines[0] == "Not run: scene scene 000 (1 row)" and lines[50] == "Not run: 28 more (28 rows)"
     assert lines[-1].startswith("No regression in 2 of 80 rows: 78 not run, 2 same")
     table = some / "results.csv"
     first, *others = table.read_text().splitlines(keepends=True)
@@ -416,9 +416,9 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> 
     groups = [line for line in render.write_text(found).splitlines() if "scenes, " in line and "rows (" in line]
     cause = "agrees -> fails: # where # was predicted"
     assert groups == [
-        f"verdict got worse: one, 3 of 3 scenes, 3 rows (torque 3), {cause}",
-        f"verdict got worse: sim, 3 of 3 scenes, 6 rows (F12 3, torque 3), {cause}",
-        "better: two, 3 of 3 scenes, 6 rows (F12 3, torque 3)",
+        f"Verdict got worse: one, 3 of 3 scenes, 3 rows (torque 3), {cause}",
+        f"Verdict got worse: sim, 3 of 3 scenes, 6 rows (F12 3, torque 3), {cause}",
+        "Better: two, 3 of 3 scenes, 6 rows (F12 3, torque 3)",
     ]
     assert found.of(Kind.VERDICT_WORSE)[0].key[:2] == ("b", "one")
     assert groups[0].partition(": ")[2] in html.unescape(render.write_html(found))
@@ -440,7 +440,7 @@ def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> Non
     old = made([ROW, other], {"scene": before, "other": SCENE})
     found = compare_rows(old, made([wrong, other], {"scene": heavier, "other": SCENE}))
     assert render.write_text(found).splitlines()[0] == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
-    assert found.status == 0 and found.not_compared == ["scene scene changed (1 rows)"]
+    assert found.status == 0 and found.not_compared == ["scene scene changed (1 row)"]
     assert compare_rows(old, made([replace(wrong, verdict=FAILS), other], {"scene": heavier})).regressed
     assert compare_rows(made([ROW], {"scene": before}), made([wrong], {"scene": heavier})).nothing
     for form in (render.write_markdown, render.write_html):
@@ -468,7 +468,7 @@ def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
     shipped = replace(ROW, quantity="as shipped", error=3.4e-7, allowed=1.0)
     found = compare_rows((HERE, [shipped]), (HERE, [replace(shipped, error=5.2e-7)]))
     assert [change.kind for change in found.changes] == [Kind.GREW] and found.status == 0
-    assert "grew within its allowance: scene / engine / exact / as shipped" in render.write_text(found)
+    assert "Grew within its allowance: scene / engine / exact / as shipped" in render.write_text(found)
     assert kinds([replace(shipped, allowed=4e-7)], [replace(shipped, error=6e-7)]) == [Kind.WORSE]
 
 
@@ -495,11 +495,11 @@ def test_more_positions_and_other_settings_are_named_so() -> None:
     finer = replace(SCENE, motion=SCENE.motion.replace(angle=fourbar.Sweep(0.0, 2.0 * math.pi, 720)))
     worse = replace(ROW, error=1e-9, allowed=1e-8)
     found = compare_rows(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
-    assert found.not_compared == ["scene scene has other positions (1 rows)"] and not found.regressed
+    assert found.not_compared == ["scene scene has other positions (1 row)"] and not found.regressed
     assert "360} -> " in str(found.scenes[0]) or "steps" in str(found.scenes[0])
     old, new = replace(ROW, setting="RK4 628/rev"), replace(worse, setting="RK4 1256/rev")
     found = compare_rows(made([old], {"scene": SCENE}), made([new], {"scene": SCENE}))
-    assert found.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 rows)"] and not found.regressed
+    assert found.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 row)"] and not found.regressed
 
 
 def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
@@ -521,7 +521,7 @@ def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
     rows.append(replace(ROW, scene="a", engine="other"))
     old = made(rows, dict.fromkeys("ab", SCENE), ("engine", "other"))
     found = compare_rows(old, made(rows[:2], {"a": SCENE}))
-    assert found.not_run == ["scene b (2 rows)", "other (1 rows)"] and found.status == 0
+    assert found.not_run == ["scene b (2 rows)", "other (1 row)"] and found.status == 0
     gone = compare_rows(old, made(rows[1:2], {"a": SCENE}))
     assert [change.key[1] for change in gone.changes if change.regression] == ["engine"]
     assert compare_rows(old, (HERE, rows[:2])).not_run[0] == "scene b (2 rows)"  # without a record its rows say so

@@ -43,9 +43,9 @@ class Named:
         self._last = name
 
     def __iter__(self) -> Iterator[str]:
-        yield from (f"{name} ({count} rows)" for name, count in self._rows.items())
+        yield from (f"{name} ({count} row{'s' if count > 1 else ''})" for name, count in self._rows.items())
         if self._others:
-            yield f"and {self._others} more ({self._rows_of_others} rows)"
+            yield f"{self._others} more ({self._rows_of_others} rows)"
 
 
 @dataclass(slots=True)

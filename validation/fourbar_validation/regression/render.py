@@ -52,14 +52,19 @@ def write_text(diff: Differences) -> str:
     """Write for a terminal: what is another question first, then what it was made with, then the rows."""
     lines = [*map(str, diff.scenes), *diff.notes]
     lines += [f"{what}: {old} -> {new}" for what, old, new in diff.surroundings]
-    lines += [f"not compared: {name}" for name in diff.not_compared]
-    lines += [f"not run: {name}" for name in diff.not_run]
-    lines += [f"disagree: {sentence}" for sentence in diff.fault.sentences]
+    lines += [f"Not compared: {name}" for name in diff.not_compared]
+    lines += [f"Not run: {name}" for name in diff.not_run]
+    lines += [f"Disagreement: {sentence}" for sentence in diff.fault.sentences]
     groups, more = _group_rows(diff)
-    lines += [f"{group.kind.value}: {group}" for group in groups] + more
+    lines += [f"{_begin(group.kind.value)}: {group}" for group in groups] + more
     for kind in SHOWN:
-        lines += [f"{kind.value}: {line}" for line in _list_worst(diff, kind)]
-    return "\n".join([*lines, write_verdict(diff)]) + "\n"
+        lines += [f"{_begin(kind.value)}: {line}" for line in _list_worst(diff, kind)]
+    return "\n".join([*lines, f"{write_verdict(diff)}."]) + "\n"
+
+
+def _begin(text: str) -> str:
+    """Begin a line with a capital."""
+    return text[:1].upper() + text[1:]
 
 
 def _group_rows(diff: Differences) -> tuple[list[Group], list[str]]:
