@@ -167,8 +167,8 @@ def write_findings(*, known: bool) -> list[str]:
         if fields["Reported"].startswith(("known", "stated")) == known:
             dates = " ".join(f"*{name}:* {fields[name]}." for name in ("Since", "Until", "Reported"))
             script = finding.script.name
-            entry = f"- **{finding.engine[0]}**: {finding.sentence} {fields['Found']} {dates}"
-            lines.append(f"{entry} [{script}](findings/{script})")
+            lines += [f"- **{finding.engine[0]}**: {finding.sentence}", f"  - {fields['Found']}"]
+            lines.append(f"  - {dates} [{script}](findings/{script})")
     return lines
 
 

@@ -32,7 +32,8 @@ def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
     listed = (FOLDER.parent / "findings.md").read_text(encoding="utf-8")
     for finding in ALL:
         assert set(FIELDS) - {"With"} <= finding.fields.keys(), finding.script
-        assert f"- **{finding.engine[0]}**: {finding.sentence} {finding.fields['Found']} " in listed, finding.script
+        entry = f"- **{finding.engine[0]}**: {finding.sentence}\n  - {finding.fields['Found']}\n"
+        assert entry in listed, finding.script
     scripts = re.findall(r"\]\(findings/(\w+\.py)\)", listed)
     assert sorted(scripts) == sorted(finding.script.name for finding in ALL)
 
