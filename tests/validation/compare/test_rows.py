@@ -33,12 +33,12 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.cost.laws import ErrorLaw
 from fourbar_validation.engines.registry import ENGINES, Engine
 from fourbar_validation.regression import render
-from fourbar_validation.regression.changes import compare_rows
 from fourbar_validation.report.html import write_html as page_of
 from fourbar_validation.report.html import write_markdown
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report
 from tests.support.here import judge_here, summary_of
+from tests.support.runs import compare_rows
 from tests.support.scenes import crank_rocker
 from tests.validation.regression.test_regression import HERE, ROW, save
 from tests.validation.run.test_judge import Echo, Refuses

@@ -9,10 +9,10 @@ from fourbar_validation.compare.rows import DEGRADED, SHIPPED
 from fourbar_validation.compare.tolerance import EPS, K
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.regression import render
-from fourbar_validation.regression.changes import compare_rows
-from fourbar_validation.regression.record import ACCEPTED, describe_run, find_baseline, read_run
+from fourbar_validation.regression.record import ACCEPTED, describe_run, find_baseline
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import read_default_suite
+from tests.support.runs import compare_rows, read_run
 
 SUITE = read_default_suite()
 EXACT = [engine for engine in ENGINES if not engine.through_time]

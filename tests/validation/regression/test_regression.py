@@ -31,14 +31,13 @@ from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression import record, render
 from fourbar_validation.regression.accept import HISTORY, accept_command, compare
 from fourbar_validation.regression.change import Kind
-from fourbar_validation.regression.changes import compare_rows, compare_runs
+from fourbar_validation.regression.changes import compare_runs
 from fourbar_validation.regression.record import (
     About,
     Recorded,
     describe_run,
     find_baseline,
     open_run,
-    read_run,
     write_about,
 )
 from fourbar_validation.regression.scenes import describe_changes
@@ -47,6 +46,7 @@ from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.another_machine import CORES, ROOT, environment, why_not
 from tests.support.here import judge_here
+from tests.support.runs import compare_rows, read_run
 
 WithRows = tuple[About, list[Row]]
 ROW = Row("scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0)

@@ -8,7 +8,7 @@ from itertools import groupby
 from typing import TypeVar
 
 from fourbar.errors import FAILED, HOLDS, InputError
-from fourbar_validation.compare.rows import FORMULAS, VERDICTS, Counts, Row, sort_rows
+from fourbar_validation.compare.rows import FORMULAS, VERDICTS, Counts, Row
 from fourbar_validation.regression.change import OTHER_QUESTION, REGRESSIONS, Change, Key, Kind, compare_row
 from fourbar_validation.regression.fault import Fault
 from fourbar_validation.regression.record import About
@@ -142,13 +142,6 @@ def _say_why_not_compared(change: Change, old: Row, new: Row) -> str:
     return f"scene {change.key[0]} {'changed' if change.kind is Kind.OTHER_SCENE else 'has other positions'}"
 
 
-def compare_rows(old: tuple[About, Iterable[Row]], new: tuple[About, Iterable[Row]], kept: int = KEPT) -> Differences:
-    """Compare two runs whose rows are at hand, in any order."""
-    before, after = (sort_rows(run[1]) for run in (old, new))
-    engines = {row.engine for row in after}
-    return compare_runs((old[0], group_by_scene(before)), (new[0], group_by_scene(after)), engines, kept)
-
-
 def compare_runs(
     old: tuple[About, ByScene[Row]],
     new: tuple[About, ByScene[Row]],
@@ -180,12 +173,6 @@ def _rename_scenes(scenes: ByScene[T], names: Mapping[str, str]) -> ByScene[T]:
     if not names:
         return scenes
     return sorted(((names.get(name, name), rows) for name, rows in scenes), key=lambda scene: scene[0])
-
-
-def group_by_scene(rows: Iterable[Row]) -> Iterator[tuple[str, list[Row]]]:
-    """Group the rows by scene."""
-    for scene, rows_of_scene in groupby(rows, key=lambda row: row.scene):
-        yield scene, list(rows_of_scene)
 
 
 def _merge_scenes(old: ByScene[T], new: ByScene[T]) -> Iterator[tuple[str, Sequence[T], Sequence[T]]]:

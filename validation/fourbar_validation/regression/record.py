@@ -207,12 +207,6 @@ def _open_described(record: Path, table: Path, key: str) -> Recorded:
     return Recorded(about, table, True, key)
 
 
-def read_run(path: Path) -> tuple[About, list[Row]]:
-    """Read what a run was made with, and all its rows."""
-    run = open_run(path)
-    return run.about, list(run.rows())
-
-
 def make_record(kept: dict[str, Any]) -> About:
     """Make the record of what a file says of a run; its words are somebody's text."""
     versions, settings = (_make_plain(kept[name]) for name in ("versions", "settings"))
