@@ -24,6 +24,7 @@ class DrakeSap(Simulator):
         "stands in for the fourth (its force is not offered in Python); SetEnableLoopTopology(True), from 1.57 on, "
         "takes the SDF of four joints"
     )
+    quantities = ("theta_3", "theta_4", "torque", "F12", "F32", "F14")  # F43 where the loop has its fourth joint
     settings: ClassVar[dict[str, str]] = {
         "ball constraint": "drake",
         **({"four joints": "gazebo"} if hasattr(MultibodyPlant, "SetEnableLoopTopology") else {}),
