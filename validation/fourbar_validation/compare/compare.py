@@ -73,7 +73,7 @@ NUMBERS = ("error", "allowed", "theta_2", "condition")
 
 
 class Held(NamedTuple):
-    """What an answer is held to."""
+    """Tolerance, quantities and predictions that an answer is held to."""
 
     tolerance: ErrorBound
     quantities: Sequence[str]

@@ -8,10 +8,9 @@ import tempfile
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from fourbar_validation.compare.rows import make_plain, write_one_line
-from fourbar_validation.places import import_path
 
 WORKER_MEMORY = 8 * 2**30
 """Bytes of address space of one process; a scene takes a hundredth, most of it libraries."""
@@ -68,12 +67,6 @@ def run_to_end(
         return Ended("", "", True, f"no answer within {seconds:g} s")
     last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
     return Ended(done.stdout, done.stderr, done.returncode not in fine, write_one_line(last))
-
-
-def start_harness(line: Sequence[object], **how: Any) -> Ended:
-    """Run an interpreter that is to find this code, wherever it lies; for `how` see `run_to_end`."""
-    with import_path() as path:
-        return run_to_end(line, variables={"PYTHONPATH": path}, **how)
 
 
 KEPT = 20_000
