@@ -91,12 +91,10 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
 
 
 def direction(theta: Number) -> Number:
-    """Compute e^{i theta} from one tangent; by cosine and sine where it is differentiated, as `half_angle` does."""
-    return polar(1.0, theta) if is_differentiated(theta) else direction_of_tangent(tangent(0.5 * theta))
-
-
-def direction_of_tangent(t: Number) -> Number:
-    """Compute e^{i theta} = ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2)."""
+    """Compute e^{i theta} = ((1 - t^2) + 2 i t)/(1 + t^2), t = tan(theta/2); by cosine and sine if differentiated."""
+    if is_differentiated(theta):
+        return polar(1.0, theta)
+    t = tangent(0.5 * theta)
     kk = 1.0 / (1.0 + t * t)
     return vector((1.0 - t * t) * kk, 2.0 * t * kk)
 
