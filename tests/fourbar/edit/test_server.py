@@ -267,11 +267,11 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(bench
 def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch) -> None:
     evaluate, asked_for, released, summaries = server.evaluate_scene, threading.Event(), threading.Event(), []
 
-    def slow(scene, plain, units, *, settled=False):
+    def slow(scene, plain, units, **options):
         asked_for.set()
         released.wait(20)
         summaries.append(scene.linkage.input.length)
-        return evaluate(scene, plain, units, settled=settled)
+        return evaluate(scene, plain, units, **options)
 
     async def ask(made: Workbench, address: str) -> None:
         line = await page(address)
