@@ -300,6 +300,14 @@ def test_what_is_attached_costs_what_it_does_in_the_file_itself(key: str) -> Non
     assert priced.cost == pytest.approx(max(found[name] for name in TORQUE_AND_PINS), abs=FLOOR)
 
 
+def test_a_servo_on_a_tendon_pulls_also_where_it_is_told_nothing_and_a_motor_does_not() -> None:
+    text = write_mjcf(SPRUNG)
+    servo = text.replace("</actuator>", '<position tendon="spring_1" kp="100"/></actuator>')
+    assert keys(SPRUNG, examine(SPRUNG, servo, {})) == {"tendons.ground output.tension"}
+    motors = '<motor tendon="spring_1"/><motor joint="A"/></actuator>'
+    assert keys(SPRUNG, examine(SPRUNG, text.replace("</actuator>", motors), {})) == set()
+
+
 def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone() -> None:
     """The first has its price; who turns the other way round, or closes the loop otherwise, is another file."""
     changes: list[tuple[str, Value | None]] = [

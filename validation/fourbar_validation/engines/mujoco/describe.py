@@ -168,9 +168,12 @@ def _describe_loads(topology: Topology) -> Described:
     model, data = topology.model, topology.data
     sums: dict[str, Array] = {}
     described: Described = {}
-    for i in sorted({*range(model.nu)} - {*topology.drives()} - {*topology.cylinders()}):
+    for i in sorted({*range(model.nu)} - {*topology.drives()}):
+        bias = model.actuator_biasprm[i, :3]
+        if model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_NONE or not bias.any():
+            continue  # it exerts what it is told to, and it is told nothing
         number, frame = (int(index) for index in model.actuator_trnid[i])
-        gear, bias, kind = model.actuator_gear[i], model.actuator_biasprm[i, :3], model.actuator_trntype[i]
+        gear, kind = model.actuator_gear[i], model.actuator_trntype[i]
         element = _name_element("actuator", model.actuator(i).name, i)
         if kind == mujoco.mjtTrn.mjTRN_JOINT:
             pin = next(pin for pin, joint in topology.hinge.items() if joint == number)
