@@ -140,7 +140,7 @@ def test_the_command(rocker: tuple[Scene, Extremes], monkeypatch: pytest.MonkeyP
     text = capsys.readouterr().out
     assert "theta_2 = 0 to 6.28319 rad" in text and f"{low:.11g}" in text and "N mm  greatest" in text
     assert status(["extremes", model, "--json", "--units", "mm"]) == 2
-    assert "--json is SI" in capsys.readouterr().err
+    assert "--json has SI units" in capsys.readouterr().err
     assert status(["extremes", model, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["extremes"]["torque"]["greatest"]["high"] == rocker[1].greatest["torque"].high
