@@ -330,6 +330,7 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources() -> None:
     assert straight.mean() > 0.5 and curve.y.min() > 0.3999 and curve.x[straight].max() - curve.x[straight].min() > 0.44
 
 
+@pytest.mark.slow
 def test_the_wiper_of_the_page_needs_less_torque_by_other_means(monkeypatch: pytest.MonkeyPatch) -> None:
     """Check the optimum by `solve`, `swing` and `transmission_extremes`, which the optimiser does not use."""
     for library in ("jax", "scipy", "array_api_compat"):

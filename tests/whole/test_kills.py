@@ -319,6 +319,7 @@ def test_a_worker_killed_at_random_moments_changes_no_byte(tmp_path: Path, undis
         assert (out / "results.csv").read_bytes() == (undisturbed / "results.csv").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(200 + 40 * KILLS)
 def test_any_process_of_a_run_with_a_guest_killed_changes_no_byte(

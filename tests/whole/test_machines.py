@@ -22,6 +22,7 @@ BUT = {*(TESTS / "whole").glob("*.py"), *TESTS.rglob("test_bench*.py")}
 NUMERICAL = [file for file in sorted({*TESTS.rglob("test_*.py")} - BUT) if "numpy" in file.read_text(encoding="utf-8")]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(3600 if ALL else 600)
 @pytest.mark.parametrize("core", CORES if ALL else ["another"])
 def test_the_numbers_hold_on_another_machine(core: str, tmp_path: Path) -> None:

@@ -264,6 +264,7 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(bench
     bench(ask)
 
 
+@pytest.mark.slow
 def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch) -> None:
     evaluate, asked_for, released, summaries = server.evaluate_scene, threading.Event(), threading.Event(), []
 

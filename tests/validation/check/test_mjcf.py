@@ -258,6 +258,7 @@ COSTLY = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "old", "new"), COSTLY, ids=[case[0] for case in COSTLY])
 def test_the_one_thing_that_is_wrong_costs_as_much_alone_in_the_generated_file(key: str, old: str, new: str) -> None:
     """Another tree in another plane, made wrong in one entry: its price is the error of that file, by another model."""
@@ -286,6 +287,7 @@ SPOILT = {  # loads of the generated file itself, and what is attached to it
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", SPOILT)
 def test_what_is_attached_costs_what_it_does_in_the_file_itself(key: str) -> None:
     old, new = SPOILT[key]

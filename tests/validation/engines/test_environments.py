@@ -49,6 +49,7 @@ def write_wheel(folder: Path, version: str, factor: str) -> str:
     return f"toy-engine @ {path.as_uri()}"
 
 
+@pytest.mark.slow
 def test_two_versions_are_judged_side_by_side(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     made = make_environment

@@ -138,6 +138,7 @@ def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path: Path) -> None:
     assert others_agree(found)
 
 
+@pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(300)
 def test_whatever_a_program_does_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,6 +161,7 @@ def test_whatever_a_program_does_costs_its_own_rows(tmp_path: Path, monkeypatch:
     assert not list_processes(f"MARK_OF_TEST={tmp_path}")
 
 
+@pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.timeout(120)
 def test_a_program_that_is_silent_ends_at_its_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -269,6 +271,7 @@ def command_line(out: Path, *options: str) -> "subprocess.CompletedProcess[str]"
     return subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_run_with_guests_ends_with_their_rows_and_none_of_their_processes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -352,6 +355,7 @@ def test_parts_judged_by_another_code_are_made_again(tmp_path: Path, monkeypatch
     assert notes(["mine:Mine", program]) == ["made again: the parts of another run (engines)"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", [*ENGINES, *load_further()], ids=lambda engine: engine.name)
 def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) -> None:
     if missing := engine.missing():

@@ -130,6 +130,7 @@ def test_nothing_is_fetched() -> None:
     assert "url(" not in re.sub(r"url\(#", "", text) and "@import" not in text
 
 
+@pytest.mark.slow
 def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail() -> None:
     assert len(write_markdown(summary_of(copies(200, failing=200)))) < COMMENT_LIMIT
 
