@@ -34,9 +34,8 @@ ENGINES = Path(__file__).parent / FILE
 REFUSED = "R"
 DIFFERENTIATED = "crank_rocker"
 """Problem whose errors are drawn over time, and at which an engine that has derivatives is asked for them."""
-COLUMNS = (
-    *("problem", "engine", "version", "setting", "quantity", "error", "level", "letters", "seconds", "reason"),
-)  # fmt: skip
+COLUMNS = ("problem", "engine", "version", "setting", "quantity", "error", "level", "letters", "seconds", "reason")
+"""Columns of the table."""
 KIND = re.compile(r" \((released|slider-crank)\)$")
 """End of the name of an entry that answers one kind of problem for the row that the rest of its name names."""
 
