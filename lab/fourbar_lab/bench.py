@@ -139,10 +139,10 @@ def import_cost() -> float:
 
 def measure_memory(n: int) -> float:
     """Measure the MB allocated at the peak beyond arguments and results."""
-    at = make_command(n)
-    out = allocate(UNKNOWNS, at)
+    command = make_command(n)
+    out = allocate(UNKNOWNS, command)
     tracemalloc.start()
-    solve(make_example(), at=at, out=out)
+    solve(make_example(), at=command, out=out)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return peak / 1e6
@@ -212,18 +212,18 @@ def bench(positions: int, rounds: int, largest: int, picture: Path | None) -> in
 
 def measure(positions: int, rounds: int, largest: int) -> Measured:
     """Measure the ratios of LIMITS and ns per position, and the times by how many."""
-    scene, at = make_example(), make_command(positions)
+    scene, command = make_example(), make_command(positions)
     limits, swing = make_example(WITH_LIMITS), make_command(positions, *choose_range(WITH_LIMITS))
-    everything, angles = allocate(UNKNOWNS, at), allocate(ANGLES, at)
+    everything, angles = allocate(UNKNOWNS, command), allocate(ANGLES, command)
     batch, solved = min(positions, THIRTEEN_BATCH), make_command(min(positions, SOLVED))
     bodies, many = make_bodies(scene, make_command(batch)), len(solved.theta_2)
     alone, lone = make_example(theta_2=1.0), make_bodies(scene, make_command(1))
     peers = collect_loops()
     actions: dict[str, tuple[int, Callable[[], object]]] = {
-        ALL: (positions, lambda: solve(scene, at=at, out=everything)),
-        ANGLES_ALONE: (positions, lambda: solve(scene, at=at, out=angles)),
+        ALL: (positions, lambda: solve(scene, at=command, out=everything)),
+        ANGLES_ALONE: (positions, lambda: solve(scene, at=command, out=angles)),
         SYSTEM: (batch, lambda: solve_thirteen(bodies, 2)),
-        FLOOR: (positions, make_floor(at.theta_2, angles)),
+        FLOOR: (positions, make_floor(command.theta_2, angles)),
         "input between limits: all": (positions, lambda: solve(limits, at=swing, out=everything)),
         "input between limits: positions only": (positions, lambda: solve(limits, at=swing, out=angles)),
         FORCES: (many, lambda: solve(scene, "force", at=solved)),
@@ -233,7 +233,7 @@ def measure(positions: int, rounds: int, largest: int) -> Measured:
         "one position with error bars": (ALONE, lambda: [solve(alone, "error") for _ in range(ALONE)]),
     }
     if "C" in peers.here:
-        actions["C, all"] = (positions, partial(peers.here["C"], at.theta_2, np.zeros((15, positions))))
+        actions["C, all"] = (positions, partial(peers.here["C"], command.theta_2, np.zeros((15, positions))))
     times = time_interleaved({name: action for name, (_, action) in actions.items()}, rounds)
     rows = {name: 1e9 * times[name] / count for name, (count, _) in actions.items()}
     by_positions = time_positions(peers.here, largest, rounds)

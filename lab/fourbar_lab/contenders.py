@@ -66,9 +66,9 @@ def make_command(n: int, start: float = 0.0, stop: float = 2.0 * np.pi) -> Comma
     return Command(np.linspace(start, stop, n), np.broadcast_to(np.int8(1), (n,)), 10.0, 0.0)
 
 
-def allocate(names: Iterable[str], at: Command) -> dict[str, Array]:
+def allocate(names: Iterable[str], command: Command) -> dict[str, Array]:
     """Allocate arrays as `solve` lays them out, touched so that no page is faulted in while the clock runs."""
-    first = solve(make_example(), at=at)
+    first = solve(make_example(), at=command)
     return {name: getattr(first, name) for name in names}
 
 

@@ -203,9 +203,13 @@ def list_findings(scene: Scene) -> list[str]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            at = command(scene)
-            question = Question("", scene, at)
-            return [*_check_file(scene), *_check_assembly(scene, at, question.solution), *_check_engines(question)]
+            commanded = command(scene)
+            question = Question("", scene, commanded)
+            return [
+                *_check_file(scene),
+                *_check_assembly(scene, commanded, question.solution),
+                *_check_engines(question),
+            ]
     except Exception as error:  # a traceback is what fuzzing looks for
         return [f"{type(error).__name__}: {error}".splitlines()[0]]
 
@@ -216,14 +220,14 @@ def _check_file(scene: Scene) -> list[str]:
     return [] if again == dump(scene) else ["file: a scene that was written and read is another one"]
 
 
-def _check_assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
+def _check_assembly(scene: Scene, commanded: Command, solution: Solution) -> list[str]:
     """Compare by ball arithmetic: no position where the loop does not close, none missing where it does."""
     from fourbar_validation.engines.balls import closure, make_balls
 
     problems = []
-    margin = np.abs(find_margin(scene.linkage, at.theta_2))
-    for i, theta_2 in enumerate(at.theta_2):
-        closes = closure(make_balls(scene, float(theta_2)), int(at.branch[i])) is not None
+    margin = np.abs(find_margin(scene.linkage, commanded.theta_2))
+    for i, theta_2 in enumerate(commanded.theta_2):
+        closes = closure(make_balls(scene, float(theta_2)), int(commanded.branch[i])) is not None
         if closes != bool(solution.assembled[i]) and margin[i] > TOUCHING_MARGIN:
             problems.append(f"assembled: the formulas say {bool(solution.assembled[i])} at theta_2 = {theta_2!r}")
         angles = (solution.theta_3[i], solution.theta_4[i])
@@ -233,10 +237,10 @@ def _check_assembly(scene: Scene, at: Command, solution: Solution) -> list[str]:
 
 
 def _check_engines(question: Question) -> list[str]:
-    scene, at, solution, rows = question.scene, question.at, question.solution, list(check_identities(question))
+    scene, commanded, solution, rows = question.scene, question.at, question.solution, list(check_identities(question))
     for engine in EXACT:
-        answer = engine.start().answer(scene, at)
-        held = hold(engine, scene, at, answer)
+        answer = engine.start().answer(scene, commanded)
+        held = hold(engine, scene, commanded, answer)
         rows += Comparison("", scene, answer, solution, held).rows()
         if engine.name == "pinocchio-inverse" and answer.refusal is None:  # the quicker of two exact engines
             rows += check_statements("", scene, engine.start(), answer, predicted=held.predicted)

@@ -38,28 +38,28 @@ def mutate_files(seed: int, indices: Sequence[int], originals: Sequence[str]) ->
 def _mutate(text: str, rng: np.random.Generator, originals: Sequence[str]) -> str:
     if not text:
         return PIECES[int(rng.integers(len(PIECES)))]
-    at, length = int(rng.integers(len(text))), int(rng.geometric(0.1))
+    start, length = int(rng.integers(len(text))), int(rng.geometric(0.1))
     lines = text.splitlines(keepends=True)
     line = int(rng.integers(len(lines)))
     match int(rng.integers(7)):
         case 0:  # a piece put in
-            return text[:at] + PIECES[int(rng.integers(len(PIECES)))] + text[at:]
+            return text[:start] + PIECES[int(rng.integers(len(PIECES)))] + text[start:]
         case 1:  # a piece in place of a value
             head, _, _ = lines[line].partition("=")
             return "".join([*lines[:line], f"{head}= {PIECES[int(rng.integers(len(PIECES)))]}\n", *lines[line + 1 :]])
         case 2:  # something cut out
-            return text[:at] + text[at + length :]
+            return text[:start] + text[start + length :]
         case 3:  # one character changed
-            return text[:at] + chr(int(rng.integers(1, 0xD7FF))) + text[at + 1 :]
+            return text[:start] + chr(int(rng.integers(1, 0xD7FF))) + text[start + 1 :]
         case 4:  # a line twice
             return "".join([*lines[:line], lines[line], *lines[line:]])
         case 5:  # two files in one
             donor = originals[int(rng.integers(len(originals)))]
-            return text[:at] + donor[int(rng.integers(len(donor))) :]
+            return text[:start] + donor[int(rng.integers(len(donor))) :]
         case _:  # a digit changed
             digits = [i for i, character in enumerate(text) if character.isdigit()]
-            at = digits[int(rng.integers(len(digits)))] if digits else 0
-            return text[:at] + str(int(rng.integers(10))) + text[at + 1 :]
+            start = digits[int(rng.integers(len(digits)))] if digits else 0
+            return text[:start] + str(int(rng.integers(10))) + text[start + 1 :]
 
 
 def try_out(text: str) -> str:
@@ -68,9 +68,9 @@ def try_out(text: str) -> str:
     try:
         scene = loads(text, "mutant.toml")
         if scene.motion.free is None:
-            at = command(scene)
-            if len(at.theta_2) <= MOST_POSITIONS:
-                solve(scene, find_last_stage(scene), at=at)
+            commanded = command(scene)
+            if len(commanded.theta_2) <= MOST_POSITIONS:
+                solve(scene, find_last_stage(scene), at=commanded)
     except FourBarError as error:
         if "\n" in str(error):
             return f"more than one line: {error}"

@@ -142,12 +142,12 @@ def choose_scenes() -> list[Scene]:
     return chosen
 
 
-def compute_numbers(scene: Scene, at: Command) -> dict[str, Any]:
+def compute_numbers(scene: Scene, command: Command) -> dict[str, Any]:
     """Compute every number that the formulas state of a scene and of its linkage."""
-    solution = solve(scene, "force", at=at)
+    solution = solve(scene, "force", at=command)
     numbers = {name: getattr(solution, name) for name in UNITS if getattr(solution, name) is not None}
     numbers["status"] = solution.status_code.astype(float)
-    return numbers | collect_stated(scene.linkage) | collect_stated_of_motion(scene, at)
+    return numbers | collect_stated(scene.linkage) | collect_stated_of_motion(scene, command)
 
 
 def collect_stated(linkage: FourBar) -> dict[str, Any]:
@@ -168,15 +168,15 @@ def collect_stated(linkage: FourBar) -> dict[str, Any]:
     return {name: np.array(value, dtype=float) for name, value in numbers.items()}
 
 
-def collect_stated_of_motion(scene: Scene, at: Command) -> dict[str, Any]:
+def collect_stated_of_motion(scene: Scene, command: Command) -> dict[str, Any]:
     """Compute how well the positions of a motion transmit."""
-    state = state_of(scene.linkage, at.theta_2, at.branch)
-    branch = at.branch.astype(float)
+    state = state_of(scene.linkage, command.theta_2, command.branch)
+    branch = command.branch.astype(float)
     return {
         "transmission_angle": transmission.transmission_angle(state),
         "speed_ratio": transmission.speed_ratio(state),
         "mechanical_advantage": transmission.mechanical_advantage(state, 0.2, 0.3),
-        "to_singular": transmission.distance_to_singular(scene.linkage, at.theta_2, scene.drive_bar, branch),
+        "to_singular": transmission.distance_to_singular(scene.linkage, command.theta_2, scene.drive_bar, branch),
     }
 
 
@@ -192,12 +192,12 @@ def is_changed(before: dict[str, Any], after: dict[str, Any]) -> bool:
     return False
 
 
-def is_caught(scene: Scene, at: Command, answers: list[tuple[Engine, Answer]]) -> bool:
+def is_caught(scene: Scene, command: Command, answers: list[tuple[Engine, Answer]]) -> bool:
     """Check a scene: whether any comparison or identity fails."""
-    question = Question("", scene, at)
+    question = Question("", scene, command)
     solution, rows = question.solution, list(check_identities(question))
     for engine, answer in answers:
-        rows += Comparison("", scene, answer, solution, hold(engine, scene, at, answer)).rows()
+        rows += Comparison("", scene, answer, solution, hold(engine, scene, command, answer)).rows()
         if engine.name == FREE_BODY and (reference := make_reference(scene, answer)) is not None:
             rows.append(compare_status(question, reference))
     if not any(row.verdict == FAILS for row in rows):
@@ -209,7 +209,7 @@ class Baseline(NamedTuple):
     """A scene, and what engines and formulas say of it without a mutant."""
 
     scene: Scene
-    at: Command
+    command: Command
     answers: list[tuple[Engine, Answer]]
     before: dict[str, Any]
 
@@ -218,11 +218,11 @@ def make_baselines() -> list[Baseline]:
     """Solve the scenes; RuntimeError where the harness fails on one of them."""
     made = []
     for scene in choose_scenes():
-        at = command_of(scene)
-        answers = [(w, w.start().answer(scene, at)) for w in ENGINES if w.name in EXACT]
-        if is_caught(scene, at, answers):
+        command = command_of(scene)
+        answers = [(w, w.start().answer(scene, command)) for w in ENGINES if w.name in EXACT]
+        if is_caught(scene, command, answers):
             raise RuntimeError(f"the harness fails without a mutant: {scene.title}")
-        made.append(Baseline(scene, at, answers, compute_numbers(scene, at)))
+        made.append(Baseline(scene, command, answers, compute_numbers(scene, command)))
     return made
 
 
@@ -232,10 +232,10 @@ def judge_mutant(mutant: Mutant, tried: Sequence[Baseline]) -> bool | None:
     signal.alarm(SECONDS)
     try:
         with np.errstate(all="ignore"), mutant.active():
-            for scene, at, answers, before in tried:
-                if is_changed(before, compute_numbers(scene, at)):
+            for scene, command, answers, before in tried:
+                if is_changed(before, compute_numbers(scene, command)):
                     differs = True
-                    if is_caught(scene, at, answers):
+                    if is_caught(scene, command, answers):
                         return True
     except Exception:  # a mutant that raises or hangs ends the run: that is noticed
         return True

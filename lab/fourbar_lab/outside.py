@@ -46,12 +46,12 @@ def draw_scene(seed: int, index: int) -> Scene:
             rng.uniform(-3.0, 3.0), rng.uniform(-10.0, 10.0), rng.uniform(-10.0, 10.0), branch=int(rng.choice([-1, 1]))
         )
         scene = Scene(linkage, motion, int(rng.choice([2, 2, 3, 4])))
-        at = solve(scene, "position")
-        if not change_points(linkage) and at.assembled.all():
+        solution = solve(scene, "position")
+        if not change_points(linkage) and solution.assembled.all():
             break
     effects: list[Any] = []
     if rng.random() < 0.7:
-        effects.append(Springs((_draw_nearly_meeting(rng, scene, at),)))
+        effects.append(Springs((_draw_nearly_meeting(rng, scene, solution),)))
     if rng.random() < 0.5:
         effects.append(Gravity())
     if rng.random() < 0.3:
@@ -69,11 +69,11 @@ def _draw_own(rng: np.random.Generator, length: float) -> tuple[Any, ...]:
     return (0.1 * length * length, (0.5 * length, rng.uniform(-1.0, 1.0))) if rng.random() < 0.7 else ()
 
 
-def _draw_nearly_meeting(rng: np.random.Generator, scene: Scene, at: Solution) -> Spring:
+def _draw_nearly_meeting(rng: np.random.Generator, scene: Scene, solution: Solution) -> Spring:
     """Draw a spring whose ends are a millionth to a tenth of the linkage apart where the motion begins."""
-    assert at.theta_3 is not None and at.theta_4 is not None
+    assert solution.theta_3 is not None and solution.theta_4 is not None
     link, bars = scene.linkage, rng.choice(4, 2, replace=False) + 1
-    angles = np.array([link.ground_angle, scene.motion.theta_2, at.theta_3[0], at.theta_4[0]])
+    angles = np.array([link.ground_angle, scene.motion.theta_2, solution.theta_3[0], solution.theta_4[0]])
     first_pins = np.array([0.0, 0.0, *(np.array([link.input.length, link.ground]) * np.exp(1j * angles[[1, 0]]))])
     meet = first_pins[bars[0] - 1] + rng.uniform(0.05, 0.3) * np.exp(1j * rng.uniform(-3.0, 3.0))
     apart = np.array([0.0, 10.0 ** rng.uniform(-6, -1) * np.exp(1j * rng.uniform(-3.0, 3.0))])
@@ -135,8 +135,8 @@ def _climb(scene: Scene, intervals: tuple[tuple[float, float], ...], name: str, 
         theta_2 = np.clip(theta_2[around] + noise[0], low[spots], high[spots])
         parts = np.clip(parts[:, around] + 10.0 * noise[1:], -1.0, 1.0)
         values = _evaluate_samples(scene, name, sign, parts, theta_2)
-    at = int(np.argmax(values))
-    return parts[:, at], float(theta_2[at])
+    best_sample = int(np.argmax(values))
+    return parts[:, best_sample], float(theta_2[best_sample])
 
 
 def _evaluate_samples(scene: Scene, name: str, sign: int, parts: Array, theta_2: Array) -> Array:

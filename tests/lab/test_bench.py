@@ -43,14 +43,14 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, at = make_example(), make_command(500)
-    own = solve(scene, at=at)
+    scene, command = make_example(), make_command(500)
+    own = solve(scene, at=command)
     expected = np.concatenate([np.atleast_2d(getattr(own, name).T) for name in UNKNOWNS])
     peers = contenders.collect_loops()
     assert {"NumPy", "C"} <= set(peers.here) or "C" in peers.not_run
     for name, loop in peers.here.items():
         out = np.full((15, 500), np.nan)
-        loop(at.theta_2, out)
+        loop(command.theta_2, out)
         off = out - expected
         off[:2] = np.remainder(off[:2] + np.pi, 2 * np.pi) - np.pi
         assert (np.abs(off).max(axis=1) <= ROUNDING * np.abs(expected).max(axis=1)).all(), name

@@ -18,9 +18,9 @@ SCENE = crank_rocker()
 
 
 def test_a_number_counts_as_changed_from_a_billionth_on() -> None:
-    at = command_of(SCENE)
-    before = compute_numbers(SCENE, at)
-    assert not is_changed(before, compute_numbers(SCENE, at))
+    command = command_of(SCENE)
+    before = compute_numbers(SCENE, command)
+    assert not is_changed(before, compute_numbers(SCENE, command))
     for part, counts in ((1e-12, False), (1e-8, True)):
         after = {**before, "torque": before["torque"] * (1.0 + part)}
         assert is_changed(before, after) == counts
@@ -32,15 +32,15 @@ def test_a_number_counts_as_changed_from_a_billionth_on() -> None:
 def test_without_a_mutant_the_harness_holds() -> None:
     """Near change points too, where the engines lose as many digits as they are expected to."""
     for scene in harness.choose_scenes()[-3:]:
-        at = command_of(scene)
-        answers = [(w, w.start().answer(scene, at)) for w in harness.ENGINES if w.name in harness.EXACT]
-        assert not is_caught(scene, at, answers)
+        command = command_of(scene)
+        answers = [(w, w.start().answer(scene, command)) for w in harness.ENGINES if w.name in harness.EXACT]
+        assert not is_caught(scene, command, answers)
 
 
 def test_the_harness_alone_catches_a_wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
-    at = command_of(SCENE)
-    answers = [(w, w.start().answer(SCENE, at)) for w in harness.ENGINES if w.name in harness.EXACT]
-    assert not is_caught(SCENE, at, answers)
+    command = command_of(SCENE)
+    answers = [(w, w.start().answer(SCENE, command)) for w in harness.ENGINES if w.name in harness.EXACT]
+    assert not is_caught(SCENE, command, answers)
     true = harness.solve
 
     def wrong(*arguments: object, **keywords: object) -> object:
@@ -49,18 +49,18 @@ def test_the_harness_alone_catches_a_wrong_sign(monkeypatch: pytest.MonkeyPatch)
         return solution
 
     monkeypatch.setattr("fourbar_validation.run.question.solve", wrong)
-    assert is_caught(SCENE, at, answers)
+    assert is_caught(SCENE, command, answers)
 
 
 def test_a_mutant_acts_wherever_its_function_was_imported_and_while_it_is_active_alone() -> None:
-    at = command_of(SCENE)
-    before = compute_numbers(SCENE, at)
+    command = command_of(SCENE)
+    before = compute_numbers(SCENE, command)
     tried = list(compile_mutants(torque))
     assert len(tried) > 40 and len({mutant.name for mutant in tried}) == len(tried)
     chosen = next(mutant for mutant in tried if mutant.function is torque.inertia)
     with chosen.active():
-        assert is_changed(before, compute_numbers(SCENE, at))
-    assert not is_changed(before, compute_numbers(SCENE, at))
+        assert is_changed(before, compute_numbers(SCENE, command))
+    assert not is_changed(before, compute_numbers(SCENE, command))
 
 
 def test_every_operator_and_number_of_functions_methods_and_properties_is_changed(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
 
 @pytest.mark.posix
 def test_a_mutant_that_hangs_or_raises_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    tried = [harness.Baseline(SCENE, at := command_of(SCENE), [], compute_numbers(SCENE, at))]
+    tried = [harness.Baseline(SCENE, command := command_of(SCENE), [], compute_numbers(SCENE, command))]
     mutant = next(compile_mutants(torque))
 
     def raises(*_: object) -> None:

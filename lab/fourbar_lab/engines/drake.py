@@ -57,8 +57,8 @@ class DrakeTree(Tree):
             about_g = RotationalInertia(*[part.inertia] * 3)
             inertia = SpatialInertia.MakeFromCentralInertia(part.mass, np.array([*part.centre, 0.0]), about_g)
             body = self.body[part.bar] = plant.AddRigidBody(f"bar{part.bar}", inertia)
-            at, bearer = RigidTransform(np.array([*part.first_pin, 0.0])), self.body[part.bearer].body_frame()
-            frame = plant.AddFrame(FixedOffsetFrame(f"first_pin{part.bar}", bearer, at))
+            joint_frame, bearer = RigidTransform(np.array([*part.first_pin, 0.0])), self.body[part.bearer].body_frame()
+            frame = plant.AddFrame(FixedOffsetFrame(f"first_pin{part.bar}", bearer, joint_frame))
             joint = RevoluteJoint(FIRST_PIN[part.bar], frame, body.body_frame(), UP)
             self.joint[part.bar] = plant.AddJoint(joint)
             self.local |= {name: (body.body_frame(), np.array([*place, 0.0])) for name, place in part.points.items()}
@@ -82,13 +82,13 @@ class DrakeTree(Tree):
 
     def point_jacobian(self, name: str) -> Array:
         """Return that of the translational velocity."""
-        at = (*self.local[name], self.world, self.world)
-        return np.asarray(self.plant.CalcJacobianTranslationalVelocity(self.context, BY_SPEEDS, *at)[:2])
+        arguments = (*self.local[name], self.world, self.world)
+        return np.asarray(self.plant.CalcJacobianTranslationalVelocity(self.context, BY_SPEEDS, *arguments)[:2])
 
     def turn(self, bar: int) -> Array:
         """Last row of the angular velocity's Jacobian."""
-        at = (self.body[bar].body_frame(), self.world, self.world)
-        return np.array(self.plant.CalcJacobianAngularVelocity(self.context, BY_SPEEDS, *at)[2])
+        arguments = (self.body[bar].body_frame(), self.world, self.world)
+        return np.array(self.plant.CalcJacobianAngularVelocity(self.context, BY_SPEEDS, *arguments)[2])
 
     def set_motion(self, v: Array, a: Array) -> None:
         """Speeds; accelerations are given with each request."""
@@ -96,8 +96,8 @@ class DrakeTree(Tree):
 
     def acceleration(self, name: str) -> Array:
         """J a + (dJ/dt) v of a point."""
-        at = (*self.local[name], self.world, self.world)
-        bias = self.plant.CalcBiasTranslationalAcceleration(self.context, BY_SPEEDS, *at)
+        arguments = (*self.local[name], self.world, self.world)
+        bias = self.plant.CalcBiasTranslationalAcceleration(self.context, BY_SPEEDS, *arguments)
         return np.asarray(self.point_jacobian(name) @ self.a + bias[:2, 0])
 
     def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:

@@ -62,16 +62,16 @@ class ExudynBars(Loaded):
         bodies = Bodies(mbs, scene.linkage)
         self.body = bodies.body
         of_bar = {part.bar: part for part in list_parts(scene.linkage)}
-        self.local = {name: (part.bar, [*at, 0.0]) for part in of_bar.values() for name, at in part.points.items()}
+        self.local = {name: (part.bar, [*xy, 0.0]) for part in of_bar.values() for name, xy in part.points.items()}
         end = {bar: part.points[f"end{bar}"] for bar, part in of_bar.items()}
-        at = {
+        pin_places = {
             "O2": ((0.0, 0.0), (0.0, 0.0)),
             "A": ((0.0, 0.0), end[2]),
             "B": (end[4], end[3]),
             "O4": (of_bar[4].first_pin, (0.0, 0.0)),
         }
         for pin, bars in JOINTS.items():
-            markers = [bodies.point(bar, *place) for bar, place in zip(bars, at[pin], strict=True)]
+            markers = [bodies.point(bar, *place) for bar, place in zip(bars, pin_places[pin], strict=True)]
             mbs.AddObject(ObjectJointRevolute2D(markerNumbers=markers))
         if scene.drive is None:
             markers = [bodies.direction(bar) for bar in (1, scene.drive_bar)]

@@ -78,7 +78,7 @@ class OpenSimBars(Loaded):
             about_z = osim.Inertia(*[part.inertia] * 3, *ZERO)
             self.body[bar] = osim.Body(f"bar{bar}", part.mass, make_vec(*part.centre), about_z)
             model.addBody(self.body[bar])
-        self.local = {name: (part.bar, at) for part in self.part.values() for name, at in part.points.items()}
+        self.local = {name: (part.bar, place) for part in self.part.values() for name, place in part.points.items()}
         self.ends = (("start", scene.drive.start), ("end", scene.drive.end)) if scene.drive else ()
         self.local |= {name: (end.bar, resolve(end.distance, end.angle)) for name, end in self.ends}
         self.length = {bar: part.length for bar, part in self.part.items()}
@@ -110,9 +110,9 @@ class OpenSimBars(Loaded):
             f"below {LEAST_CONDITIONED:g} it takes constraints for dependent, and drops them"
         )
 
-    def _make_joint(self, name: str, parent: int, at: Any, child: int, on: Any) -> Any:
+    def _make_joint(self, name: str, parent: int, on_parent: Any, child: int, on_child: Any) -> Any:
         joint = osim.PinJoint(
-            name, self.body[parent], make_vec(*at), make_vec(), self.body[child], make_vec(*on), make_vec()
+            name, self.body[parent], make_vec(*on_parent), make_vec(), self.body[child], make_vec(*on_child), make_vec()
         )
         self.model.addJoint(joint)
         return joint
@@ -139,8 +139,8 @@ class OpenSimBars(Loaded):
 
     def point(self, name: str) -> Array:
         """Return a station of a body."""
-        bar, at = self.local[name]
-        return np.array(self.body[bar].findStationLocationInGround(self.state, make_vec(*at)).to_numpy()[:2])
+        bar, place = self.local[name]
+        return np.array(self.body[bar].findStationLocationInGround(self.state, make_vec(*place)).to_numpy()[:2])
 
     def gap(self) -> tuple[float, float]:
         """Return A on bar 2 minus A on bar 3, which opens as B would."""
@@ -153,8 +153,8 @@ class OpenSimBars(Loaded):
         return np.column_stack((by_own[:, 0] + by_own[:, 2], by_own[:, 2], by_own[:, 1] - by_own[:, 2]))
 
     def _compute_station_jacobian(self, name: str) -> Array:
-        (bar, at), matrix = self.local[name], osim.Matrix()
-        self.matter.calcStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*at), matrix)
+        (bar, place), matrix = self.local[name], osim.Matrix()
+        self.matter.calcStationJacobian(self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*place), matrix)
         return np.array(matrix.to_numpy())[:2]
 
     def rotation(self, bar: int) -> Array:
@@ -188,7 +188,8 @@ class OpenSimBars(Loaded):
         if self.linear is None:
             return PER_COORDINATE[self.drive_bar]
         start, end = (
-            np.zeros((2, 3)) if at.bar == 1 else self._compute_station_jacobian(name) for name, at in self.ends
+            np.zeros((2, 3)) if spring_end.bar == 1 else self._compute_station_jacobian(name)
+            for name, spring_end in self.ends
         )
         return np.asarray(self.line()[2] @ (end - start))
 
@@ -211,9 +212,9 @@ class OpenSimBars(Loaded):
         for bar in MOVING_BARS:
             values[f"omega_{bar}"], values[f"alpha_{bar}"] = self.velocity(bar), self.alpha(bar)
         for name, point in ON_BARS.items():
-            bar, at = self.local[point]
+            bar, place = self.local[point]
             drift = self.matter.calcBiasForStationJacobian(
-                self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*at)
+                self.state, self.body[bar].getMobilizedBodyIndex(), make_vec(*place)
             )
             values[f"a_{name}"] = self._compute_station_jacobian(point) @ self.a + np.array(drift.to_numpy()[:2])
         return values

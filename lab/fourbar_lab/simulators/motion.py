@@ -117,19 +117,19 @@ class Simulator:
         """Evaluate the scene's positions, each set by itself."""
         raise NotImplementedError
 
-    def answer(self, scene: Scene, at: Command) -> Answer:
+    def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer at the motion that was made."""
-        n = len(at.angle)
+        n = len(command.angle)
         rows: NDArray[np.intp] = np.arange(n)
         steps = self.steps
         how = "single states" if steps is None else f"{steps}/rev"
         setting = f"{self.setting}, {how}"
         try:
             if steps is None:
-                refuse_what_no_simulator_holds(scene, at)
+                refuse_what_no_simulator_holds(scene, command)
                 readings = self.states(scene)
             else:
-                led, course = lay_out(scene, at, steps)
+                led, course = lay_out(scene, command, steps)
                 rows, readings = course.rows, self.through(led, course)
         except (InputError, LimitError) as limit:  # InputError: a scene that no file for this simulator can hold
             return Answer(self.name, setting, refusal=str(limit))
@@ -143,32 +143,32 @@ class Simulator:
         values = {"theta_3": theta[:, 1], "theta_4": theta[:, 2]}
         values["torque"] = np.array([instant.torque for instant in read])
         values |= {name: np.array([instant.forces[name] for instant in read]) for name in read[0].forces}
-        turned = np.remainder(theta[:, 0] - at.theta_2 + np.pi, 2.0 * np.pi) - np.pi
-        made = Command(at.theta_2 + turned, at.branch, moved[0], moved[1])
+        turned = np.remainder(theta[:, 0] - command.theta_2 + np.pi, 2.0 * np.pi) - np.pi
+        made = Command(command.theta_2 + turned, command.branch, moved[0], moved[1])
         gap = readings.gap / max(scene.linkage.lengths)
         return Answer(self.name, setting, made, np.ones(n, bool), values, evidence={"gap": gap},
                       shared=self.changed, seconds=readings.seconds)  # fmt: skip
 
 
-def refuse_what_no_simulator_holds(scene: Scene, at: Command) -> None:
+def refuse_what_no_simulator_holds(scene: Scene, command: Command) -> None:
     """Raise LimitError for a motion other than omega_2 on one branch, and for loads."""
-    speed, acceleration = list_speeds(at)
-    steady = at.speed is not None and speed[0] != 0.0 and np.ptp(speed) == 0.0 and not acceleration.any()
+    speed, acceleration = list_speeds(command)
+    steady = command.speed is not None and speed[0] != 0.0 and np.ptp(speed) == 0.0 and not acceleration.any()
     if not steady or scene.loads or scene.motion.through != "sign":
         raise LimitError("a simulator runs at one speed omega_2, without loads, on one branch")
 
 
-def lay_out(scene: Scene, at: Command, steps: int) -> tuple[Scene, Course]:
+def lay_out(scene: Scene, command: Command, steps: int) -> tuple[Scene, Course]:
     """Lay out a run through the positions of a command; the scene's motion begins before them, so that it settles."""
-    refuse_what_no_simulator_holds(scene, at)
+    refuse_what_no_simulator_holds(scene, command)
     sense = math.copysign(1.0, scene.motion.omega_2 or 0.0)
-    first = float((sense * at.theta_2).min()) * sense
+    first = float((sense * command.theta_2).min()) * sense
     lead = next((lead for lead in LEADS if _closes(scene, np.linspace(first - sense * lead, first, 50))), 0.0)
-    progress = sense * (at.theta_2 - first) + lead
+    progress = sense * (command.theta_2 - first) + lead
     stops, rows = np.unique(np.maximum(1, np.rint(progress / math.tau * steps).astype(int)), return_inverse=True)
     if len(stops) < len(np.unique(progress)):
         raise LimitError("its positions lie closer together than the steps")
-    motion = scene.motion.replace(angle=np.array([first - sense * lead, *at.theta_2]))
+    motion = scene.motion.replace(angle=np.array([first - sense * lead, *command.theta_2]))
     return replace(scene, motion=motion), Course(find_timestep(scene, steps), steps, stops.tolist(), rows)
 
 
@@ -210,14 +210,14 @@ def start(scene: Scene) -> Start:
 
     No simulator starts from what the formulas computed.
     """
-    at, omega_2 = command(scene), scene.motion.omega_2 or 0.0
-    closed = close(scene.linkage, at.theta_2, at.branch)
+    commanded, omega_2 = command(scene), scene.motion.omega_2 or 0.0
+    closed = close(scene.linkage, commanded.theta_2, commanded.branch)
     usable = np.flatnonzero(closed.assembled)
     if not len(usable):
         raise NotAssembledError("the linkage closes at none of the scene's positions: there is nothing to start from")
-    theta_2 = at.theta_2[usable]
+    theta_2 = commanded.theta_2[usable]
     first = usable[[np.argmin(theta_2) if omega_2 >= 0.0 else np.argmax(theta_2)]]
-    theta = (at.theta_2[first], *closed.theta[:, first])
+    theta = (commanded.theta_2[first], *closed.theta[:, first])
     omega = move(scene.linkage, theta[0], np.array([omega_2]), np.zeros(1), *theta[1:]).omega
     q, v = [float(x[0]) for x in theta], [float(omega[bar][0]) for bar in (2, 3, 4)]
     return Start((q[0], q[1] - q[0], q[2]), (v[0], v[1] - v[0], v[2]), choose_run(theta_2, omega_2, 0.0))

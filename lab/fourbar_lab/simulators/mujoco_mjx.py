@@ -67,7 +67,7 @@ class MujocoMjx(Simulator):
         """Differentiate the driving torque forwards, at a set state and through a quarter turn, and backwards."""
         begin, end = gradients.choose_quarter(scene)
         ways = [("jax.jvp at a set state", end, 0), ("jax.jvp through a quarter turn", begin, gradients.STEPS // 4)]
-        ways_tried = [_slopes(scene, how, at, partial(_forwards, steps=steps)) for how, at, steps in ways]
+        ways_tried = [_slopes(scene, how, state, partial(_forwards, steps=steps)) for how, state, steps in ways]
         try:
             ways_tried.append(_slopes(scene, "jax.grad at a set state", end, _backwards))
         except ValueError as error:

@@ -90,7 +90,7 @@ def _measure_period(time: Array, theta: Array, omega: Array, alpha: Array) -> fl
     passed = np.flatnonzero((theta[:-1] < level) & (theta[1:] >= level))
     if len(passed) < 2:
         return None
-    at = []
+    passages = []
     for i in (passed[0], passed[-1]):
         ends = np.column_stack([theta, omega, alpha])[i : i + 2]
         ends[:, 0] -= level
@@ -98,8 +98,8 @@ def _measure_period(time: Array, theta: Array, omega: Array, alpha: Array) -> fl
         low, high = time[i], time[i + 1]
         while (middle := 0.5 * (low + high)) not in (low, high):
             low, high = (middle, high) if roots(middle) < 0.0 else (low, middle)
-        at.append(high)
-    return float(at[1] - at[0]) / (len(passed) - 1)
+        passages.append(high)
+    return float(passages[1] - passages[0]) / (len(passed) - 1)
 
 
 @click.command()

@@ -19,8 +19,8 @@ class PinocchioSlider:
         joints = (pin.JointModelRZ(), 0, (0.0, 0.0)), (pin.JointModelRZ(), 1, (crank, 0.0)), (
             pin.JointModelPX(), 0, (0.0, offset))  # fmt: skip
         for number, ((joint, parent, place), body) in enumerate(zip(joints, bodies, strict=True), 1):
-            at = pin.SE3(np.eye(3), np.array([*place, 0.0]))
-            self.model.addJoint(parent, joint, at, f"joint {number}")
+            placement = pin.SE3(np.eye(3), np.array([*place, 0.0]))
+            self.model.addJoint(parent, joint, placement, f"joint {number}")
             inertia = pin.Inertia(body.mass, np.array([*body.centre, 0.0]), np.diag([body.inertia] * 3))
             self.model.appendBodyToJoint(number, inertia, pin.SE3.Identity())
         end = pin.SE3(np.eye(3), np.array([rod, 0.0, 0.0]))

@@ -99,8 +99,8 @@ def read_question(name: str) -> Any:
 
 @pytest.mark.parametrize("name", PRESCRIBED)
 def test_the_free_bodies_answer_the_same(name: str) -> None:
-    scene, at = read_question(name)
-    answers = FreeBody().answer(scene, at).quantities
+    scene, command = read_question(name)
+    answers = FreeBody().answer(scene, command).quantities
     assert_agreement(name, answers, K * EPS / float(np.abs(answers["sin_mu"]).min()) ** 2)
 
 
@@ -126,8 +126,8 @@ def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, 
     def psi(angle: Any) -> Any:
         return mp.asin((e - a * mp.sin(angle)) / b)
 
-    def slope(point: Any, at: Any, order: int = 1) -> Any:
-        return mp.mpc(*(mp.diff(lambda x, part=part: part(point(x)), at, order) for part in (mp.re, mp.im)))
+    def slope(point: Any, angle: Any, order: int = 1) -> Any:
+        return mp.mpc(*(mp.diff(lambda x, part=part: part(point(x)), angle, order) for part in (mp.re, mp.im)))
 
     def work(force: Any, displaced: Any) -> Any:
         return mp.re(force * mp.conj(displaced))
@@ -138,17 +138,17 @@ def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, 
         r, phi = stated.get("centre", (length / 2, 0.0))
         bodies.append((stated.get("inertia", mp.mpf(stated["mass"]) * length**2 / 12), mp.mpf(r) * mp.expj(phi)))
     (i2, c2), (i3, c3) = bodies
-    places = (
+    centres = (
         lambda angle: c2 * mp.expj(angle),
         lambda angle: a * mp.expj(angle) + c3 * mp.expj(psi(angle)),
         lambda angle: a * mp.cos(angle) + b * mp.cos(psi(angle)) + mp.mpc(0, e),
     )
     masses = (mp.mpf(scene["bars"][name]["mass"]) for name in ("crank", "rod", "slider"))
-    p = [m * (slope(lambda t: at(theta(t)), 0, 2) - weight) for m, at in zip(masses, places, strict=True)]  # noqa: B023
+    p = [m * (slope(lambda t: centre(theta(t)), 0, 2) - weight) for m, centre in zip(masses, centres, strict=True)]  # noqa: B023
     for load in scene.get("loads", ()):
         p[2] -= mp.mpf(load["force"][0]) * mp.expj(load["force"][1])
     t2, t3 = i2 * alpha, i3 * slope(lambda t: psi(theta(t)), 0, 2).real
-    torque = sum(work(force, slope(at, place)) for force, at in zip(p, places, strict=True))
+    torque = sum(work(force, slope(centre, place)) for force, centre in zip(p, centres, strict=True))
     torque += t2 + t3 * slope(psi, place).real
     arm = mp.expj(psi(place))
     F43 = mp.mpc(-p[2].real, (work(p[1], 1j * c3 * arm) + t3 - p[2].real * b * arm.imag) / (b * arm.real))
@@ -156,7 +156,7 @@ def slide(mp: Any, scene: Any, place: Any, omega: Any, alpha: Any) -> dict[str, 
     F12 = p[0] - F32
     numbers = {
         "theta_3": psi(place),
-        "stroke": places[2](place).real,
+        "stroke": centres[2](place).real,
         "torque": torque,
         "guide_force": p[2].imag + F43.imag,
     }
