@@ -65,7 +65,11 @@ def test_a_measure_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     out = tmp_path / "study"
     list(advice.measure(3, 2, out))
     cases = list(advice.measure(3, 4, out))
-    assert made == [0, 1, 2, 3] and [each.index for each in cases] == made and all(each.met for each in cases)
+    assert (
+        made == [0, 1, 2, 3]
+        and [measured.index for measured in cases] == made
+        and all(measured.met for measured in cases)
+    )
     made.clear()
     list(advice.measure(4, 1, out))  # another seed starts over
     assert made == [0]

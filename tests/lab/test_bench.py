@@ -29,14 +29,14 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
-    found = bench.measure(1000, 1, 10_000)
-    assert bench.LIMITS.keys() - found.not_run.keys() <= found.rows.keys()
-    numbers = [found.rows, *found.over_positions.values(), *found.over_linkages.values()]
-    assert all(math.isfinite(value) and value > 0.0 for own in numbers for value in own.values())
-    assert set(found.over_positions["NumPy"]) == {1000, 10_000}
-    assert set(found.over_linkages["study, NumPy"]) == {1, 10, 100, 1000}
-    assert set(found.over_linkages["one after the other"]) == {1, 10}
-    contenders.draw_bench(found.over_positions, found.over_linkages, tmp_path / "bench.svg")
+    measured = bench.measure(1000, 1, 10_000)
+    assert bench.LIMITS.keys() - measured.not_run.keys() <= measured.rows.keys()
+    numbers = [measured.rows, *measured.over_positions.values(), *measured.over_linkages.values()]
+    assert all(math.isfinite(value) and value > 0.0 for row in numbers for value in row.values())
+    assert set(measured.over_positions["NumPy"]) == {1000, 10_000}
+    assert set(measured.over_linkages["study, NumPy"]) == {1, 10, 100, 1000}
+    assert set(measured.over_linkages["one after the other"]) == {1, 10}
+    contenders.draw_bench(measured.over_positions, measured.over_linkages, tmp_path / "bench.svg")
     picture = (tmp_path / "bench.svg").read_text()
     assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 15
 
@@ -44,8 +44,8 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_every_contender_finds_the_same_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, command = make_example(), make_command(500)
-    own = solve(scene, at=command)
-    expected = np.concatenate([np.atleast_2d(getattr(own, name).T) for name in UNKNOWNS])
+    solution = solve(scene, at=command)
+    expected = np.concatenate([np.atleast_2d(getattr(solution, name).T) for name in UNKNOWNS])
     peers = contenders.collect_loops()
     assert {"NumPy", "C"} <= set(peers.here) or "C" in peers.not_run
     for name, loop in peers.here.items():

@@ -50,9 +50,9 @@ def test_every_entry_fits_its_module_and_is_tried_on_a_scene() -> None:
 )
 def test_an_injected_fault_fails_the_harness_where_its_entry_says(chosen: tuple[str, ...]) -> None:
     """A fault of the formulas is noticed by every exact engine by itself."""
-    found = try_faults([ENTRIES[fault] for fault in chosen])
-    assert not isinstance(found, str), found
-    for fault, failing in zip(chosen, found, strict=True):
+    outcomes = try_faults([ENTRIES[fault] for fault in chosen])
+    assert not isinstance(outcomes, str), outcomes
+    for fault, failing in zip(chosen, outcomes, strict=True):
         assert explain_survival(read_faults()[ENTRIES[fault]], failing) is None, fault
         noticed = {row.partition(" ")[0] for rows in failing.values() for row in rows}
         assert chosen is ELSEWHERE or noticed >= EXACT, (fault, noticed)

@@ -58,8 +58,8 @@ def test_half_are_adversarial() -> None:
 def small_error(true: object) -> object:
     """One part in 1e9 of the moment of bar 3."""
 
-    def wrong(lengths, at, drive_bar, w, *others):  # type: ignore[no-untyped-def]
-        return true(lengths, at, drive_bar, w._replace(M3=(1.0 + 1e-9) * w.M3), *others)  # type: ignore[operator]
+    def wrong(lengths, angles, drive_bar, w, *others):  # type: ignore[no-untyped-def]
+        return true(lengths, angles, drive_bar, w._replace(M3=(1.0 + 1e-9) * w.M3), *others)  # type: ignore[operator]
 
     return wrong
 
@@ -84,8 +84,8 @@ def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) ->
         "limit_positions",
         lambda *of: tuple(limit._replace(theta_4=limit.theta_4 + 1e-9) for limit in true(*of)),
     )
-    found = {finding.split(":")[0] for finding in examine.list_findings(scene)}
-    assert found == {"pinocchio-inverse range", "pinocchio-inverse limit_positions"}
+    kinds = {finding.split(":")[0] for finding in examine.list_findings(scene)}
+    assert kinds == {"pinocchio-inverse range", "pinocchio-inverse limit_positions"}
 
 
 @pytest.mark.parametrize(("times", "found"), [(9.0, False), (11.0, True)])
@@ -137,15 +137,15 @@ def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     with Store(tmp_path, {"seed": 1, "bounds": False, **name_code(LAB)}).held() as store:
         assert store.done() >= {4}
         store.put(4, [{"0": ["left by the run before"]}])
-    found = list(run(12, 1, tmp_path, 1))
-    assert len(found) == 3 and found[0] == {"0": ["left by the run before"]}
+    findings = list(run(12, 1, tmp_path, 1))
+    assert len(findings) == 3 and findings[0] == {"0": ["left by the run before"]}
 
 
 @pytest.mark.slow
 def test_a_scene_that_kills_its_worker_costs_itself_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(examine, "examine", dies_in_scene_2)
-    (found,) = run(4, 1, tmp_path, 1)
-    assert found.keys() == {"2"} and found["2"][0].startswith(examine.LOST)
+    (finding,) = run(4, 1, tmp_path, 1)
+    assert finding.keys() == {"2"} and finding["2"][0].startswith(examine.LOST)
 
 
 def dies_in_scene_2(seed: int, bounds: bool, index: int) -> list[str]:
@@ -170,7 +170,7 @@ def watched(monkeypatch: pytest.MonkeyPatch, change: Any = lambda found: found) 
 def test_no_value_lies_outside_what_is_proven(monkeypatch: pytest.MonkeyPatch) -> None:
     proven = watched(monkeypatch)
     assert not [number for number in range(45, 48) if examine.examine(SEED, True, number)]
-    assert len(proven) == 3 and any(found.nominal for found in proven)
+    assert len(proven) == 3 and any(extremes.nominal for extremes in proven)
 
 
 @pytest.mark.slow
@@ -181,12 +181,12 @@ def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatc
             for name, x in extremes.items()
         }
 
-    def narrower(found: Extremes) -> Extremes:
-        return found._replace(least=within(found.least, 1e-6), greatest=within(found.greatest, -1e-6))
+    def narrower(extremes: Extremes) -> Extremes:
+        return extremes._replace(least=within(extremes.least, 1e-6), greatest=within(extremes.greatest, -1e-6))
 
     watched(monkeypatch, narrower)
-    found = outside.list_findings(outside.draw_scene(SEED, 45))
-    assert [line.split(":")[0] for line in found if "beyond" in line] == ["extremes torque"] * 2 + [
+    findings = outside.list_findings(outside.draw_scene(SEED, 45))
+    assert [line.split(":")[0] for line in findings if "beyond" in line] == ["extremes torque"] * 2 + [
         "extremes |F12|"
     ] * 2
 
@@ -195,11 +195,11 @@ def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatc
 def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A distance that may be 0 had 1 m added."""
 
-    def silent(of: spring.Spring, across: Any) -> Any:
+    def silent(effect: spring.Spring, across: Any) -> Any:
         distance = np.abs(across)
         if isinstance(distance, Sloped):
             distance.values += np.array([float(ball.contains(0)) for ball in distance.values], dtype=object)
-        return of.stiffness + of.slack / distance
+        return effect.stiffness + effect.slack / distance
 
     assert outside.list_findings(meeting(0.1005)) == []
     monkeypatch.setattr(spring, "_divide_by_distance", silent)

@@ -121,9 +121,9 @@ def test_a_derivative_that_is_left_out_is_a_failure(monkeypatch: pytest.MonkeyPa
     """The reference says where there is none: where the loop does not close, or dry friction holds a pin at rest."""
 
     def lost(scene: fourbar.Scene) -> fourbar.Sensitivity:
-        found = fourbar.sensitivity(scene)
-        by = {name: np.full_like(of, np.nan) for name, of in found.by.items()}
-        return replace(found, status=["no_torque"], by=by)
+        sensitivity = fourbar.sensitivity(scene)
+        by = {name: np.full_like(of, np.nan) for name, of in sensitivity.by.items()}
+        return replace(sensitivity, status=["no_torque"], by=by)
 
     def judged(scene: fourbar.Scene) -> Tally:
         judge_slopes(scene, tally := Tally(), "", "numpy")
@@ -202,10 +202,10 @@ def test_an_angle_without_a_value_is_beyond_what_is_allowed(monkeypatch: pytest.
 
 
 def test_a_tally_adds_up() -> None:
-    whole, parts = run("random", range(12)), Tally()
+    tally, parts = run("random", range(12)), Tally()
     for part in (range(5), range(5, 12)):
         parts.add(run("random", part))
-    assert parts == whole
+    assert parts == tally
 
 
 def test_the_command_line_says_how_few_digits_are_left() -> None:

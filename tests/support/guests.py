@@ -25,12 +25,12 @@ def write_program(folder: Path, name: str, *replacements: tuple[str, str]) -> st
 
 def list_processes(mark: str) -> list[int]:
     """List the processes whose environment has the mark."""
-    found = []
+    processes = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != os.getpid():
             try:
                 if mark.encode() in (entry / "environ").read_bytes():
-                    found.append(int(entry.name))
+                    processes.append(int(entry.name))
             except OSError:
                 continue
-    return found
+    return processes

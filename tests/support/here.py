@@ -30,8 +30,8 @@ class Heard(Progress):
 def summary_of(records: Iterable[Record]) -> Summary:
     """What a run comes to in which these scenes were judged."""
     summary = Summary()
-    for each in records:
-        summary.add(each)
+    for record in records:
+        summary.add(record)
     return summary
 
 

@@ -13,17 +13,17 @@ from fourbar_validation.engines.free_body import FreeBody
 class Right:
     name = "right"
 
-    def answer(self, scene: Any, at: Any) -> Answer:
-        return FreeBody().answer(scene, at)
+    def answer(self, scene: Any, command: Any) -> Answer:
+        return FreeBody().answer(scene, command)
 
 
 class Angle(Right):
     name = "angle"
     quantities: ClassVar[tuple[str, ...]] = ("theta_3",)
 
-    def answer(self, scene: Any, at: Any) -> Answer:
-        answer = super().answer(scene, at)
-        return Answer(self.name, "exact", at, answer.assembled, {"theta_3": answer.quantities["theta_3"]})
+    def answer(self, scene: Any, command: Any) -> Answer:
+        answer = super().answer(scene, command)
+        return Answer(self.name, "exact", command, answer.assembled, {"theta_3": answer.quantities["theta_3"]})
 
 
 class Releases(Right):
@@ -47,9 +47,9 @@ class OfAnyBar(Right):
     commands = ("theta_4", "stroke")
     effects = ("gravity", "loads", "cylinder")
 
-    def answer(self, scene: Any, at: Any) -> Answer:
-        assert at.stroke is None or np.isnan(at.angle).all()
-        return super().answer(scene, at)
+    def answer(self, scene: Any, command: Any) -> Answer:
+        assert command.stroke is None or np.isnan(command.angle).all()
+        return super().answer(scene, command)
 
 
 class Changes(Right):
@@ -57,7 +57,7 @@ class Changes(Right):
 
     name = "changes"
 
-    def answer(self, scene: Any, at: Any) -> Answer:
+    def answer(self, scene: Any, command: Any) -> Answer:
         from fourbar_validation.compare import compare, rows
         from fourbar_validation.compare.tolerance import EQUIVALENCE
         from fourbar_validation.run import judge
@@ -65,7 +65,7 @@ class Changes(Right):
         for module in (compare, rows, judge):
             module.FAILS = module.AGREES = "agrees"  # type: ignore[attr-defined]
         object.__setattr__(EQUIVALENCE, "factor", 1e30)
-        answer = super().answer(scene, at)
+        answer = super().answer(scene, command)
         answer.quantities["torque"] = 1.01 * answer.quantities["torque"]
         return answer
 
@@ -73,7 +73,7 @@ class Changes(Right):
 class Prints(Right):
     name = "prints"
 
-    def answer(self, scene: Any, at: Any) -> Answer:
+    def answer(self, scene: Any, command: Any) -> Answer:
         print("\x1b]0;owned\x07begin")
         sys.stdout.flush()
         os.system("echo from a shell")
@@ -83,14 +83,14 @@ class Prints(Right):
 class Empty(Right):
     name = "empty"
 
-    def answer(self, scene: Any, at: Any) -> Any:
+    def answer(self, scene: Any, command: Any) -> Any:
         return None
 
 
 class Leaves(Right):
     name = "leaves"
 
-    def answer(self, scene: Any, at: Any) -> Answer:
+    def answer(self, scene: Any, command: Any) -> Answer:
         sys.exit(0)
 
 
@@ -100,17 +100,17 @@ class Lacks(Right):
     name = "lacks"
     quantities: ClassVar[tuple[str, ...]] = ("theta_3", "theta_4", "torque")
 
-    def answer(self, scene: Any, at: Any) -> Answer:
-        answer = super().answer(scene, at)
+    def answer(self, scene: Any, command: Any) -> Answer:
+        answer = super().answer(scene, command)
         theta = answer.quantities["theta_3"]
-        return Answer(self.name, "wrong", at, answer.assembled, {"theta_3": theta, "theta_4": np.nan * theta})
+        return Answer(self.name, "wrong", command, answer.assembled, {"theta_3": theta, "theta_4": np.nan * theta})
 
 
 class Shapes(Right):
     name = "shapes"
 
-    def answer(self, scene: Any, at: Any) -> Answer:
-        answer = super().answer(scene, at)
+    def answer(self, scene: Any, command: Any) -> Answer:
+        answer = super().answer(scene, command)
         answer.quantities["F12"] = answer.quantities["F12"].T
         return answer
 
@@ -118,8 +118,8 @@ class Shapes(Right):
 class Complex(Right):
     name = "complex"
 
-    def answer(self, scene: Any, at: Any) -> Answer:
-        answer = super().answer(scene, at)
+    def answer(self, scene: Any, command: Any) -> Answer:
+        answer = super().answer(scene, command)
         answer.quantities["torque"] = answer.quantities["torque"].astype(complex)
         return answer
 
@@ -127,8 +127,8 @@ class Complex(Right):
 class Elsewhere(Right):
     name = "elsewhere"
 
-    def answer(self, scene: Any, at: Any) -> Answer:
-        return super().answer(scene, at._replace(speed=0.0))
+    def answer(self, scene: Any, command: Any) -> Answer:
+        return super().answer(scene, command._replace(speed=0.0))
 
 
 class Nameless:

@@ -114,9 +114,9 @@ class Equations:
         elif isinstance(term, Viscous):
             self.damping += [(*PINS[pin], arb(k)) for pin, k in term.coefficients]
         elif isinstance(term, Load):
-            k, (size, angle), (r, at) = term.bar - 2, term.force or (0.0, 0.0), term.at
+            k, (size, angle), (r, angle_of_place) = term.bar - 2, term.force or (0.0, 0.0), term.at
             _push((self.own if term.frame == "bar" else self.world)[k], arb(size), arb(angle))
-            self.couple[k] += arb(term.moment) + arb(r) * arb(size) * (arb(angle) - arb(at)).sin()
+            self.couple[k] += arb(term.moment) + arb(r) * arb(size) * (arb(angle) - arb(angle_of_place)).sin()
         else:
             raise NotImplementedError(type(term).__name__)
 
@@ -195,12 +195,12 @@ class Equations:
     def step(self, theta: Three, omega: Three) -> Step:
         """The series of the motion, one term longer with each evaluation."""
         angles, speeds = [[q, w] for q, w in zip(theta, omega, strict=True)], [[w] for w in omega]
-        for known in range(1, ORDER):
-            ctx.cap = known
+        for count in range(1, ORDER):
+            ctx.cap = count
             alpha = self.accelerations([arb_series(q) for q in angles], [arb_series(w) for w in speeds])
             for q, w, terms in zip(angles, speeds, alpha, strict=True):
-                w.append((terms[known - 1] / known).mid())
-                q.append(w[known] / (known + 1))
+                w.append((terms[count - 1] / count).mid())
+                q.append(w[count] / (count + 1))
         return Step(angles, speeds)
 
 
@@ -258,8 +258,8 @@ def released(
                 q, _ = step.at(arb(float(times[len(rows)])) - t)
                 rows.append([float(q[0]), _sine(q)])
             t, (theta, omega) = (t + h).mid(), new
-    found = np.array(rows)
-    return Reference(found[:, 0], found[:, 1], stopped, limits, change_points)
+    angles = np.array(rows)
+    return Reference(angles[:, 0], angles[:, 1], stopped, limits, change_points)
 
 
 def _crossing(side: Callable[[Ball], float], high: Ball) -> Ball:

@@ -41,5 +41,5 @@ def thesis(theta_2: object = None) -> fourbar.Scene:
     )
     loads = [fourbar.Load(2, (10.0, 0.0), (0.05, math.radians(265.0)))]
     loads += [fourbar.Load(bar, moment=-0.15) for bar in (2, 3, 4)]
-    where = np.radians([135.0]) if theta_2 is None else theta_2
-    return fourbar.Scene(linkage, fourbar.Motion(where, 0.2244), 4, tuple(loads), title="thesis")  # type: ignore[arg-type]
+    angles = np.radians([135.0]) if theta_2 is None else theta_2
+    return fourbar.Scene(linkage, fourbar.Motion(angles, 0.2244), 4, tuple(loads), title="thesis")  # type: ignore[arg-type]

@@ -61,7 +61,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     link = fourbar.uniform(0.3, 0.1, 0.25, 0.22)
     scene, rows = fourbar.Scene(link, fourbar.Motion(1.0, 10.0)), (("O2", 0.1), ("B", 0.2))
     solution, study = fourbar.solve(scene), fourbar.vary(scene, {"lengths.input": [0.1, 0.11]})
-    out, at, ends = (
+    out, command, ends = (
         {"torque": np.empty(1)},
         fourbar.command(scene),
         (fourbar.SpringEnd(2, 0.1, 0.2), fourbar.SpringEnd(4, 0.1, 0.2)),
@@ -77,14 +77,14 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
     def by(kind: Any, *values: Any) -> object:
         return acting(kind.at(O2=values[0]))
 
-    def law(*given: Any) -> object:
-        return moving(fourbar.Motion(law=fourbar.Law(*given)))
+    def law(*arguments: Any) -> object:
+        return moving(fourbar.Motion(law=fourbar.Law(*arguments)))
 
-    def bars(*given: Any) -> object:
-        return fourbar.solve(fourbar.Scene(fourbar.FourBar(0.3, fourbar.Bar(*given), link.coupler, link.output)))
+    def bars(*arguments: Any) -> object:
+        return fourbar.solve(fourbar.Scene(fourbar.FourBar(0.3, fourbar.Bar(*arguments), link.coupler, link.output)))
 
-    def solved(*given: Any) -> object:
-        return fourbar.solve(given[0], given[1], at=given[2], side=given[3])
+    def solved(*arguments: Any) -> object:
+        return fourbar.solve(arguments[0], arguments[1], at=arguments[2], side=arguments[3])
 
     only_linkage = ("change_points", "circuits", "classify", "time_ratio", "transmission_extremes")
     of_solution = ("motor_duty", "shaking_force", "shaking_moment")
@@ -125,7 +125,7 @@ def calls() -> dict[str, tuple[Callable[..., object], tuple[Any, ...]]]:
             lambda *x: fourbar.tolerances(fourbar.Scene(link, scene.motion, tolerances=x[0]), samples=x[1], seed=x[2]),
             ((fourbar.Tolerance("lengths.input", 1e-4),), 2, 0),
         ),
-        "solve": (solved, (scene, "force", at, 0)),
+        "solve": (solved, (scene, "force", command, 0)),
         "solve, a study": (solved, (study, "force", None, 0)),
         "solve, out": (lambda x: fourbar.solve(scene, out=x), (out,)),
         "solve, out torque": (lambda x: fourbar.solve(scene, out={"torque": x}), (out["torque"],)),
@@ -179,8 +179,8 @@ def spoilt(value: Any, wrong: object) -> Iterator[Any]:
     yield wrong
     if isinstance(value, tuple):
         for i, part in enumerate(value):
-            for other in spoilt(part, wrong):
-                parts = (*value[:i], other, *value[i + 1 :])
+            for replacement in spoilt(part, wrong):
+                parts = (*value[:i], replacement, *value[i + 1 :])
                 yield type(value)(*parts) if hasattr(value, "_fields") else parts
 
 
@@ -197,9 +197,9 @@ def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
     for name, (call, good) in table.items():
         call(*good)
         for wrong in WRONG:
-            for given in itertools.islice(spoilt(good, wrong), 1, None):
+            for arguments in itertools.islice(spoilt(good, wrong), 1, None):
                 try:
-                    call(*given)
+                    call(*arguments)
                     if wrong is ALWAYS_WRONG[-1]:
                         holes.append(f"{name} takes {wrong!r}")
                 except fourbar.FourBarError as error:
@@ -228,9 +228,9 @@ def test_the_public_formulas_agree_with_a_solution() -> None:
     scene = crank_rocker()
     solution, linkage = fourbar.solve(scene), scene.linkage
     z = linkage.coupler.to_centre
-    found = fourbar.point_coefficients(linkage, solution.theta_2, solution.branch, 3, z)
+    coefficients = fourbar.point_coefficients(linkage, solution.theta_2, solution.branch, 3, z)
     assert solution.omega_2 is not None and solution.a_G3 is not None and solution.alpha_2 is not None
-    a = found.first * solution.alpha_2 + found.second * solution.omega_2**2
+    a = coefficients.first * solution.alpha_2 + coefficients.second * solution.omega_2**2
     assert np.allclose(np.column_stack([np.real(a), np.imag(a)]), solution.a_G3, rtol=1e-12, atol=1e-12)
     curve = fourbar.coupler_curve(linkage, z.real, z.imag)
     gap = np.hypot(curve.x[:, None] - solution.G3[:, 0], curve.y[:, None] - solution.G3[:, 1]).min(axis=0)
@@ -268,15 +268,15 @@ def test_help_says_the_parameters() -> None:
     shown = pydoc.render_doc(crank_rocker().plot, renderer=pydoc.plaintext)  # type: ignore[attr-defined]
     assert all(f"{name} :" in shown for name in ("figure", "position", "branches", "units", "dimensions"))
     shown = pydoc.render_doc(fourbar.Scene, renderer=pydoc.plaintext)
-    for each in fields(fourbar.Scene):
-        assert re.search(rf"^ \|  .*\b{each.name}\b.* : ", shown, re.MULTILINE), each.name
+    for field in fields(fourbar.Scene):
+        assert re.search(rf"^ \|  .*\b{field.name}\b.* : ", shown, re.MULTILINE), field.name
 
 
 def test_scenes_compare_by_value(tmp_path: Path) -> None:
     scene = crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]), 10.0))
     same = crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]), 10.0))
     assert scene == same and hash(scene) == hash(same) and scene != "scene"
-    for other in (
+    for changed in (
         crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.3]), 10.0)),
         crank_rocker(motion=fourbar.Motion(0.1, 10.0)),
         crank_rocker(motion=fourbar.Motion(np.array([0.1, 0.2]), 10.0, branch=-1)),
@@ -284,7 +284,7 @@ def test_scenes_compare_by_value(tmp_path: Path) -> None:
         replace(scene, drive_bar=4),
         replace(scene, title="another"),
     ):
-        assert scene != other
+        assert scene != changed
     file = DOCS.parent / "models" / "thesis.toml"
     save(fourbar.load(file), tmp_path / "a.toml")
     assert fourbar.load(file) == fourbar.load(tmp_path / "a.toml")
@@ -307,7 +307,7 @@ def test_loads_without_a_speed_are_pointed_to_the_static_torque(
 @pytest.mark.parametrize("wrong", [0, 2, -1.5, np.nan])
 def test_a_command_on_no_branch_is_refused(wrong: float) -> None:
     scene = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(np.array([0.1, 0.2]), 10.0))
-    at = fourbar.command(scene)
+    command = fourbar.command(scene)
     for row in (np.array([wrong]), np.array([1, wrong])):
         with pytest.raises(fourbar.InputError, match=r"at\.branch = .*must be \+1"):
-            fourbar.solve(scene, at=at._replace(angle=at.theta_2[: len(row)], branch=row))
+            fourbar.solve(scene, at=command._replace(angle=command.theta_2[: len(row)], branch=row))

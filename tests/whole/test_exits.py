@@ -40,9 +40,9 @@ def raising(error: BaseException) -> click.Group:
     return click.Group(commands={"go": go})
 
 
-def returning(result: object) -> click.Group:
+def returning(value: object) -> click.Group:
     """A group whose command `go` returns something."""
-    return click.Group(commands={"go": click.command(name="go")(lambda: result)})
+    return click.Group(commands={"go": click.command(name="go")(lambda: value)})
 
 
 def leaving() -> click.Group:

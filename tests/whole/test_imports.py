@@ -136,17 +136,17 @@ def test_layers_stand_on_floors(package: str) -> None:
     )
     height = {name: number for number, floor in enumerate(floors) for name in floor}
     for name, path in modules(package).items():
-        for other in (each for each in imported(path) if each.startswith(f"{package}.")):
-            own, used = layer(name), layer(other)
-            if used in height and used != own:
-                assert height[used] < height[own] or (own, used) in ON_ONE_FLOOR, f"{name} imports {other}"
+        for used_module in (module for module in imported(path) if module.startswith(f"{package}.")):
+            using, used = layer(name), layer(used_module)
+            if used in height and used != using:
+                assert height[used] < height[using] or (using, used) in ON_ONE_FLOOR, f"{name} imports {used_module}"
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_no_modules_import_each_other_in_a_circle_types_included(package: str) -> None:
     names = modules(package)
     uses = {
-        name: {other for other in imported(path, types=True) if other in names} - {name} for name, path in names.items()
+        name: {used for used in imported(path, types=True) if used in names} - {name} for name, path in names.items()
     }
     while leaves := {name for name, used in uses.items() if not used & uses.keys()}:
         uses = {name: used for name, used in uses.items() if name not in leaves}
@@ -171,8 +171,8 @@ def test_the_picture_of_the_layers_is_what_the_imports_make() -> None:
 
 def test_the_formulas_know_numpy_and_the_linkage_alone() -> None:
     for path in (ROOT / "fourbar" / "formulas").glob("*.py"):
-        known = {name for name in imported(path) if name.startswith("fourbar.")}
-        assert {layer(name) for name in known} <= {"formulas", "linkage", "errors"}, path
+        used = {name for name in imported(path) if name.startswith("fourbar.")}
+        assert {layer(name) for name in used} <= {"formulas", "linkage", "errors"}, path
 
 
 @pytest.mark.parametrize("name", ["compare", "report"])
@@ -180,7 +180,7 @@ def test_what_judges_knows_no_engine_library(name: str) -> None:
     paths = [*(PACKAGES["fourbar_validation"] / name).rglob("*.py")]
     assert paths
     for path in paths:
-        assert not {each.partition(".")[0] for each in imported(path)} & set(ENGINES), path
+        assert not {module.partition(".")[0] for module in imported(path)} & set(ENGINES), path
 
 
 def test_nothing_that_is_shipped_knows_the_lab() -> None:

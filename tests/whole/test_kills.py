@@ -193,8 +193,8 @@ def test_the_hash_of_the_code_is_that_of_its_modules(tmp_path: Path) -> None:
 def test_damaged_swapped_and_foreign_parts_are_made_again_and_named(tmp_path: Path) -> None:
     row = Row("a", "engine", "exact", "torque", math.nan, math.inf, REFUSES, "a limit", -0.0, 1e-300)
     record = Record("a", title="A", rows=[row])
-    with Store(tmp_path / "foreign", {"scenes": "two"}).held() as other:
-        other.put(4, [record.kept_all()])
+    with Store(tmp_path / "foreign", {"scenes": "two"}).held() as foreign:
+        foreign.put(4, [record.kept_all()])
     with Store(tmp_path / "run", {"scenes": "one"}).held() as store:
         for chunk in range(6):
             store.put(chunk, [record.kept_all()])

@@ -82,7 +82,7 @@ JUDGED_BY = {
 
 def listed() -> dict[str, str]:
     """The test of each module of the table."""
-    found = {}
+    tests_of = {}
     for test, groups in JUDGED_BY.items():
         for group in groups.split(";"):
             folder, _, names = group.strip().partition(": ")
@@ -90,8 +90,8 @@ def listed() -> dict[str, str]:
                 top, _, inner = folder.partition("/")
                 paths = [path for path in (SOURCES[top] / inner).glob("*.py") if not path.name.startswith("__")]
                 names = " ".join(path.stem for path in paths if not own_test(path, top))
-            found |= {f"{folder}/{name}.py": test for name in names.split()}
-    return found
+            tests_of |= {f"{folder}/{name}.py": test for name in names.split()}
+    return tests_of
 
 
 def own_test(path: Path, top: str) -> bool:
@@ -119,4 +119,4 @@ def test_every_test_has_the_name_of_a_module_or_folder(top: str) -> None:
         folder = SOURCES[top] / test.parent.relative_to(ROOT / "tests" / top)
         names = {folder.name, *(entry.stem for entry in folder.iterdir())}
         name = test.stem.removeprefix("test_")
-        assert any(name == each or name.startswith(f"{each}_") for each in names), test
+        assert any(name == module or name.startswith(f"{module}_") for module in names), test

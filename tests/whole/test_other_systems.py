@@ -27,10 +27,10 @@ BEGIN = "import os, sys; vars(os).pop('fork', None); from {module} import status
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder whose name takes more than ASCII, with a scene whose title does."""
-    found = tmp_path / "Análisis de θ"
-    found.mkdir()
-    save(crank_rocker(title="Mécanique, θ₂"), found / "scène.toml")
-    return found
+    scene_folder = tmp_path / "Análisis de θ"
+    scene_folder.mkdir()
+    save(crank_rocker(title="Mécanique, θ₂"), scene_folder / "scène.toml")
+    return scene_folder
 
 
 @pytest.mark.slow
@@ -60,7 +60,7 @@ def test_commands_need_neither_fork_nor_utf_8(module: str, line: str, folder: Pa
     )
     said = done.stderr.decode(errors="replace")
     assert done.returncode == (1 if "check-mjcf" in line else HOLDS), said  # the other model is another one
-    assert not [each for each in said.splitlines() if "EncodingWarning" in each and each.startswith(tuple(OURS))]
+    assert not [line for line in said.splitlines() if "EncodingWarning" in line and line.startswith(tuple(OURS))]
 
 
 def test_line_ends_of_windows_are_read(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

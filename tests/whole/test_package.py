@@ -117,7 +117,7 @@ def test_a_wheel_in_a_folder_of_another_project_takes_that_for_no_checkout(tmp_p
 def test_every_library_that_fourbar_imports_is_declared() -> None:
     project = PROJECT["project"]
     declared = libraries(project["dependencies"]) | libraries(
-        [each for extra in project["optional-dependencies"].values() for each in extra]
+        [requirement for extra in project["optional-dependencies"].values() for requirement in extra]
     )
     for path in (ROOT / "fourbar").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
@@ -188,9 +188,9 @@ def lowest(requirements: list[str]) -> list[str]:
 def installed_works(python: str, package: Path, folder: Path, constraints: list[str]) -> None:
     """Install afresh, outside the tree; then version, numbers, a page, and the one line of a missing extra."""
     subprocess.run([python, "-m", "venv", folder], check=True)
-    own = folder / "bin" / "python"
+    its_python = folder / "bin" / "python"
     (folder / "constraints.txt").write_text("\n".join(constraints))
-    subprocess.run([own, "-m", "pip", "install", "-q", package, "-c", folder / "constraints.txt"], check=True)
+    subprocess.run([its_python, "-m", "pip", "install", "-q", package, "-c", folder / "constraints.txt"], check=True)
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 
     def run(*arguments: str, program: str = "fourbar") -> subprocess.CompletedProcess[str]:

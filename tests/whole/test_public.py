@@ -26,9 +26,9 @@ def of_commands() -> Iterator[str]:
         for name in group.list_commands(context):
             command = group.get_command(context, name)
             assert command is not None
-            for given in sorted(command.params, key=lambda each: each.opts[0]):
-                chosen = f" {'|'.join(given.type.choices)}" if isinstance(given.type, click.Choice) else ""
-                yield f"{program} {name}: {' '.join(sorted([*given.opts, *given.secondary_opts]))}{chosen}"
+            for option in sorted(command.params, key=lambda param: param.opts[0]):
+                chosen = f" {'|'.join(option.type.choices)}" if isinstance(option.type, click.Choice) else ""
+                yield f"{program} {name}: {' '.join(sorted([*option.opts, *option.secondary_opts]))}{chosen}"
 
 
 def of_python() -> Iterator[str]:
@@ -47,14 +47,18 @@ def public() -> str:
     """One line a name: of Python, of commands and their options, exit statuses, quantities, columns of results."""
     lines = [*of_python(), *of_commands()]
     lines += [f"exit status {name}: {getattr(errors, name)}" for name in ("HOLDS", "FAILED", "BAD_INPUT", "BROKEN")]
-    lines += [f"quantity {each.name}: {each.unit}, {each.stage}, {each.kind}" for each in QUANTITIES]
+    lines += [
+        f"quantity {quantity.name}: {quantity.unit}, {quantity.stage}, {quantity.kind}" for quantity in QUANTITIES
+    ]
     return "\n".join([*lines, f"columns of results: {', '.join(COLUMNS)}"]) + "\n"
 
 
 def test_nothing_public_changes_unnoticed() -> None:
-    kept, found = KEPT.read_text(encoding="utf-8").splitlines(), public().splitlines()
-    gone, new = ("\n".join(line for line in one if line not in other) for one, other in ((kept, found), (found, kept)))
-    assert kept == found, f"gone:\n{gone}\nnew:\n{new}\npython -m tests.whole.test_public keeps it"
+    kept, current = KEPT.read_text(encoding="utf-8").splitlines(), public().splitlines()
+    gone, new = (
+        "\n".join(line for line in one if line not in other) for one, other in ((kept, current), (current, kept))
+    )
+    assert kept == current, f"gone:\n{gone}\nnew:\n{new}\npython -m tests.whole.test_public keeps it"
 
 
 def test_all_is_what_dir_shows() -> None:

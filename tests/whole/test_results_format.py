@@ -74,7 +74,7 @@ def test_every_engine_is_described() -> None:
     described = re.findall(r"^\| `([\w-]+)` \| .+ \|$", table, re.MULTILINE)
     shipped = [check.rows.__name__ for check in CHECKS if check.shipped]
     assert sorted(described) == sorted(["engine", *WORK, *FORWARD, *shipped])
-    names = {each.name for each in (*ENGINES, *load_further(), *HARD_ENGINES)}
+    names = {engine.name for engine in (*ENGINES, *load_further(), *HARD_ENGINES)}
     assert names | {FORMULAS} == set(WORK)
 
 
@@ -93,9 +93,9 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
 
 
 def test_the_fields_of_a_solution_are_the_rows_of_the_table() -> None:
-    named = [field.name for field in dataclasses.fields(Solution)]
-    assert [name for name in named if name not in NOT_QUANTITIES] == [q.name for q in QUANTITIES]
-    assert set(NOT_QUANTITIES) <= set(named)
+    fields = [field.name for field in dataclasses.fields(Solution)]
+    assert [name for name in fields if name not in NOT_QUANTITIES] == [q.name for q in QUANTITIES]
+    assert set(NOT_QUANTITIES) <= set(fields)
     assert {q.kind for q in QUANTITIES} == {"scalar", "vector"}
     assert {q.group for q in QUANTITIES} == {"", "unknown", "dry friction", "pin loads", "linear drive"}
     assert STAGES == ("position", "velocity", "acceleration", "force", "error")

@@ -144,8 +144,8 @@ class ExudynBars(Loaded):
         return self.ground_angle if bar == 1 else math.remainder(self.q[self.turn[bar]], math.tau)
 
     def _read_output(self, kind: Any, name: str) -> Array:
-        bar, at = self.local[name]
-        return np.array(self.mbs.GetObjectOutputBody(self.body[bar], kind, at)[:2])
+        bar, local = self.local[name]
+        return np.array(self.mbs.GetObjectOutputBody(self.body[bar], kind, local)[:2])
 
     def point(self, name: str) -> Array:
         """Return a point of a body."""

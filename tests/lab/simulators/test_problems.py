@@ -329,14 +329,14 @@ def test_error_bars_are_allowed_where_they_are_larger() -> None:
 
 def test_an_answer_at_its_own_motion_is_judged_there() -> None:
     problem = read_stored("crank_rocker")
-    scene, at = read_question("crank_rocker")
-    moved = at._replace(angle=at.angle + 1e-3, speed=np.full(len(at.angle), 10.01))
+    scene, command = read_question("crank_rocker")
+    moved = command._replace(angle=command.angle + 1e-3, speed=np.full(len(command.angle), 10.01))
     theirs = fourbar.solve(scene, at=moved)
     answers = {name: getattr(theirs, name).tolist() for name in problem["answers"]}
-    own = {**make_result("crank_rocker", **answers), "at": protocol.command_to_json(scene, moved)}
-    assert set(find_levels(judge(problem, own)).values()) == {"A"}
-    del own["at"]
-    assert set(find_levels(judge(problem, own)).values()) != {"A"}
+    result = {**make_result("crank_rocker", **answers), "at": protocol.command_to_json(scene, moved)}
+    assert set(find_levels(judge(problem, result)).values()) == {"A"}
+    del result["at"]
+    assert set(find_levels(judge(problem, result)).values()) != {"A"}
 
 
 def test_the_command_judges_a_result_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

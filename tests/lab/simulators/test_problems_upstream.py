@@ -20,14 +20,14 @@ DIGITS = 1e-8
 
 def literals(path: Path) -> dict[str, Any]:
     """What the file states as plain values."""
-    found = {}
+    outcomes = {}
     for node in ast.parse(path.read_text()).body:
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
             try:
-                found[node.targets[0].id] = ast.literal_eval(node.value)
+                outcomes[node.targets[0].id] = ast.literal_eval(node.value)
             except ValueError:
                 continue
-    return found
+    return outcomes
 
 
 @pytest.mark.parametrize("quantity", ["torque", "F14"])

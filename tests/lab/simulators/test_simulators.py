@@ -52,10 +52,10 @@ def ask_position() -> tuple[Scene, Command]:
 
 def find_errors(simulator: Any, **setting: Any) -> dict[str, float]:
     """Errors of a simulator's answer, each read back from the protocol's JSON."""
-    scene, at = ask_position()
-    answer = simulator().at_setting(**setting).answer(scene, at)
+    scene, command = ask_position()
+    answer = simulator().at_setting(**setting).answer(scene, command)
     assert answer.refusal is None, answer.refusal
-    data = json.loads(json.dumps(protocol.answer_to_json(scene, at, answer)))
+    data = json.loads(json.dumps(protocol.answer_to_json(scene, command, answer)))
     return {row.quantity: row.error for row in judge(PROBLEM, data)}
 
 
@@ -105,11 +105,11 @@ class Rigid(Simulator):
         def read(theta: float) -> Instant:
             one = np.array([theta])
             branch = np.array([scene.motion.branch], dtype=np.int8)
-            found = FreeBody().answer(scene, Command(one, branch, speed, 0.0)).quantities
-            angle = math.nan if done > self.diverges_at else float(found["theta_3"][0])
-            forces = {name: found[name][0] for name in PIN_FORCES if name != self.left_out}
-            torque = self.settings[self.setting] * float(found["torque"][0])
-            return Instant((theta, angle, float(found["theta_4"][0])), speed, 0.0, torque, forces)
+            exact = FreeBody().answer(scene, Command(one, branch, speed, 0.0)).quantities
+            angle = math.nan if done > self.diverges_at else float(exact["theta_3"][0])
+            forces = {name: exact[name][0] for name in PIN_FORCES if name != self.left_out}
+            torque = self.settings[self.setting] * float(exact["torque"][0])
+            return Instant((theta, angle, float(exact["theta_4"][0])), speed, 0.0, torque, forces)
 
         return motion.run_through(scene, course, advance, read)
 
@@ -121,27 +121,27 @@ def test_a_run_is_judged_at_the_motion_that_it_made() -> None:
 
 
 def test_a_run_begins_before_its_first_position_where_the_linkage_closes() -> None:
-    scene, at = ask_position()
-    led, course = motion.lay_out(scene, at, 100)
+    scene, command = ask_position()
+    led, course = motion.lay_out(scene, command, 100)
     assert motion.start(led).qpos[0] == pytest.approx(-0.5 * math.pi) and course.stops[-1] == 125
     assert course.timestep == pytest.approx(math.tau / 10.0 / 100) and course.rows.tolist() == list(range(25))
     back = replace(scene, motion=scene.motion.replace(speed=-10.0))
-    led, course = motion.lay_out(back, at._replace(speed=-10.0), 100)
+    led, course = motion.lay_out(back, command._replace(speed=-10.0), 100)
     assert motion.start(led).qpos[0] == pytest.approx(2.5 * math.pi) and course.rows.tolist() == list(range(24, -1, -1))
     upright = read_problem(PROBLEMS / "pinocchio_2729.json")  # 30 degrees from a change point
-    scene, at = protocol.command_from_json(protocol.scene_from_json(upright["scene"]), upright["command"])
-    led, course = motion.lay_out(scene, at, 628)
-    assert 0.1 < motion.start(led).qpos[0] < at.theta_2[0] - 0.1 and course.stops[0] > 1
+    scene, command = protocol.command_from_json(protocol.scene_from_json(upright["scene"]), upright["command"])
+    led, course = motion.lay_out(scene, command, 628)
+    assert 0.1 < motion.start(led).qpos[0] < command.theta_2[0] - 0.1 and course.stops[0] > 1
 
 
 @pytest.mark.parametrize(
     "changes", [{"alpha_2": 1.0}, {"branch": [1, -1] * 12 + [1]}, {"omega_2": 0.0}, {"theta_2": [1.0, 1.0001] * 12}]
 )
 def test_a_motion_that_no_simulator_makes_is_a_refusal(changes: dict[str, Any]) -> None:
-    scene, at = protocol.command_from_json(
+    scene, command = protocol.command_from_json(
         protocol.scene_from_json(PROBLEM["scene"]), {**PROBLEM["command"], **changes}
     )
-    answer = Rigid().answer(scene, at)
+    answer = Rigid().answer(scene, command)
     assert answer.refusal is not None and answer.setting == "plain, 628/rev"
 
 
@@ -215,14 +215,14 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
     scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
     _, theta_2 = gradients.choose_quarter(scene)
 
-    def answered(at: gradients.ClosedState) -> Instant:
-        at.data.qpos[:], at.data.qvel[:] = at.qpos, at.qvel
-        instant: Instant = mujoco_c._evaluated(at.model, at.data)
+    def answered(state: gradients.ClosedState) -> Instant:
+        state.data.qpos[:], state.data.qvel[:] = state.qpos, state.qvel
+        instant: Instant = mujoco_c._evaluated(state.model, state.data)
         return instant
 
     now, by = answered(gradients.assemble(scene, theta_2, "mujoco")), {}
     for key in gradients.list_keys(scene):
-        more, less = (answered(at).torque for at in gradients.assemble_either_side(scene, theta_2, key, "mujoco"))
+        more, less = (answered(state).torque for state in gradients.assemble_either_side(scene, theta_2, key, "mujoco"))
         by[key] = gradients.change(more, less)
     state = (theta_2, now.omega_2, now.alpha_2, now.torque)
     right = gradients.collect_answer(scene, "differences", state, by)
@@ -240,15 +240,15 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state() ->
 @pytest.mark.nightly
 def test_exudyn_refuses_what_it_has_no_element_for() -> None:
     module = pytest.importorskip("fourbar_lab.simulators.exudyn_simulated", exc_type=ImportError)
-    (scene, at), (_, setting) = ask_position(), module.ExudynIntegrators.settings
+    (scene, command), (_, setting) = ask_position(), module.ExudynIntegrators.settings
     assert max(find_errors(module.ExudynIntegrators, name=setting, steps_per_turn=314).values()) < IN_EXUDYN
     simulator = module.ExudynIntegrators().at_setting(name=setting, steps_per_turn=314)
     damped = replace(scene, effects=(*scene.effects, Viscous.at(B=0.01)))
-    answer = simulator.answer(damped, at)
+    answer = simulator.answer(damped, command)
     ours = fourbar.solve(damped, "force", at=answer.at)
     assert np.abs(answer.quantities["torque"] - ours.torque).max() < IN_EXUDYN * np.abs(ours.torque).max()
     with pytest.raises(LimitError, match="alone"):
-        simulator.through(*motion.lay_out(replace(scene, effects=(Friction.at(B=0.01),)), at, 314))
+        simulator.through(*motion.lay_out(replace(scene, effects=(Friction.at(B=0.01),)), command, 314))
 
 
 @pytest.mark.nightly
