@@ -31,6 +31,7 @@ from fourbar.scene.motion import Motion as Motion
 from fourbar.scene.motion import Sweep as Sweep
 from fourbar.scene.numbers import Point as Point
 from fourbar.scene.numbers import Tolerance as Tolerance
+from fourbar.scene.pictures import Picture as Picture
 from fourbar.solution import Solution as Solution
 from fourbar.solve import solve as solve
 
@@ -54,7 +55,6 @@ if _TYPE_CHECKING:
     from fourbar.files import dump as dump
     from fourbar.files import load as load
     from fourbar.files import save as save
-    from fourbar.files.pictures import Picture as Picture
     from fourbar.show.duty import bearing_load as bearing_load
     from fourbar.show.duty import motor_duty as motor_duty
     from fourbar.show.duty import shaking_force as shaking_force
@@ -82,7 +82,6 @@ _ON_FIRST_USE = {
     **{name: "fourbar.studies.derivatives" for name in ("Sensitivity", "sensitivity")},
     **{name: "fourbar.studies.study" for name in ("Study", "vary")},
     **{name: "fourbar.evaluation.free_motion" for name in ("Released", "release")},
-    "Picture": "fourbar.files.pictures",
     "extremes": "fourbar.studies.enclosure",
     "equilibrium": "fourbar.studies.equilibrium",
     "function": "fourbar.studies.function",

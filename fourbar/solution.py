@@ -5,7 +5,6 @@ import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from fourbar.errors import InputError, expect
 from fourbar.linkage import POSITIVE, require
 from fourbar.quantities import LINE_QUANTITIES, NOT_ASSEMBLED, PIN_FORCES, SCALARS, STATUS_NAMES, UNITS, Quantities
 from fourbar.scene import Command
+from fourbar.scene.scene import load_show
 from fourbar.writing import describe_extent, list_names, make_data_frame, write_between, write_object, write_text
 
 Array = NDArray[np.float64]
@@ -90,7 +90,7 @@ class Solution(Quantities):
         return "\n".join([*lines, list_names("evaluated", self.evaluated())])
 
     def _repr_html_(self) -> Any:
-        return import_module("fourbar.show.notebook").show_solution(self)
+        return load_show("notebook").show_solution(self)
 
     @property
     def commanded(self) -> str:

@@ -21,7 +21,6 @@ from fourbar.edit.exports import Exports, evaluate_scene
 from fourbar.errors import FourBarError, InputError
 from fourbar.files import loads, read_text
 from fourbar.files.fields import Reader
-from fourbar.files.reading import read_bytes
 from fourbar.files.scene_file import LARGEST_FILE
 from fourbar.files.scene_text import BRANCHES, write_new_scene
 from fourbar.linkage import BAR_NAMES, POSITIVE
@@ -33,7 +32,7 @@ from fourbar.show.units import suit_units, units
 from fourbar.solution import Conversion
 from fourbar.solve import solve
 from fourbar.studies.keys import list_entries, read_place
-from fourbar.writing import write_bytes
+from fourbar.writing import read_bytes, write_bytes
 
 SCHEMA = "fourbar-edit/2"
 ENDING = ".edit"

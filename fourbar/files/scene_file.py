@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
+from fourbar import writing
 from fourbar.effects import LinearDrive, Load, Table, list_kinds
 from fourbar.errors import InputError, expect
-from fourbar.files import reading
 from fourbar.files.effects import read_effect, read_ends
 from fourbar.files.fields import BARE_KEY, Reader
-from fourbar.files.pictures import Picture
 from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
 from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, SPLINES, STROKE_COMMAND, Free, FromLimit, Law, Motion, Sweep
 from fourbar.scene.numbers import Point, Tolerance
+from fourbar.scene.pictures import Picture
 from fourbar.solution import Array
 from fourbar.studies.keys import COMMAND_KEYS, LEFT_OUT, is_left_out, list_entries, read_place, refuse_key
 
@@ -52,7 +52,7 @@ def load(path: str | Path) -> Scene:
 
 def read_text(path: str | Path) -> str:
     """Read the text of a scene file."""
-    return reading.read_text(path, "scene file", LARGEST_FILE)
+    return writing.read_text(path, "scene file", LARGEST_FILE)
 
 
 def loads(text: str, name: str = "scene") -> Scene:

@@ -15,10 +15,15 @@ from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.quantities import Array
 from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, STROKE_COMMAND, FromLimit, Motion, Sweep
 from fourbar.scene.numbers import Point, Tolerance
+from fourbar.scene.pictures import Picture
 
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive, Load
-    from fourbar.files.pictures import Picture
+
+
+def load_show(module: str) -> Any:
+    """Import a module of `fourbar.show`, the one step up: scenes and solutions display themselves when asked to."""
+    return import_module(f"fourbar.show.{module}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +53,7 @@ class Scene:
     effects: "tuple[Effect, ...]" = ()
     title: str = ""
     source: str = ""
-    pictures: "tuple[Picture, ...]" = ()
+    pictures: tuple[Picture, ...] = ()
     points: tuple[Point, ...] = ()
     tolerances: tuple[Tolerance, ...] = ()
     drive: "LinearDrive | None" = None
@@ -68,15 +73,12 @@ class Scene:
 
             object.__setattr__(self, "motion", copy(self.motion))
             object.__setattr__(self.motion, "bar", find_triangle(self.linkage, self.drive).bar)
-        many = {"loads": Effect, "effects": Effect, "pictures": object, "points": Point, "tolerances": Tolerance}
+        many = {"loads": Effect, "effects": Effect, "pictures": Picture, "points": Point, "tolerances": Tolerance}
         for name, each_kind in many.items():
             expect(name, getattr(self, name), tuple, list)
             object.__setattr__(self, name, tuple(getattr(self, name)))
             for entry in getattr(self, name):
                 expect(name, entry, each_kind)
-        for picture in self.pictures:
-            if not hasattr(picture, "data_uri"):
-                raise InputError("pictures", picture, "must be a Picture, as fourbar.load makes it of a file")
         names = [point.name for point in self.points]
         if len(set(names)) < len(names):
             raise InputError("points", names, "each point has a name of its own")
@@ -110,12 +112,13 @@ class Scene:
         NotAssembledError : there is no position to draw.
         DependencyError : matplotlib is missing.
         """
-        figures = import_module("fourbar.show.plot.figures")  # a layer above, loaded when something is drawn
         options = {} if units is None else {"units": units}
-        return figures.draw_figure(self, figure, position=position, branches=branches, dimensions=dimensions, **options)
+        return load_show("plot").draw_figure(
+            self, figure, position=position, branches=branches, dimensions=dimensions, **options
+        )
 
     def _repr_html_(self) -> Any:
-        return import_module("fourbar.show.notebook").show_scene(self)
+        return load_show("notebook").show_scene(self)
 
     def _require_linear(self, drive: object) -> None:
         """Raise InputError where the drive is none along a line, acts on a bar too, or never moves its ends."""

@@ -20,12 +20,12 @@ import numpy as np
 
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.files import dump
-from fourbar.files.pictures import encode_picture
 from fourbar.files.scene_text import BARS
 from fourbar.formulas.mobility import classify
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command, command_at
+from fourbar.scene.pictures import encode_picture
 from fourbar.show.acting import Symbol, list_acting
 from fourbar.show.duty import compute_energies
 from fourbar.show.plot.style import format_of, shorten_text

@@ -17,8 +17,8 @@ import pytest
 
 import fourbar
 from fourbar.errors import DependencyError, InputError, NotAssembledError
-from fourbar.files.pictures import LARGEST
 from fourbar.scene.motion import Law
+from fourbar.scene.pictures import LARGEST
 from fourbar.show import animate
 from tests.support.scenes import crank_rocker, thesis
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from fourbar.errors import InputError
-from fourbar.files.reading import read_text
+from fourbar.writing import read_text
 
 LARGEST_MJCF = 2**20
 """Bytes; a four-bar takes four thousand."""

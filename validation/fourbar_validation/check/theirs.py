@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError
-from fourbar.files.reading import read_text
 from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS
+from fourbar.writing import read_text
 from fourbar_validation.compare.tolerance import EPS
 
 Array = NDArray[np.float64]

@@ -16,8 +16,7 @@ from typing import Any
 from filelock import FileLock
 
 from fourbar.errors import DependencyError, InputError
-from fourbar.files.reading import read_text
-from fourbar.writing import write_text
+from fourbar.writing import read_text, write_text
 from fourbar_validation.engines.guests import Guest, Program, name_guests, serve
 from fourbar_validation.engines.processes import run_to_end
 from fourbar_validation.engines.registry import FOLDERS, Engine

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
+from fourbar import writing
 from fourbar.errors import InputError
-from fourbar.files import loads, read_text, reading
+from fourbar.files import loads, read_text
 from fourbar.scene import Scene
 from fourbar.scene.motion import DEFAULT_STEPS, Free, Law, Sweep, require_steps
 from fourbar_validation.compare.rows import make_plain
@@ -160,7 +161,7 @@ def read_suite(path: Path) -> Files:
 
     if not path.exists():
         raise refuse(path.name, 'must be "hard" or a file that lists scenes: there is no such file')
-    text = reading.read_text(path, "--suite", LARGEST_LIST)
+    text = writing.read_text(path, "--suite", LARGEST_LIST)
     try:
         lines = [line.partition("#")[0].strip() for line in text.splitlines()]  # one entry each; # begins a comment
         entries = tomllib.loads(text).get("scenes") if path.suffix == ".toml" else [line for line in lines if line]

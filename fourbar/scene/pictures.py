@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from fourbar.errors import InputError, expect
-from fourbar.files.reading import read_bytes
 from fourbar.linkage import BAR_NAMES, require_bar
+from fourbar.writing import read_bytes
 
 LARGEST = 2_000_000
 """Bytes of one picture: a page with three of them still opens quickly."""

@@ -10,7 +10,7 @@ import fourbar
 from fourbar.cli import status
 from fourbar.errors import InputError
 from fourbar.files import dump, load, loads, save
-from fourbar.files.pictures import LARGEST, Picture
+from fourbar.scene.pictures import LARGEST, Picture
 from fourbar.show import animate
 from tests.fourbar.show.test_animate import PNG, embedded
 from tests.support.scenes import crank_rocker
