@@ -44,8 +44,6 @@ END_ROUNDS = 9
 IN_LINE = 1e-6
 """rad. Transmission angle that is zero: at a limit, a place in its last digits leaves some 1e-8."""
 Branch = NDArray[np.int8]
-At = Callable[[Array, Branch, str], Solution]
-"""Solve at places (of what is commanded, or of a motion law the time) and branches, up to a stage."""
 Sizes = Callable[[Solution], dict[str, Array]]
 """List magnitudes at the positions of a solution, by name."""
 
@@ -110,20 +108,19 @@ def locate_between(scene: Scene, solution: Solution) -> Between:
     """
     if not _has_between(scene, solution):
         return Between(solution, solution, [], {COUPLE.value, LINE.value, *PIN_FORCES})
-    solve_at = _solve_of(scene)
     pins, low, high, branch = _find_reversing(scene, solution)
     for _ in range(ROUNDS if pins else 0):
         places = _cut(low, high)
-        inside = solve_at(places.ravel(), np.repeat(branch, CUTS + 1), "velocity")
+        inside = _solve_at(scene, places.ravel(), np.repeat(branch, CUTS + 1), "velocity")
         slips = np.array([_compute_slip(inside, pin).reshape(places.shape)[row] for row, pin in enumerate(pins)])
         turned = np.argmax(slips * slips[:, :1] <= 0.0, axis=1)
         rows = np.arange(len(pins))
         low, high = places[rows, turned - 1], places[rows, turned]
-    merged = _merge(solve_at, solution, np.concatenate([low, high]), np.concatenate([branch, branch]))
+    merged = _merge(scene, solution, np.concatenate([low, high]), np.concatenate([branch, branch]))
     angles = low if scene.motion.law is None else scene.motion.law.at(low)[0]
-    peaks, branch, growing = _find_largest(solve_at, merged, list_sizes)
+    peaks, branch, growing = _find_largest(scene, merged, list_sizes)
     reversals = sorted(zip(angles.tolist(), pins, strict=True))
-    return Between(solution, _merge(solve_at, merged, peaks, branch), reversals, growing)
+    return Between(solution, _merge(scene, merged, peaks, branch), reversals, growing)
 
 
 def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
@@ -145,9 +142,8 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
             largest = searched[0][1] if solution is searched[0][0] else find(solution)
             return {bar: np.abs(bending.moment) for bar, bending in largest.items()}
 
-        solve_at = _solve_of(scene)
-        places, branch, growing = _find_largest(solve_at, solution, list_moments, BENDING_PEAKS, BENDING_ROUNDS)
-        searched += [(peaks := solve_at(places, branch, "force"), find(peaks))] if len(places) else []
+        places, branch, growing = _find_largest(scene, solution, list_moments, BENDING_PEAKS, BENDING_ROUNDS)
+        searched += [(peaks := _solve_at(scene, places, branch), find(peaks))] if len(places) else []
     bending = dict[int, BarBending]()
     for bar in MOVING_BARS:
         grows = str(bar) in growing
@@ -164,21 +160,22 @@ def _has_between(scene: Scene, solution: Solution) -> bool:
     return scene.motion.free is None and not listed and solution.F12 is not None and len(solution) > 1
 
 
-def _solve_of(scene: Scene) -> At:
-    return lambda places, branch, stage: solve(scene, stage, at=command_at(scene, places, branch))
+def _solve_at(scene: Scene, places: Array, branch: Branch, stage: str = "force") -> Solution:
+    """Solve at places (of what is commanded, or of a motion law the time) and branches."""
+    return solve(scene, stage, at=command_at(scene, places, branch))
 
 
 def _cut(low: Array, high: Array) -> Array:
     return low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, CUTS + 1)
 
 
-def _merge(solve_at: At, solution: Solution, places: Array, branch: Branch) -> Solution:
+def _merge(scene: Scene, solution: Solution, places: Array, branch: Branch) -> Solution:
     """Solve at the positions of a solution and at others among them, in the order of the solution."""
     if not len(places):
         return solution
     over = np.concatenate([solution.at.places, places])
     order = np.unique(over, return_index=True)[1][:: 1 if over[0] < over[1] else -1]
-    return solve_at(over[order], np.concatenate([solution.at.branch, branch])[order], "force")
+    return _solve_at(scene, over[order], np.concatenate([solution.at.branch, branch])[order])
 
 
 def _compute_slip(solution: Solution, pin: str) -> Array:
@@ -203,7 +200,7 @@ def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array,
 
 
 def _find_largest(
-    solve_at: At, solution: Solution, sizes: Sizes, most: int = MOST_PEAKS, rounds: int = ROUNDS
+    scene: Scene, solution: Solution, sizes: Sizes, most: int = MOST_PEAKS, rounds: int = ROUNDS
 ) -> tuple[Array, Branch, set[str]]:
     """Find where each size is largest between positions that it has a local maximum at: places, branches, growing."""
     over, branch, peaks = solution.at.places, solution.at.branch, list[tuple[str, int, int, int]]()
@@ -226,7 +223,7 @@ def _find_largest(
     reached = [np.array([present[name][i] for name, i, *_ in peaks])]
     for _ in range(rounds if len(peaks) else 0):
         cut = _cut(low, high)
-        inside = sizes(solve_at(cut.ravel(), np.repeat(branch[top], CUTS + 1), "force"))
+        inside = sizes(_solve_at(scene, cut.ravel(), np.repeat(branch[top], CUTS + 1)))
         values = np.array([np.nan_to_num(inside[n].reshape(cut.shape)[k], nan=-1.0) for k, n in enumerate(names)])
         inwards = np.abs(np.arange(CUTS + 1) - np.where(solution.assembled[start], 0, CUTS)[:, None])
         best = np.argmax(np.where(opens[:, None] & (values >= 0.0), inwards, values), axis=1)
@@ -289,7 +286,7 @@ class Facts:
 def summarize(scene: Scene, solution: Solution) -> Facts:
     """Collect the facts of a scene solved up to the forces or the error bars; at least one position assembles."""
     between, kind = locate_between(scene, solution), _find_kind(scene, solution)
-    places = _list_places(solution)
+    places, codes = _list_places(solution), solution.status_code
     fine, stretches = solution, list[tuple[float | None, float | None]]()
     if smooth := kind in ("sweep", "turn", "law"):
         fine = _solve_positions(scene, np.linspace(places[0], places[-1], FINE + 1), solution)
@@ -311,9 +308,7 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         scene=scene,
         solution=solution,
         kind=kind,
-        counts={
-            STATUS_NAMES[code]: int(np.sum(solution.status_code == code)) for code in np.unique(solution.status_code)
-        },
+        counts={STATUS_NAMES[code]: int(np.sum(codes == code)) for code in np.unique(codes)},
         commanded=(float(places[0]), float(places[-1])),
         angles={bar: find_range(getattr(fine, f"theta_{bar}")) for bar in (2, 3, 4)},
         transmission=Peak(mu if mu > IN_LINE else 0.0, least.place),
@@ -356,7 +351,7 @@ def _solve_positions(scene: Scene, places: Array, like: Solution) -> Solution:
     rising = like.at.places[order]
     nearest = np.clip(np.searchsorted(rising, places), 1, len(rising) - 1)
     nearest -= np.abs(places - rising[nearest - 1]) < np.abs(places - rising[nearest])
-    return solve(scene, "position", at=command_at(scene, places, like.at.branch[order][nearest]))
+    return _solve_at(scene, places, like.at.branch[order][nearest], "position")
 
 
 def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak:
