@@ -58,7 +58,7 @@ JUDGED_BY = {
     "validation/check/test_mjcf.py": "validation/check: differences screen; "
     "validation/engines/mujoco: describe theirs topology",
     "validation/published/test_published.py": "validation/published: comparison figures program textbook "
-    "thesis_dynamics thesis_positions thirteen",
+    "thesis thirteen",
     "validation/regression/test_regression.py": "validation/regression: accept change changes fault "
     "record render scenes; validation/report: junit",
     "validation/report/test_report.py": "validation/report: figures machine record summary svg templating",

@@ -13,8 +13,7 @@ from fourbar_validation.places import PROGRAM
 from fourbar_validation.published.figures import ERRATA, VERDICTS, PublishedFigure
 from fourbar_validation.published.program import STEPS, climb_ladder, read_printed
 from fourbar_validation.published.textbook import compare_maple, compare_textbooks
-from fourbar_validation.published.thesis_dynamics import list_dynamics
-from fourbar_validation.published.thesis_positions import list_position_figures
+from fourbar_validation.published.thesis import list_thesis_figures
 from fourbar_validation.report.templating import render
 from fourbar_validation.report.terminal import make_table
 
@@ -23,8 +22,7 @@ WIDTH = 78
 
 def list_figures() -> Iterator[PublishedFigure]:
     """List every published figure: the thesis, the Maple worksheet, public test cases."""
-    yield from list_position_figures()
-    yield from list_dynamics()
+    yield from list_thesis_figures()
     yield from compare_maple()
     yield from compare_textbooks()
 
