@@ -31,7 +31,7 @@ long-test: $(LONG:%=long-%)
 $(LONG:%=long-%): setup
 
 long-kills:
-	KILLS=50 $(BIN)/python -m pytest tests/whole/test_kills.py tests/validation/run/test_machines.py
+	KILLS=50 $(BIN)/python -m pytest tests/whole/test_kills.py
 long-package:
 	PACKAGE=all $(BIN)/python -m pytest tests/whole/test_package.py
 long-machines:

@@ -267,8 +267,6 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(tmp_path: Path) -> No
         (["--engines", ","], "must be among pinocchio-inverse"),
         (["--against", "no-such-run"], "error: --against = 'no-such-run': must be a folder with results.csv"),
         (["--html", "changes.html"], "say --against BASELINE too"),
-        (["--mjcf", "theirs.xml", "--name", "coupler=link"], "check-mjcf SCENE THEIRS.xml"),
-        (["--name", "coupler=link"], "check-mjcf SCENE THEIRS.xml"),
         (["a.toml", "--random", "3"], "leave out the scene files"),
         (["--suite", "hard", "--random", "3"], "leave out scene files and --random"),
     ],

@@ -117,8 +117,6 @@ def make_breakdown(scene: str, engine: str, error: BaseException, part: str = ""
         reason = "the engine hung and was stopped"
     elif type(error).__name__ == "ProcessExpired":  # raised by Pebble
         reason = f"the engine crashed its process (exit code {getattr(error, 'exitcode', None) or 0})"
-    elif type(error).__name__ == "KilledWorker":  # raised by Dask
-        reason = "the engine crashed its process, or hung and was stopped"
     else:
         reason = str(error) if isinstance(error, EngineError) else say_error(error)
     return Row.unmeasured(scene, engine, part, "all", FAILS, reason)

@@ -13,7 +13,7 @@ from concurrent.futures.process import BrokenProcessPool
 from itertools import chain, islice
 from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, Protocol
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from fourbar.errors import DependencyError
 from fourbar_validation.compare.answer import EngineError
@@ -53,7 +53,7 @@ class StalledError(Exception):
 
 
 class NoWorkersError(DependencyError):
-    """The cluster has no workers, or those of this machine all die."""
+    """All workers die before they finish anything."""
 
 
 class Worker(SpawnProcess):
@@ -106,28 +106,8 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
-class Workers(Protocol):
-    """Workers that carry out tasks: processes of this machine, or the workers of a cluster."""
-
-    @property
-    def in_flight(self) -> int:
-        """Chunks submitted at a time."""
-
-    def submit(self, items: Sequence[Any]) -> Any:
-        """Hand in some items; the task."""
-
-    def done(self, tasks: Collection[Any], seconds: float) -> set[Any]:
-        """Wait for those that are finished, until there is one; none after some seconds."""
-
-    def result(self, task: Any) -> list[Any]:
-        """Return or raise what a finished task did; StalledError where it is on nobody's account."""
-
-    def lost(self, tasks: Collection[Any]) -> bool:
-        """Tell whether nobody takes up the tasks any more."""
-
-
-class Processes:
-    """The processes of a Pebble pool."""
+class Workers:
+    """Workers that carry out tasks: the processes of a Pebble pool."""
 
     def __init__(
         self, pool: "ProcessPool", function: Callable[[Any], Any], workers: int, seconds: float | None
@@ -157,7 +137,7 @@ class Processes:
         return wait(tasks, seconds, FIRST_COMPLETED).done
 
     def result(self, task: "Future[list[Any]]") -> list[Any]:
-        """Return or raise what a task did."""
+        """Return or raise what a finished task did; StalledError where it is on nobody's account."""
         try:
             return task.result()
         except BrokenProcessPool:  # workers died while they had nothing to do
@@ -200,7 +180,7 @@ def apply_over_processes(
     seconds: float | None = SECONDS,
     instead: Instead = fail,
 ) -> Iterator[tuple[int, list[Any]]]:
-    """Apply the function to each item of the chunks, over processes of this machine; chunks as they are done.
+    """Apply the function to each item of the chunks, over processes; chunks as they are done.
 
     `seconds`: after which an item is taken to hang; None: never.
     """
@@ -220,7 +200,7 @@ def apply_over_processes(
             max_workers=workers, context=WorkerContext(), initializer=prepare_worker, initargs=[os.getpid(), function]
         ) as pool:
             try:
-                crew = Processes(pool, function, workers, seconds)
+                crew = Workers(pool, function, workers, seconds)
                 for number, results in yield_done(chain(list(unfinished.items()), waiting), crew, instead):
                     yield number, results
                     del unfinished[number]

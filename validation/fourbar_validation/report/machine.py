@@ -105,12 +105,3 @@ def build(package: str) -> str:
         return ""
     files = sorted(line for line in lines if line.partition(",")[0].endswith(BUILT))
     return hashlib.sha256("\n".join(files).encode()).hexdigest()[:16] if files else ""
-
-
-def find_differing(here: dict[str, str], elsewhere: dict[str, str]) -> str:
-    """Name the first entry in which two differ; nothing where they are the same."""
-    for name in [*here, *elsewhere]:
-        ours, theirs = here.get(name, "none"), elsewhere.get(name, "none")
-        if ours != theirs:
-            return f"{name} is {theirs} there and {ours} here"
-    return ""

@@ -15,7 +15,6 @@ from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.environments import read_engines, start_engines
 from fourbar_validation.engines.guests import Guest, read_guests
 from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES, Engine, hold_fully, load_further
-from fourbar_validation.places import PROGRAM
 from fourbar_validation.regression.accept import FORMS, add_output_options, report_differences
 from fourbar_validation.regression.record import COLUMNS, find_baseline, open_run
 from fourbar_validation.report.junit import list_cases, write_document
@@ -48,7 +47,6 @@ class Request:
     seed: int | None = None
     type: str | None = None
     workers: int = WORKERS
-    scheduler: str | None = None
     against: str | None = None
     witness: tuple[str, ...] = ()
     time_limit: float | None = None
@@ -82,13 +80,6 @@ class Request:
             open_run(find_baseline(self.against), "--against")
 
 
-def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[str, ...]) -> None:
-    """Name the command that does what these options did."""
-    if value:
-        allowed = f"is a command of its own: {PROGRAM} check-mjcf SCENE THEIRS.xml"
-        raise InputError("--mjcf", value[0], allowed)
-
-
 @click.command(name="run")
 @click.argument("scenes", nargs=-1, type=click.Path(path_type=Path))
 @click.option(
@@ -106,7 +97,6 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
     "decades and every effect but loaded friction, for exact engines.",
 )
 @click.option("--workers", type=click.IntRange(min=1), default=WORKERS, show_default=True, help="Number of processes.")
-@click.option("--scheduler", metavar="ADDRESS", help="Spread over the workers of this Dask scheduler.")
 @click.option("--against", metavar="BASELINE", help="Compare with an accepted name or an earlier run's folder.")
 @click.option(
     "--witness",
@@ -130,7 +120,6 @@ def refuse_moved(context: click.Context, option: click.Parameter, value: tuple[s
 )
 @click.option("--verbose", is_flag=True, help="Print the worst row of each scene and engine, and what was left out.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing and measure no observed order; no verdict changes.")
-@click.option("--mjcf", "--name", multiple=True, hidden=True, expose_value=False, is_eager=True, callback=refuse_moved)
 @add_output_options
 def command(**stated: Any) -> int:
     """Judge scenes (default: models/ and capabilities/); write results.csv, timings.csv, report.md, report.html."""
@@ -146,7 +135,7 @@ def command(**stated: Any) -> int:
     folders = [path.parent for path in request.scenes]
     chosen = choose_engines(request.engines, engines, folders, request.time_limit)
     present, missing = find_askable(chosen, by_name=request.engines is not None)
-    options = RunOptions(request.workers, request.scheduler, not request.no_pictures, request.sample_shipped)
+    options = RunOptions(request.workers, not request.no_pictures, request.sample_shipped)
     with ShownProgress(len(suite)) as progress:
         summary = run(suite, request.out, present, options, missing, progress)
     print_table(summary, request.out, verbose=request.verbose)

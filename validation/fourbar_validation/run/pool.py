@@ -1,8 +1,7 @@
-"""Scenes judged over processes or machines; one that breaks down is judged again engine by engine."""
+"""Scenes judged over processes; one that breaks down is judged again engine by engine."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from fourbar_validation.compare.rows import make_breakdown, make_plain
 from fourbar_validation.engines import workers as processes
@@ -11,9 +10,6 @@ from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.scenes.suites import Files, Suite
-
-if TYPE_CHECKING:
-    from fourbar_validation.run.machines import Cluster
 
 SECONDS_PER_POSITION = 0.03
 """Ten times what a position takes with all engines: scenes of many positions have that much longer."""
@@ -78,9 +74,7 @@ def find_time_limit(suite: Suite, engines: Iterable[Engine]) -> float:
 
 
 def judge_chunks(
-    chunks: Iterable[tuple[int, list[Job]]], limit: float, workers: int, cluster: "Cluster | None" = None
+    chunks: Iterable[tuple[int, list[Job]]], limit: float, workers: int
 ) -> Iterator[tuple[int, list[Record]]]:
     """Judge numbered chunks of jobs, each as it is done; a job that takes longer than `limit` (s) hangs."""
-    if cluster is not None:
-        return cluster.over(judge_job, chunks, limit, judge_by_engine)
     return processes.apply_over_processes(judge_job, chunks, workers, seconds=limit, instead=judge_by_engine)

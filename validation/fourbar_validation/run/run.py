@@ -27,7 +27,6 @@ from fourbar_validation.report.summary import PICTURED, Summary
 from fourbar_validation.report.svg import NUMBERS
 from fourbar_validation.run import pool
 from fourbar_validation.run.judge import OUTPUT
-from fourbar_validation.run.machines import Cluster
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.suites import Files, Suite
@@ -53,9 +52,7 @@ class RunOptions:
     """Options of a run; only the sample changes a result."""
 
     workers: int = WORKERS
-    """Processes of this machine."""
-    scheduler: str | None = None
-    """Address of a Dask scheduler, whose workers are used instead."""
+    """Number of processes."""
     drawn: bool = True
     """True for pictures; a long suite has them at the end, of the scenes that fail or come nearest to failing."""
     sample: int = SAMPLE
@@ -110,11 +107,10 @@ def run(
         for line in store.notes:
             progress.note(line)
         progress.advance(JUDGING, sum(len(chunks[number]) for number in done))
-        cluster = None if options.scheduler is None else Cluster(options.scheduler)
         todo = (number for number in range(len(chunks)) if number not in done)
         jobs = ((n, pool.make_jobs(suite, chunks[n], engines, draw_at_once, options.sample)) for n in todo)
         limit = pool.find_time_limit(suite, engines)
-        for number, records in pool.judge_chunks(jobs, limit, options.workers, cluster):
+        for number, records in pool.judge_chunks(jobs, limit, options.workers):
             store.put(number, [record.kept_all() for record in records])
             progress.advance(JUDGING, len(records))
         first_lines = _collect(suite, chunks, store, summary, progress)
@@ -125,10 +121,7 @@ def run(
             for _, records in pool.judge_chunks(jobs, limit, options.workers):
                 summary.picture(*records)
                 progress.advance(DRAWING, 1)
-        about = describe_run(engines, suite.fingerprint(), describe_scenes(suite))
-        if cluster is not None:
-            about.settings["machines"] = cluster.machines
-        write_about(about, out)
+        write_about(describe_run(engines, suite.fingerprint(), describe_scenes(suite)), out)
         write_text(out / "report.md", write_markdown(summary))
         generated = any(engine.generated for engine in engines)
         models, why_not = picture_models(suite, shown) if generated else ({}, "")
