@@ -24,7 +24,8 @@ from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.rows import say_error, write_csv, write_one_line
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.environments import FILE, Entry, prepare_program, read_engines_of
-from fourbar_validation.engines.guests import HELLO, Running
+from fourbar_validation.engines.guests import HELLO
+from fourbar_validation.engines.processes import Running
 from fourbar_validation.places import find_checkout
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.svg import draw_svg, shrink_svg

@@ -20,7 +20,7 @@ from fourbar.files import save
 from fourbar.scene.motion import Free
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
-from fourbar_validation.engines import guests
+from fourbar_validation.engines import guests, processes
 from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.command import Request, select_scenes
 from fourbar_validation.run.judge import judge
@@ -142,7 +142,7 @@ def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path: Path) -> None:
 @pytest.mark.linux
 @pytest.mark.timeout(300)
 def test_whatever_a_program_does_costs_its_own_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guests, "WORKER_MEMORY", 2 * 10**8)
+    monkeypatch.setattr(processes, "WORKER_MEMORY", 2 * 10**8)
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     entries = {}
     for name, (old, new, _) in PROGRAMS.items():
@@ -167,7 +167,7 @@ def test_whatever_a_program_does_costs_its_own_rows(tmp_path: Path, monkeypatch:
 def test_a_program_that_is_silent_ends_at_its_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With what it started, and is not asked again for that scene."""
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
-    monkeypatch.setattr(guests, "MOST_ERRORS", 10**7)
+    monkeypatch.setattr(processes, "MOST_ERRORS", 10**7)
     entries = [write_program(tmp_path, name, pair) for name, pair in SILENT.items()]
     began = time.monotonic()
     found = judged(SCENE, *entries, seconds=3.0)

@@ -17,8 +17,8 @@ from filelock import FileLock
 
 from fourbar.errors import DependencyError, InputError
 from fourbar.writing import read_text, write_text
-from fourbar_validation.engines.guests import Guest, Program, name_guests, serve
-from fourbar_validation.engines.processes import run_to_end
+from fourbar_validation.engines.guests import Guest, name_guests, serve
+from fourbar_validation.engines.processes import Program, run_to_end
 from fourbar_validation.engines.registry import FOLDERS, Engine
 
 FILE = "engines.toml"

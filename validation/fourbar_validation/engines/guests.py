@@ -4,32 +4,26 @@ The judge imports nothing of a guest. docs/protocol.md is the contract.
 """
 
 import hashlib
-import json
 import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
-import tempfile
-import threading
-import time
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import InputError
 from fourbar.quantities import ANGLES, DRY_FRICTION_QUANTITIES
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
 from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.rows import FORMULAS, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
-from fourbar_validation.engines import keeper, protocol
-from fourbar_validation.engines.processes import KEPT, WORKER_MEMORY, print_kept
+from fourbar_validation.engines import protocol
+from fourbar_validation.engines.processes import Ask, Program, Running
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.places import CHECKOUT, PACKAGE
 
@@ -37,43 +31,12 @@ CLASS = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*", re.ASCII)
 """A class of the user's, which our host serves: "module:Class"; anything else is a command line."""
 NOT_FOUND = 2
 """Exit status of our host where there is no such class or engine."""
-SECONDS, SECONDS_PER_POSITION = 60.0, 0.03
-"""Time for a question where no limit is stated."""
 QUESTIONS = 4
 """Questions to a guest about one scene at most, with hello: its limit of time is that of each."""
-LONGEST_LINE, BYTES_PER_POSITION = 10**6, 10**4
-"""Bytes of an answer: ten times as many as all quantities take."""
-MOST_ERRORS = 10**8
-"""Bytes that a program may write to its standard error for one answer."""
-KILLED = (-9, 137)
-"""Exit status of a program that was killed: its own, or its shell's."""
 QUANTITIES = (*COMPARED, *DRY_FRICTION_QUANTITIES)
 """Names of what an engine can answer."""
 COMMANDS = tuple(names[0] for names in protocol.KINDS_OF_COMMAND)
 HELLO = {"ask": "hello", "protocol": protocol.PROTOCOL}
-ATTEMPTS = 5
-"""A guest that is killed from outside is asked so often before it is given up."""
-ENDING = 5.0
-"""Seconds for a program that is told to end; then it is killed."""
-
-
-class _KilledError(EngineError):
-    """The program was killed, by itself or from outside."""
-
-
-@dataclass(frozen=True, slots=True)
-class Program:
-    """A command line, and what it is started with."""
-
-    command: tuple[str, ...]
-    seconds: float | None = None
-    """Limit of time for each question; None: a minute, and more for many positions."""
-    variables: tuple[tuple[str, str], ...] = ()
-    """Added to the environment."""
-
-    def limit(self, positions: int) -> float:
-        """Return the seconds within which a question is answered."""
-        return SECONDS + SECONDS_PER_POSITION * positions if self.seconds is None else self.seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,184 +286,14 @@ class Asked:
             return f"it does not name {name!r} among its settings"
         return f"it does not name {', '.join(lacking)} among its effects" if lacking else ""
 
-    def _ask(self, data: dict[str, Any], positions: int) -> dict[str, Any]:
-        return _RUNNING.setdefault(self._program, Running(self._program)).ask_again(data, positions, self._hello)
+    def _ask(self, question: dict[str, Any], positions: int) -> dict[str, Any]:
+        running = _RUNNING.setdefault(self._program, Running(self._program))
+        return running.ask_again(question, positions, self._greet)
 
-
-@dataclass(eq=False)
-class Running:
-    """A program that runs: one question and one answer at a time."""
-
-    program: Program
-    _process: "subprocess.Popen[bytes] | None" = None
-    _number: int = 0
-    """Number of the last question."""
-    _errors: IO[bytes] | None = None
-    """File that takes what the engine writes to its standard error."""
-    _stopped: str = ""
-    """Why it was stopped."""
-    _lock: threading.Lock = field(default_factory=threading.Lock)
-
-    def ask_again(self, data: dict[str, Any], positions: int, hello: Hello | None = None) -> dict[str, Any]:
-        """Ask, and ask anew what is killed from outside; one that is started for it must say hello as before."""
-        with self._lock:
-            for attempt in range(1, ATTEMPTS + 1):
-                try:
-                    if hello is not None and self._process is None:
-                        self._greet(hello)
-                    return self._ask(data, positions)
-                except _KilledError:
-                    if attempt == ATTEMPTS:
-                        raise
-        raise AssertionError
-
-    def _greet(self, hello: Hello) -> None:
-        """Begin with hello, which must be as before; a program that fails to say so is ended."""
-        try:
-            if read_hello(self._ask(HELLO, 0)) != hello:
-                raise EngineError("its hello is another than before")
-        except FourBarError:
-            self.end()
-            raise
-
-    def _ask(self, data: dict[str, Any], positions: int) -> dict[str, Any]:
-        """Send a question and return the object that answers it; a program that fails is ended, and the error says how.
-
-        Its own words for a breakdown are an answer.
-        """
-        process = self._process or self._start()
-        assert process.stdin is not None and process.stdout is not None
-        self._number += 1
-        line = json.dumps({"id": self._number, **data}, allow_nan=False).encode() + b"\n"
-        seconds, most = self.program.limit(positions), LONGEST_LINE + BYTES_PER_POSITION * positions
-        answered = threading.Event()
-        watch = threading.Thread(target=self._watch, args=(process, seconds, answered), daemon=True)
-        watch.start()
-        try:
-            with suppress(OSError):  # it closed its input, or is gone: what it said before tells
-                process.stdin.write(line)
-                process.stdin.flush()
-            reply = process.stdout.readline(most + 1)
-            answered.set()
-            watch.join()
-            if not reply.endswith(b"\n") or self._stopped:
-                raise self._find_end(process, reply, most)
-            return self._read(reply)
-        except BaseException:
-            answered.set()
-            self.end()
-            raise
-        finally:
-            print_kept(self._take_errors())
-
-    def _read(self, reply: bytes) -> dict[str, Any]:
-        """Read a line; EngineError where it is not the answer that was asked for."""
-        said = write_one_line(reply[:KEPT].decode(errors="backslashreplace"))
-        try:
-            data = json.loads(reply, object_pairs_hook=_make_object, parse_constant=_refuse_constant)
-        except (ValueError, RecursionError) as error:
-            raise EngineError(f"said what is no JSON ({write_one_line(str(error))}): {said}") from None
-        if not isinstance(data, dict) or type(data.get("id")) is not int:
-            raise EngineError(f"said what is no object with an id: {said}")
-        if data["id"] != self._number:
-            raise EngineError(f"answered question {data['id']} where {self._number} was asked")
-        return data
-
-    def _start(self) -> "subprocess.Popen[bytes]":
-        command = list(self.program.command)
-        if os.name == "posix":
-            kept_by = [sys.executable, "-I", "-S", keeper.__file__, str(os.getpid()), str(WORKER_MEMORY)]
-            command = [*kept_by, *command]
-        self._errors = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - as long as the program
-        environment, pipe = {**os.environ, **dict(self.program.variables)}, subprocess.PIPE
-        self._process = subprocess.Popen(
-            command,
-            bufsize=2**16,
-            stdin=pipe,
-            stdout=pipe,
-            stderr=self._errors,
-            env=environment,
-            start_new_session=True,
-        )
-        self._number, self._stopped = 0, ""
-        return self._process
-
-    def _watch(self, process: "subprocess.Popen[bytes]", seconds: float, answered: threading.Event) -> None:
-        """Stop a program that takes too long or writes too much."""
-        until = time.monotonic() + seconds
-        while not answered.wait(min(1.0, max(0.0, until - time.monotonic()))):
-            if time.monotonic() >= until:
-                self._stopped = f"no answer within {seconds:g} s"
-            elif self._errors is not None and os.fstat(self._errors.fileno()).st_size > MOST_ERRORS:
-                self._stopped = f"wrote more than {MOST_ERRORS} bytes to its standard error"
-            if self._stopped:
-                _stop(process)
-                return
-
-    def _take_errors(self) -> bytes:
-        """Take the beginning and the end of what it wrote to its standard error since the last question."""
-        if self._errors is None:
-            return b""
-        size = self._errors.seek(0, os.SEEK_END)
-        self._errors.seek(0)
-        text = self._errors.read(min(size, KEPT // 2))
-        self._errors.seek(max(size - KEPT // 2, len(text)))
-        text += self._errors.read(KEPT // 2)
-        self._errors.truncate(0)
-        self._errors.seek(0)
-        return text
-
-    def _find_end(self, process: "subprocess.Popen[bytes]", reply: bytes, most: int) -> EngineError:
-        """Say in one line how a program ended, or that it did not end its line."""
-        if self._stopped:
-            return EngineError(self._stopped)
-        if len(reply) > most:
-            return EngineError(f"said more than {most} bytes without an end of line")
-        try:
-            status = process.wait(1.0)
-        except subprocess.TimeoutExpired:
-            return EngineError("closed its standard output")
-        errors = self._take_errors()
-        print_kept(errors)
-        lines = errors.decode(errors="backslashreplace").strip().splitlines()
-        said = f": {write_one_line(lines[-1])}" if lines else ""
-        if status in KILLED:
-            return _KilledError(f"was killed{said}")
-        how = f"exit status {status}" if status >= 0 else f"ended by signal {-status}"
-        return EngineError(how + " in the middle of a line" * bool(reply) + said)
-
-    def end(self) -> None:
-        """End the program and all that it started."""
-        process, self._process = self._process, None
-        if process is not None:
-            _stop(process)
-            print_kept(self._take_errors())
-            errors, self._errors = self._errors, None
-            for stream in (process.stdin, process.stdout, errors):
-                with suppress(OSError):
-                    assert stream is not None
-                    stream.close()
-
-
-def _stop(process: "subprocess.Popen[bytes]") -> None:
-    process.terminate()
-    try:
-        process.wait(ENDING)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+    def _greet(self, ask: Ask) -> None:
+        if read_hello(ask(HELLO, 0)) != self._hello:
+            raise EngineError("its hello is another than before")
 
 
 _RUNNING: dict[Program, Running] = {}
 """The programs that this process started."""
-
-
-def _make_object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    data = dict(pairs)
-    if len(data) < len(pairs):
-        raise ValueError("a key stands twice")
-    return data
-
-
-def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is no number; null stands where there is no value")

@@ -1,15 +1,20 @@
-"""Run other programs to their end, bound the memory of this process, and keep what engines print in it."""
+"""Run other programs, to their end or question by question; bound the memory of this process, and keep its output."""
 
 import ctypes
+import json
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Container, Iterator, Mapping, Sequence
+import threading
+import time
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import IO, Any, NamedTuple
 
+from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.rows import make_plain, write_one_line
 
 WORKER_MEMORY = 8 * 2**30
@@ -71,7 +76,7 @@ def run_to_end(
 
 KEPT = 20_000
 """Bytes that are kept of one answer's output: half from its beginning, half from its end."""
-_file: list[BinaryIO] = []
+_file: list[IO[bytes]] = []
 """The one file of this process, once it keeps what is printed."""
 
 
@@ -110,14 +115,7 @@ def take_printed() -> str:
             stream.flush()
     with suppress(AttributeError, OSError, TypeError):  # another system than those of the Unix family
         ctypes.CDLL(None).fflush(None)
-    size = file.seek(0, os.SEEK_END)
-    file.seek(0)
-    text = file.read(min(size, KEPT // 2))
-    remaining = max(size - KEPT, 0)
-    file.seek(remaining, os.SEEK_CUR)
-    text += f"\n... {remaining} bytes left out ...\n".encode() * bool(remaining) + file.read()
-    file.truncate(0)
-    file.seek(0)
+    text = _take_written(file)
     for name, descriptor in (("stdout", 1), ("stderr", 2)):  # an engine may have closed them, or sent them elsewhere
         os.dup2(file.fileno(), descriptor)
         if getattr(getattr(sys, name), "closed", True):
@@ -125,3 +123,209 @@ def take_printed() -> str:
             stream = open(descriptor, "w", 1, "utf-8", "backslashreplace", closefd=False)  # noqa: SIM115
             setattr(sys, name, stream)
     return make_plain(text.decode(errors="backslashreplace"))
+
+
+def _take_written(file: IO[bytes]) -> bytes:
+    """Empty a file; return its beginning and its end where it holds more than is kept."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(0)
+    text = file.read(min(size, KEPT // 2))
+    skipped = max(size - KEPT, 0)
+    file.seek(skipped, os.SEEK_CUR)
+    text += f"\n... {skipped} bytes left out ...\n".encode() * bool(skipped) + file.read(KEPT // 2)
+    file.truncate(0)
+    file.seek(0)
+    return text
+
+
+SECONDS, SECONDS_PER_POSITION = 60.0, 0.03
+"""Time for a question where no limit is stated: ten times what a position takes with all engines."""
+LONGEST_LINE, BYTES_PER_POSITION = 10**6, 10**4
+"""Bytes of an answer: ten times as many as all quantities take."""
+MOST_ERRORS = 10**8
+"""Bytes that a program may write to its standard error for one answer."""
+KILLED = (-9, 137)
+"""Exit status of a program that was killed: its own, or its shell's."""
+ATTEMPTS = 5
+"""A guest that is killed from outside is asked so often before it is given up."""
+ENDING = 5.0
+"""Seconds for a program that is told to end; then it is killed."""
+KEEPER = str(Path(__file__).with_name("keeper.py"))
+Question = dict[str, Any]
+"""A question or an answer, as an object of JSON."""
+Ask = Callable[[Question, int], Question]
+"""Function that asks a question about a number of positions."""
+
+
+class _KilledError(EngineError):
+    """The program was killed, by itself or from outside."""
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A command line, and what it is started with."""
+
+    command: tuple[str, ...]
+    seconds: float | None = None
+    """Limit of time for each question; None: a minute, and more for many positions."""
+    variables: tuple[tuple[str, str], ...] = ()
+    """Added to the environment."""
+
+    def limit(self, positions: int) -> float:
+        """Return the seconds within which a question is answered."""
+        return SECONDS + SECONDS_PER_POSITION * positions if self.seconds is None else self.seconds
+
+
+@dataclass(eq=False)
+class Running:
+    """A program that runs: one question and one answer at a time."""
+
+    program: Program
+    _process: "subprocess.Popen[bytes] | None" = None
+    _number: int = 0
+    """Number of the last question."""
+    _errors: IO[bytes] | None = None
+    """File that takes what the engine writes to its standard error."""
+    _stopped: str = ""
+    """Why it was stopped."""
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def ask_again(self, question: Question, positions: int, greet: Callable[[Ask], None] | None = None) -> Question:
+        """Ask, and ask anew a program that is killed from outside; one that fails is ended.
+
+        `greet` asks what a program that is started must be asked first, and raises where the answer is wrong.
+        """
+        with self._lock:
+            attempts = 0
+            while True:
+                attempts += 1
+                try:
+                    if greet is not None and self._process is None:
+                        greet(self._ask)
+                    return self._ask(question, positions)
+                except BaseException as error:
+                    self.end()
+                    if not isinstance(error, _KilledError) or attempts == ATTEMPTS:
+                        raise
+
+    def _ask(self, question: Question, positions: int) -> Question:
+        """Send a question and return the object that answers it, also one that says why it has no answer."""
+        process = self._process or self._start()
+        assert process.stdin is not None and process.stdout is not None
+        self._number += 1
+        line = json.dumps({"id": self._number, **question}, allow_nan=False).encode() + b"\n"
+        seconds, most = self.program.limit(positions), LONGEST_LINE + BYTES_PER_POSITION * positions
+        answered = threading.Event()
+        watch = threading.Thread(target=self._watch, args=(process, seconds, answered), daemon=True)
+        watch.start()
+        try:
+            with suppress(OSError):  # it closed its input, or is gone: what it said before tells
+                process.stdin.write(line)
+                process.stdin.flush()
+            reply = process.stdout.readline(most + 1)
+            answered.set()
+            watch.join()
+            if not reply.endswith(b"\n") or self._stopped:
+                raise self._find_end(process, reply, most)
+            return self._read(reply)
+        finally:
+            answered.set()
+            self._take_errors()
+
+    def _read(self, reply: bytes) -> Question:
+        """Read a line; EngineError where it is not the answer that was asked for."""
+        said = write_one_line(reply[:KEPT].decode(errors="backslashreplace"))
+        try:
+            data = json.loads(reply, object_pairs_hook=_make_object, parse_constant=_refuse_constant)
+        except (ValueError, RecursionError) as error:
+            raise EngineError(f"said what is no JSON ({write_one_line(str(error))}): {said}") from None
+        if not isinstance(data, dict) or type(data.get("id")) is not int:
+            raise EngineError(f"said what is no object with an id: {said}")
+        if data["id"] != self._number:
+            raise EngineError(f"answered question {data['id']} where {self._number} was asked")
+        return data
+
+    def _start(self) -> "subprocess.Popen[bytes]":
+        command = list(self.program.command)
+        if os.name == "posix":
+            command = [sys.executable, "-I", "-S", KEEPER, str(os.getpid()), str(WORKER_MEMORY), *command]
+        self._errors = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - as long as the program
+        environment, pipe = {**os.environ, **dict(self.program.variables)}, subprocess.PIPE
+        self._process = subprocess.Popen(
+            command,
+            bufsize=2**16,
+            stdin=pipe,
+            stdout=pipe,
+            stderr=self._errors,
+            env=environment,
+            start_new_session=True,
+        )
+        self._number, self._stopped = 0, ""
+        return self._process
+
+    def _watch(self, process: "subprocess.Popen[bytes]", seconds: float, answered: threading.Event) -> None:
+        """Stop a program that takes too long or writes too much."""
+        until = time.monotonic() + seconds
+        while not answered.wait(min(1.0, max(0.0, until - time.monotonic()))):
+            if time.monotonic() >= until:
+                self._stopped = f"no answer within {seconds:g} s"
+            elif self._errors is not None and os.fstat(self._errors.fileno()).st_size > MOST_ERRORS:
+                self._stopped = f"wrote more than {MOST_ERRORS} bytes to its standard error"
+            if self._stopped:
+                _stop(process)
+                return
+
+    def _take_errors(self) -> bytes:
+        """Take what it wrote to its standard error, which is kept as what this process prints."""
+        text = b"" if self._errors is None else _take_written(self._errors)
+        print_kept(text)
+        return text
+
+    def _find_end(self, process: "subprocess.Popen[bytes]", reply: bytes, most: int) -> EngineError:
+        """Say in one line how a program ended, or that it did not end its line."""
+        if self._stopped:
+            return EngineError(self._stopped)
+        if len(reply) > most:
+            return EngineError(f"said more than {most} bytes without an end of line")
+        try:
+            status = process.wait(1.0)
+        except subprocess.TimeoutExpired:
+            return EngineError("closed its standard output")
+        lines = self._take_errors().decode(errors="backslashreplace").strip().splitlines()
+        said = f": {write_one_line(lines[-1])}" if lines else ""
+        if status in KILLED:
+            return _KilledError(f"was killed{said}")
+        how = f"exit status {status}" if status >= 0 else f"ended by signal {-status}"
+        return EngineError(how + " in the middle of a line" * bool(reply) + said)
+
+    def end(self) -> None:
+        """End the program and all that it started."""
+        process, self._process = self._process, None
+        if process is not None:
+            _stop(process)
+            self._take_errors()
+            errors, self._errors = self._errors, None
+            for stream in (process.stdin, process.stdout, errors):
+                with suppress(OSError):
+                    assert stream is not None
+                    stream.close()
+
+
+def _stop(process: "subprocess.Popen[bytes]") -> None:
+    process.terminate()
+    try:
+        process.wait(ENDING)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def _make_object(pairs: list[tuple[str, Any]]) -> Question:
+    data = dict(pairs)
+    if len(data) < len(pairs):
+        raise ValueError("a key stands twice")
+    return data
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is no number; null stands where there is no value")

@@ -6,13 +6,11 @@ from dataclasses import dataclass, replace
 from fourbar_validation.compare.rows import make_breakdown, make_plain
 from fourbar_validation.engines import workers as processes
 from fourbar_validation.engines.guests import QUESTIONS, Guest
+from fourbar_validation.engines.processes import SECONDS_PER_POSITION
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.record import Record
 from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.scenes.suites import Files, Suite
-
-SECONDS_PER_POSITION = 0.03
-"""Ten times what a position takes with all engines: scenes of many positions have that much longer."""
 
 
 @dataclass(frozen=True, slots=True)
