@@ -28,7 +28,7 @@ from fourbar_lab.tally import (
     list_components,
 )
 from fourbar_validation.compare.tolerance import find_used
-from fourbar_validation.engines.balls import compute_reference
+from fourbar_validation.engines.prediction import compute_reference
 from fourbar_validation.engines.workers import apply_each
 from fourbar_validation.report.terminal import make_table
 

@@ -18,8 +18,8 @@ from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command
 from fourbar.solution import Solution
 from fourbar_validation.compare.rows import AGREES, REFUSES
-from fourbar_validation.engines.balls import compute_reference
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.prediction import compute_reference
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 

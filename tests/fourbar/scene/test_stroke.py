@@ -15,7 +15,7 @@ from fourbar.files.scene_text import dump
 from fourbar.scene.motion import Sweep
 from fourbar.studies.keys import read_place, replace_numbers
 from fourbar_validation.compare.rows import AGREES
-from fourbar_validation.engines.balls import compute_reference
+from fourbar_validation.engines.prediction import compute_reference
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker

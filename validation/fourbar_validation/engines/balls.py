@@ -1,4 +1,4 @@
-"""The linkage in ball arithmetic: every output of `solve` to 50 digits with a rigorous radius, and its sensitivities.
+"""The linkage in ball arithmetic: every output of `solve` to 50 digits with a rigorous radius.
 
 Shares nothing with the formulas: the loop is closed by the complex quadratic in e^{i theta_3}, the
 velocities and accelerations come from the linear systems of the differentiated loop, the pin forces
@@ -7,7 +7,6 @@ and the torque from the full thirteen Newton-Euler equations about the mass cent
 
 import math
 from bisect import bisect
-from collections.abc import Iterable
 from typing import Any, NamedTuple, TypeAlias
 
 from flint import acb, arb, arb_mat, ctx
@@ -233,12 +232,36 @@ def _move(x: Values, w: dict[int, Complex], commanded: int) -> BallBars:
 
 def _sum_acting(scene: Scene, x: Values, bars: BallBars) -> tuple[dict[int, Complex], dict[int, Ball]]:
     """Sum what acts on each bar: a force, and a moment about the mass centre."""
+    w, first_pin, centre = bars.directions(x), bars.first_pin, bars.centre
     force = {bar: x[f"m{bar}"] * polar(x["g"], x["g_angle"]) if "g" in x else acb(0) for bar in MOVING_BARS}
     moment = {bar: x.get(f"couple_{bar}", arb(0)) for bar in MOVING_BARS}  # a probe may add one
-    _add_effects(scene, x, bars.directions(x), bars.first_pin, bars.centre, force, moment)
+    for k, load in enumerate(scene.loads):
+        theta_2 = x.get("theta_2", w[2].arg())
+        factor = _interpolate_factor(load.table, theta_2, x, k) if load.table else arb(1)
+        axes = w[load.bar] if load.frame == "bar" else acb(1)
+        f, arm = (axes * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"]) for name in ("F", "at"))
+        force[load.bar] += factor * f
+        moment[load.bar] += factor * (wedge(arm, f) + x[f"M_{k}"])
     for effect in scene.effects:
         if isinstance(effect, Flywheel):
             moment[effect.bar] -= x["J"] * bars.alpha[effect.bar]
+        elif isinstance(effect, Torsion):
+            for pin, *_ in effect.springs:
+                i, j = PINS[pin]
+                turned = (w[j] * w[i].conjugate() * polar(arb(1), -x[f"rest_{pin}"])).arg()
+                _add_twist(moment, pin, -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * turned)
+        elif isinstance(effect, Springs):
+            for k, spring in enumerate(effect.springs):
+                start, end = spring.start.bar, spring.end.bar
+                arms = [
+                    w[bar] * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"])
+                    for bar, name in ((start, "start"), (end, "end"))
+                ]
+                pull = _pull(spring, x, k, first_pin[end] + arms[1] - first_pin[start] - arms[0])
+                for bar, arm, f in ((start, arms[0], pull), (end, arms[1], -pull)):
+                    if bar in force:
+                        force[bar] += f
+                        moment[bar] += wedge(arm - centre[bar], f)
     for pin, (i, j) in PINS.items():
         slip = bars.omega.get(j, 0) - bars.omega.get(i, 0)
         sign = arb(1) if slip > 0 else arb(-1) if slip < 0 else arb(0) if slip == 0 else arb(0, 1)
@@ -295,43 +318,6 @@ def _add_twist(moment: dict[int, Ball], pin: str, couple: Ball) -> None:
             moment[bar] += value
 
 
-def _add_effects(
-    scene: Scene,
-    x: Values,
-    w: dict[int, Complex],
-    first_pin: dict[int, Complex],
-    centre: dict[int, Complex],
-    force: dict[int, Complex],
-    moment: dict[int, Ball],
-) -> None:
-    """Add loads and springs, from the directions and first pins of all bars, the ground's too."""
-    for k, load in enumerate(scene.loads):
-        theta_2 = x.get("theta_2", w[2].arg())
-        factor = _interpolate_factor(load.table, theta_2, x, k) if load.table else arb(1)
-        axes = w[load.bar] if load.frame == "bar" else acb(1)
-        f, arm = (axes * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"]) for name in ("F", "at"))
-        force[load.bar] += factor * f
-        moment[load.bar] += factor * (wedge(arm, f) + x[f"M_{k}"])
-    for effect in scene.effects:
-        if isinstance(effect, Torsion):
-            for pin, *_ in effect.springs:
-                i, j = PINS[pin]
-                turned = (w[j] * w[i].conjugate() * polar(arb(1), -x[f"rest_{pin}"])).arg()
-                _add_twist(moment, pin, -x[f"wound_{pin}"] - x[f"torsion_{pin}"] * turned)
-        elif isinstance(effect, Springs):
-            for k, spring in enumerate(effect.springs):
-                start, end = spring.start.bar, spring.end.bar
-                arms = [
-                    w[bar] * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"])
-                    for bar, name in ((start, "start"), (end, "end"))
-                ]
-                pull = _pull(spring, x, k, first_pin[end] + arms[1] - first_pin[start] - arms[0])
-                for bar, arm, f in ((start, arms[0], pull), (end, arms[1], -pull)):
-                    if bar in force:
-                        force[bar] += f
-                        moment[bar] += wedge(arm - centre[bar], f)
-
-
 def _interpolate_factor(table: Table, theta_2: Ball, x: Values, k: int) -> Ball:
     """Interpolate between the two points of a table that enclose an angle, taken modulo a turn.
 
@@ -353,46 +339,6 @@ def _pull(spring: Spring, x: Values, k: int, across: Complex) -> Complex:
         return x[f"stiffness_{k}"] * across
     distance = abs(across)
     return (x[f"pull_{k}"] + x[f"stiffness_{k}"] * (distance - x[f"length_{k}"])) / distance * across
-
-
-def compute_response(base: Values, changed: Iterable[Values | None]) -> dict[str, float]:
-    """Compute how far each output moves, by 2^-STEP_BITS, under the first of several changes that closes the loop."""
-    for moved in changed:
-        if moved is None:
-            continue
-        response = {}
-        for output, y in base.items():
-            if output not in moved:  # singular there
-                response[output] = math.inf
-                continue
-            change = abs(moved[output] - y)
-            if output.startswith("theta") and change > 3:
-                change = 2 * arb.pi() - change
-            response[output] = abs(float((change * arb(2) ** STEP_BITS).mid()))
-        return response
-    return {}
-
-
-def compute_reference(scene: Scene, branch: int, angle: float) -> tuple[Values, dict[str, float]] | None:
-    """Compute values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
-    exact = make_balls(scene, angle)
-    exact |= {f"{name}_{k}": arb(1) for k, load in enumerate(scene.loads) if load.table for name in OF_PIECE}
-
-    def evaluate(**changed: Ball) -> Values | None:
-        return compute_outputs(scene, branch, exact | changed)
-
-    base = evaluate()
-    if base is None:
-        return None
-    sensitivity = dict.fromkeys(base, 0.0)
-    for name, value in exact.items():
-        step = abs(value) * arb(2) ** -STEP_BITS
-        moved = (
-            compute_response(base, (evaluate(**{name: value + side * step}) for side in (1, -1))) if value != 0 else {}
-        )
-        for output, rate in moved.items():
-            sensitivity[output] += rate
-    return base, sensitivity
 
 
 ENDS = ("from", "to")

@@ -1,4 +1,4 @@
-"""The error that rounding must be expected to make, computed from the description in 320-bit arithmetic.
+"""Sensitivities in 320-bit arithmetic, and the error that rounding must be expected to make by them.
 
     predicted = eps (R sum_i w_i |dy/dx_i| + reach sum_j |dy/dz_j|),
 
@@ -14,8 +14,9 @@ torque cancels, and for forces near a toggle, which a law in s^2 would excuse to
 """
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from fourbar.quantities import PIN_FORCES, VECTORS
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.tolerance import EPS, ROUNDINGS, Array, Mask, sum_lengths
 from fourbar_validation.engines.description import find_centre, list_speeds
+
+if TYPE_CHECKING:
+    from fourbar_validation.engines.balls import Ball, Values
 
 FIRST_ORDER = 0.1
 """Limit of first-order prediction. Angles uncertain by this part of the sine that everything divides by leave speeds,
@@ -103,7 +107,7 @@ def _compute_sensitivity(
     """Compute the sensitivities at one position; None where the loop does not close."""
     from flint import acb, arb
 
-    from fourbar_validation.engines.balls import STEP_BITS, compute_outputs, compute_response, make_balls
+    from fourbar_validation.engines.balls import STEP_BITS, compute_outputs, make_balls
 
     exact = make_balls(scene, theta_2, omega_2=omega_2, alpha_2=alpha_2)
     base = compute_outputs(scene, branch, exact)
@@ -111,15 +115,12 @@ def _compute_sensitivity(
         return None
     step = arb(2) ** -STEP_BITS
 
-    def add(total: dict[str, float], changes: list[dict[str, Any]]) -> None:
-        """Add the change under the first of several changes of the inputs with which the loop still closes."""
-        moved = (compute_outputs(scene, branch, exact | changed) for changed in changes)
-        for output, rate in compute_response(base, moved).items():
-            total[output] = total.get(output, 0.0) + rate
+    def move(**changed: "Ball") -> "Values | None":
+        return compute_outputs(scene, branch, exact | changed)
 
     data = {name: 1.0 if name.startswith("theta") else abs(float(value.mid())) for name, value in base.items()}
-    for name, weight in _weigh_inputs({name: float(value) for name, value in exact.items()}).items():
-        add(data, [{name: exact[name] + side * weight * step} for side in (1, -1)])
+    weights = _weigh_inputs({name: float(value) for name, value in exact.items()})
+    _add_responses(data, base, move, exact, weights)
     data["condition"] = float(base["condition"].mid())
     loop: dict[str, float] = {}
     carried: dict[str, float] = {}
@@ -131,14 +132,14 @@ def _compute_sensitivity(
                 loop[f"{name}_x"] = loop[f"{name}_y"] = float(hardest)
         for name, most in (("slip", fastest), ("jerk", hardest)):
             for direction in (acb(1), acb(0, 1)):
-                add(loop, [{name: most * step * direction}])
+                _add_response(loop, base, move(**{name: most * step * direction}))
     if "torque" in base:
         strongest = max(abs(base[name + axis]) for name in PIN_FORCES for axis in ("_x", "_y"))
         strongest += abs(base["torque"]) / sum_lengths(scene.linkage)  # the couple on a bar is rounded too
         heaviest = max(scene.linkage.bar(bar).mass for bar in MOVING_BARS)
         for bar in MOVING_BARS:
-            add(loop, [{f"couple_{bar}": strongest * step}])
-            add(carried, [{f"couple_{bar}": heaviest * hardest * step}])
+            _add_response(loop, base, move(**{f"couple_{bar}": strongest * step}))
+            _add_response(carried, base, move(**{f"couple_{bar}": heaviest * hardest * step}))
     return Sensitivities(data, loop, carried)
 
 
@@ -151,3 +152,60 @@ def _weigh_inputs(stored: dict[str, float]) -> dict[str, float]:
     weights["theta_1"] = max(abs(stored["theta_1"]), abs(stored["theta_2"]), longest / stored["d"])
     weights["theta_2"] = max(abs(stored["theta_2"]), 1.0)
     return weights
+
+
+def compute_reference(scene: Scene, branch: int, angle: float) -> "tuple[Values, dict[str, float]] | None":
+    """Compute values at one position as balls, and sum |x_i dy/dx_i| of each; None where the loop does not close."""
+    from flint import arb
+
+    from fourbar_validation.engines.balls import OF_PIECE, compute_outputs, make_balls
+
+    exact = make_balls(scene, angle)
+    exact |= {f"{name}_{k}": arb(1) for k, load in enumerate(scene.loads) if load.table for name in OF_PIECE}
+
+    def move(**changed: "Ball") -> "Values | None":
+        return compute_outputs(scene, branch, exact | changed)
+
+    base = move()
+    if base is None:
+        return None
+    sensitivity = dict.fromkeys(base, 0.0)
+    weights = {name: abs(float(value)) for name, value in exact.items() if value != 0}
+    _add_responses(sensitivity, base, move, exact, weights)
+    return base, sensitivity
+
+
+def _add_responses(
+    total: dict[str, float],
+    base: "Values",
+    move: "Callable[..., Values | None]",
+    inputs: "Values",
+    weights: dict[str, float],
+) -> None:
+    """Add how far each output moves as each input moves by its weight, to a side on which the loop closes."""
+    from flint import arb
+
+    from fourbar_validation.engines.balls import STEP_BITS
+
+    for name, weight in weights.items():
+        step = weight * arb(2) ** -STEP_BITS
+        sides = (move(**{name: inputs[name] + side * step}) for side in (1, -1))
+        _add_response(total, base, next((moved for moved in sides if moved is not None), None))
+
+
+def _add_response(total: dict[str, float], base: "Values", moved: "Values | None") -> None:
+    """Add how far each output moves, in parts of 2^-STEP_BITS; infinitely far where it has become singular."""
+    from flint import arb
+
+    from fourbar_validation.engines.balls import STEP_BITS
+
+    if moved is None:
+        return
+    for output, y in base.items():
+        rate = math.inf
+        if output in moved:
+            change = abs(moved[output] - y)
+            if output.startswith("theta") and change > 3:
+                change = 2 * arb.pi() - change
+            rate = abs(float((change * arb(2) ** STEP_BITS).mid()))
+        total[output] = total.get(output, 0.0) + rate
