@@ -69,7 +69,7 @@ JUDGED_BY = {
     "lab/test_faults.py": "lab: fault_scenes injection",
     "validation/cost/test_cost.py": "validation/cost: series formulas laws pictures study; "
     "validation/advise: worst_errors; validation/engines/mujoco: one_state",
-    "validation/advise/test_advise.py": "validation/advise: matters; validation/engines/mujoco: required_error trial",
+    "validation/advise/test_advise.py": "validation/advise: matters; validation/engines/mujoco: trial",
     "lab/test_benchmark.py": "lab/simulators: slider_engines slider_mujoco slider_pinocchio",
     "lab/simulators/test_problems.py": "lab/simulators: slider_crank; validation/check: problem",
     # simulators that need not be there: their scripts run where they are installed

@@ -21,8 +21,7 @@ from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer, explain_refusal
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.engines import protocol
-from fourbar_validation.engines.guests import NOT_FOUND
-from fourbar_validation.engines.mujoco.required_error import adjust_engines
+from fourbar_validation.engines.guests import NOT_FOUND, adjust_engines
 from fourbar_validation.engines.registry import BALLS, ENGINES, load_further
 from fourbar_validation.report.machine import DISTRIBUTIONS
 

@@ -5,31 +5,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from fourbar_validation.compare.answer import Adapter
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.prediction import predict_in_world_axes
-from fourbar_validation.engines.registry import Engine
-
-
-def make_exudyn() -> Adapter:
-    """Start Exudyn."""
-    from fourbar_lab.engines.exudyn import ExudynConstraints
-
-    return ExudynConstraints()
-
-
-def make_opensim() -> Adapter:
-    """Start OpenSim."""
-    from fourbar_lab.engines.opensim import OpenSimConstraints
-
-    return OpenSimConstraints()
-
-
-def make_drake() -> Adapter:
-    """Start Drake."""
-    from fourbar_lab.engines.drake import DrakeInverse
-
-    return DrakeInverse()
+from fourbar_validation.engines.registry import Engine, Later
 
 
 def _hash_adapters() -> str:
@@ -42,6 +20,6 @@ def _hash_adapters() -> str:
 _exact: Callable[..., Engine] = partial(
     Engine, tolerance=EQUIVALENCE, predictor=predict_in_world_axes, code=_hash_adapters()
 )
-EXUDYN = _exact("exudyn-constraints", make_exudyn, library="exudyn")
-OPENSIM = _exact("opensim-constraints", make_opensim, library="opensim")
-DRAKE = _exact("drake-inverse", make_drake, library="pydrake")
+EXUDYN = _exact("exudyn-constraints", Later("fourbar_lab.engines.exudyn:ExudynConstraints"), library="exudyn")
+OPENSIM = _exact("opensim-constraints", Later("fourbar_lab.engines.opensim:OpenSimConstraints"), library="opensim")
+DRAKE = _exact("drake-inverse", Later("fourbar_lab.engines.drake:DrakeInverse"), library="pydrake")

@@ -17,10 +17,9 @@ from fourbar_validation.advise import advise, matters
 from fourbar_validation.advise.worst_errors import compute_errors
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import FAILS
-from fourbar_validation.engines.guests import Guest
-from fourbar_validation.engines.mujoco import required_error
+from fourbar_validation.engines.guests import Guest, adjust_engines
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
-from fourbar_validation.engines.mujoco.trial import TrialSetup
+from fourbar_validation.engines.mujoco.trial import TrialSetup, compute_expected_error
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import MODELS
@@ -99,7 +98,7 @@ def test_a_predicted_error_that_is_no_number_is_no_small_one() -> None:
     values = {"torque": np.ones(2), "F12": np.ones((2, 2))}
     predicted = {"torque": np.full(2, 1e-9), "F12": np.array([1e-9, np.nan])}
     answer = Answer("", "", quantities=values, predicted=predicted)
-    assert required_error.compute_expected_error(turning(), answer) == math.inf
+    assert compute_expected_error(turning(), answer) == math.inf
 
 
 @pytest.mark.parametrize("required", [0.0, 1.0, -1e-3, math.nan])
@@ -107,7 +106,7 @@ def test_an_error_is_between_0_and_1(required: float) -> None:
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
         advise.advise(turning(), required)
     with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
-        required_error.adjust_engines(ENGINES, required)
+        adjust_engines(ENGINES, required)
 
 
 @pytest.mark.slow
@@ -115,7 +114,7 @@ def test_an_error_is_between_0_and_1(required: float) -> None:
 def test_a_run_is_no_more_precise_than_required(required: float) -> None:
     scene = turning(positions=90)
     engines = [engine for engine in ENGINES if engine.through_time]
-    record = judge("s", scene, required_error.adjust_engines(engines, required))
+    record = judge("s", scene, adjust_engines(engines, required))
     assert not [row for row in record.rows if row.verdict == FAILS]
     (answer,) = record.answers
     answers = [row for row in record.rows if row.engine == "mujoco-simulated" and row.quantity != "as shipped"]
@@ -129,15 +128,13 @@ def test_a_run_is_no_more_precise_than_required(required: float) -> None:
 def test_a_guest_is_asked_for_the_error_and_not_answered_for_by_the_harness() -> None:
     (simulated,) = (engine for engine in ENGINES if engine.through_time)
     guest = Guest("mujoco 3.3.7", partial(dict), simulated.tolerance, through_time=True)
-    ours, theirs, exact = required_error.adjust_engines((simulated, guest, replace(guest, through_time=False)), 1e-3)
+    ours, theirs, exact = adjust_engines((simulated, guest, replace(guest, through_time=False)), 1e-3)
     assert ours.start != simulated.start and theirs.start() == {"setting": {"error": 1e-3}} == exact.start()
     assert theirs.tolerance == ours.tolerance != exact.tolerance == guest.tolerance
 
 
 def test_exact_engines_stay_exact() -> None:
-    changed = [
-        new for old, new in zip(ENGINES, required_error.adjust_engines(ENGINES, 1e-3), strict=True) if new != old
-    ]
+    changed = [new for old, new in zip(ENGINES, adjust_engines(ENGINES, 1e-3), strict=True) if new != old]
     assert [engine.name for engine in changed] == ["mujoco-simulated"]
     assert changed[0].tolerance.factor == 1e-3 and changed[0].answers == next(
         w.answers for w in ENGINES if w.through_time

@@ -13,7 +13,7 @@ from fourbar.scene import command as list_positions
 from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.engines import environments, guests
 from fourbar_validation.engines.environments import Entry, make_environment, read_engines, start_engines
-from fourbar_validation.engines.mujoco.required_error import adjust_engines
+from fourbar_validation.engines.guests import adjust_engines
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.regression.record import describe_run
 from fourbar_validation.run.command import choose_engines

@@ -21,10 +21,10 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array, EngineError, ReleasedAnswer
 from fourbar_validation.compare.compare import COMPARED
 from fourbar_validation.compare.rows import FORMULAS, write_one_line
-from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
+from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound, hold_simulated
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.processes import Ask, Program, Running
-from fourbar_validation.engines.registry import Engine
+from fourbar_validation.engines.registry import SIMULATED_TO_ERROR, Engine
 from fourbar_validation.places import CHECKOUT, PACKAGE
 
 CLASS = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*", re.ASCII)
@@ -127,6 +127,20 @@ def _make_guest(name: str, program: Program, hello: Hello, trouble: str, number:
         seconds=program.seconds,
         releases="release" in hello.effects,
     )
+
+
+def adjust_engines(engines: Sequence[Engine], error: float) -> tuple[Engine, ...]:
+    """Lay out simulations for an error and hold them to it; guests are asked for it, and exact engines stay exact."""
+    tolerance = hold_simulated(error, "steps and softness are laid out for it")
+    adjusted = []
+    for stated in engines:
+        engine = stated
+        if isinstance(engine, Guest):
+            engine = engine.at_setting(error=error)
+        elif engine.through_time:
+            engine = replace(engine, start=partial(SIMULATED_TO_ERROR, error))
+        adjusted.append(replace(engine, tolerance=tolerance, order=None) if engine.through_time else engine)
+    return tuple(adjusted)
 
 
 def list_numbers(engines: Iterable[Engine]) -> dict[str, int]:

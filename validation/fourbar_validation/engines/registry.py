@@ -8,6 +8,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, PackageNotFoundError, distribution
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -38,7 +39,7 @@ class Engine:
 
     name: str
     start: Callable[[], Adapter]
-    """Starts it; importable by name, and imports the library itself: a missing one costs only its own rows."""
+    """Starts it; importable by name, or `Later`."""
     tolerance: ErrorBound
     answers: tuple[str, ...] = COMPARED
     """Quantities that it must answer."""
@@ -121,41 +122,43 @@ WORK = {
 OF_A_POSITION = tuple(name for name in COMPARED if STAGE_OF[name] == "position")
 
 
-def _make_pinocchio() -> Adapter:
-    from fourbar_validation.engines.pinocchio import PinocchioInverse
+@dataclass(frozen=True, slots=True)
+class Later:
+    """Class or function that is imported when it is called: a library that is missing costs its own rows only."""
 
-    return PinocchioInverse()
+    name: str
+    """The module and the name in it, as `module:name`."""
 
-
-def _make_mujoco() -> Adapter:
-    from fourbar_validation.engines.mujoco.inverse import MujocoInverse
-
-    return MujocoInverse()
-
-
-def _make_simulation() -> Adapter:
-    from fourbar_validation.engines.mujoco.simulate import MujocoSimulated
-
-    return MujocoSimulated()
+    def __call__(self, *arguments: Any) -> Any:
+        """Import and call it."""
+        module, _, name = self.name.partition(":")
+        return getattr(import_module(module), name)(*arguments)
 
 
-def _observe_order_of_simulation(
-    scene: Scene, at: Command, error: Callable[[Answer], float]
-) -> tuple[float, float, float]:
-    from fourbar_validation.engines.mujoco.simulate import observe_order
-
-    return observe_order(scene, at, error)
-
-
+_HERE = "fourbar_validation.engines"
+SIMULATED_TO_ERROR = Later(f"{_HERE}.mujoco.trial:SimulatedToError")
+"""Simulation with settings for a wanted error."""
 ENGINES = (
-    Engine("pinocchio-inverse", _make_pinocchio, EQUIVALENCE, predictor=predict_in_world_axes, library="pinocchio"),
-    Engine("mujoco-inverse", _make_mujoco, EQUIVALENCE, predictor=predict_about_mass_centre, library="mujoco"),
+    Engine(
+        "pinocchio-inverse",
+        Later(f"{_HERE}.pinocchio:PinocchioInverse"),
+        EQUIVALENCE,
+        predictor=predict_in_world_axes,
+        library="pinocchio",
+    ),
+    Engine(
+        "mujoco-inverse",
+        Later(f"{_HERE}.mujoco.inverse:MujocoInverse"),
+        EQUIVALENCE,
+        predictor=predict_about_mass_centre,
+        library="mujoco",
+    ),
     Engine(
         "mujoco-simulated",
-        _make_simulation,
+        Later(f"{_HERE}.mujoco.simulate:MujocoSimulated"),
         SIMULATED,
         UNKNOWNS,
-        order=_observe_order_of_simulation,
+        order=Later(f"{_HERE}.mujoco.simulate:observe_order"),
         through_time=True,
         generated=True,
         residuals=True,

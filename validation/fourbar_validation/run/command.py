@@ -13,7 +13,7 @@ from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.columns import read_columns
 from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.environments import read_engines, start_engines
-from fourbar_validation.engines.guests import Guest, read_guests
+from fourbar_validation.engines.guests import Guest, adjust_engines, read_guests
 from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES, Engine, hold_fully, load_further
 from fourbar_validation.regression.accept import FORMS, add_output_options, report_differences
 from fourbar_validation.regression.record import COLUMNS, find_baseline, open_run
@@ -129,8 +129,6 @@ def command(**stated: Any) -> int:
     request.require_consistent()
     suite, engines = select_scenes(request)
     if request.error is not None:
-        from fourbar_validation.engines.mujoco.required_error import adjust_engines
-
         engines = adjust_engines(engines, request.error)
     folders = [path.parent for path in request.scenes]
     chosen = choose_engines(request.engines, engines, folders, request.time_limit)
