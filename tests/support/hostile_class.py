@@ -35,7 +35,7 @@ class Releases(Right):
         self.step = step
 
     def release(self, scene: Any, times: Any) -> Any:
-        from fourbar_validation.engines.mujoco.released import MujocoForward
+        from fourbar_validation.engines.mujoco.forward import MujocoForward
 
         return MujocoForward(self.step).release(scene, times)
 

@@ -53,7 +53,7 @@ JUDGED_BY = {
     "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives monitor runner",
     "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds cuts sensitivities equilibria "
     "files variants",
-    "validation/run/test_released.py": "validation/engines/mujoco: released",
+    "validation/run/test_released.py": "validation/engines/mujoco: forward",
     "validation/check/test_check.py": "validation/check: fitted judge mistakes theirs; validation/run: printed",
     "validation/check/test_mjcf.py": "validation/check: differences screen; "
     "validation/engines/mujoco: describe theirs topology",
@@ -68,7 +68,7 @@ JUDGED_BY = {
     "lab/test_fuzz.py": "lab: outside",
     "lab/test_faults.py": "lab: fault_scenes injection",
     "validation/cost/test_cost.py": "validation/cost: series formulas laws pictures study; "
-    "validation/advise: worst_errors; validation/engines/mujoco: one_state",
+    "validation/advise: worst_errors",
     "validation/advise/test_advise.py": "validation/advise: matters; validation/engines/mujoco: trial",
     "lab/test_benchmark.py": "lab/simulators: slider_engines slider_mujoco slider_pinocchio",
     "lab/simulators/test_problems.py": "lab/simulators: slider_crank; validation/check: problem",

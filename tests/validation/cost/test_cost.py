@@ -23,7 +23,7 @@ from fourbar_validation.cost import formulas, laws, pictures, study
 from fourbar_validation.cost.cost import cost, list_front
 from fourbar_validation.cost.series import BEST
 from fourbar_validation.engines.mujoco import drives
-from fourbar_validation.engines.mujoco.one_state import MujocoOneState
+from fourbar_validation.engines.mujoco.forward import MujocoOneState
 from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
 from fourbar_validation.engines.pinocchio import PinocchioForward
 from tests.support.scenes import crank_rocker, thesis

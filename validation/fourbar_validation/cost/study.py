@@ -245,7 +245,7 @@ class CostStudy:
         )
 
     def _time_one_state(self) -> list[CostPoint]:
-        from fourbar_validation.engines.mujoco.one_state import MujocoOneState
+        from fourbar_validation.engines.mujoco.forward import MujocoOneState
 
         points = [
             self._time_answer("one state", MujocoOneState((d,)), f"MuJoCo at one state, d = {d:g}", (1.0 - d) / d)

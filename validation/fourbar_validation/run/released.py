@@ -34,7 +34,7 @@ from fourbar_validation.run.shipped.variants import keep_worst, take_member
 
 
 def _answer_mujoco(step: float) -> Any:
-    from fourbar_validation.engines.mujoco.released import MujocoForward
+    from fourbar_validation.engines.mujoco.forward import MujocoForward
 
     return MujocoForward(step)
 

@@ -186,6 +186,28 @@ class ClosedLoop(Assembled):
         else:
             self.data.qfrc_applied[TURNED_BY[drive_bar]] += size
 
+    def solve_drive(
+        self,
+        drive_bar: int | None,
+        wanted: float,
+        trials: tuple[float, float],
+        correction: float = 0.0,
+        refinements: int = 0,
+    ) -> float | None:
+        """Solve for the couple or push that gives the crank an acceleration (rad/s^2); None where it does not move it.
+
+        The state is left under it, to be read.
+        """
+
+        def crank_acceleration(size: float) -> float:
+            self.work(drive_bar, size, correction)
+            mujoco.mj_forward(self.model, self.data)
+            return float(self.data.qacc[O2])
+
+        size = solve_couple(crank_acceleration, wanted, *trials, refinements)
+        mujoco.mj_rnePostConstraint(self.model, self.data)
+        return size
+
     def bad(self) -> int:
         """Count warnings of a bad position, velocity or acceleration: each resets the data."""
         return sum(int(self.data.warning[kind].number) for kind in WARNINGS)
@@ -211,15 +233,7 @@ def solve_couple_elsewhere(
     speed = float(loop.drive_column(drive_bar) @ d.qvel)
     guess = crank_torque * d.qvel[O2] / speed if speed else crank_torque
     trials = (0.5 * guess, 1.5 * guess) if guess else (-1.0, 1.0)
-
-    def crank_acceleration(couple: float) -> float:
-        light.work(drive_bar, couple, correction)
-        mujoco.mj_forward(light.model, d)
-        return float(d.qacc[O2])
-
-    couple = solve_couple(crank_acceleration, happened, *trials)
-    mujoco.mj_rnePostConstraint(light.model, d)
-    return couple
+    return light.solve_drive(drive_bar, happened, trials, correction)
 
 
 def solve_couple(

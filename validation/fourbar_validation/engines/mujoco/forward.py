@@ -1,0 +1,152 @@
+"""MuJoCo's forward dynamics of the generated MJCF without its flywheel: of a released linkage, and at one state.
+
+At one state the torque is that with which the closed loop accelerates as commanded. At an exactly closed state the only
+error is the closure's softness, in proportion to (1-d)/d with d the impedance: the values at several d, extrapolated to
+(1-d)/d = 0, are free of it.
+"""
+
+import math
+import time
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fourbar.errors import InputError
+from fourbar.mjcf import RECIPE, Settings, write_mjcf
+from fourbar.mjcf.effects import unwind
+from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Command, Scene, command
+from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer
+from fourbar_validation.engines.description import name_driving
+from fourbar_validation.engines.loaded import Values
+from fourbar_validation.engines.loop import Angles, Assembler, LimitDetector, read_each
+from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
+from fourbar_validation.engines.mujoco.runner import Stepper
+
+RELEASED, ONE_STATE = "mujoco-forward", "mujoco-one-state"
+"""Names of the engines."""
+TIME_CONSTANT_STEPS = 2.0
+"""Time constant of the loop's closure, in timesteps. Through change points the closure takes energy out: 1e-6 of it in
+ten seconds at 1 ms with 2, three hundred times as much with 10."""
+FRICTION = (mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF, mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON)
+
+
+class MujocoForward:
+    """Free motion of the closed loop with a fixed step, s."""
+
+    name, version = RELEASED, mujoco.__version__
+
+    def __init__(self, step: float = 1e-3) -> None:
+        self.step = step
+
+    def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
+        """Integrate the motion at the given times, rising from 0 (s)."""
+        setting, start = f"RK4 {self.step:g} s", command(scene)
+        interval = float(times[1] - times[0])  # the times are evenly spaced; the step divides the interval
+        timestep = interval / math.ceil(interval / self.step - 1e-6)
+        settings = replace(RECIPE, flywheel=0.0, timestep=timestep, time_constant_steps=TIME_CONSTANT_STEPS, pad=None)
+        bare = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0))
+        try:
+            loop = ClosedLoop(write_mjcf(bare, settings, keyframe=False))
+        except InputError as error:
+            return ReleasedAnswer.refused(RELEASED, setting, str(error))
+        q_0 = Assembler(loop).find(float(start.theta_2[0]), int(start.branch[0]))
+        if q_0 is None:
+            return ReleasedAnswer.refused(RELEASED, setting, "the loop does not close at the start")
+        loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+        loop.set_state(q_0, scene.motion.omega_2 or 0.0)
+        rows, q, detector = [], loop.data.qpos, LimitDetector(int(start.branch[0]))
+        stepper, work = Stepper(loop.model, loop.data, timestep), _Work(loop.model, loop.data, timestep)
+
+        def look(now: float) -> None:
+            detector.look(now, q[O2] + q[A], q[O4])
+            work.add()
+
+        for t in times:
+            stepper.to(float(t), look)
+            mujoco.mj_forward(loop.model, loop.data)
+            terms = np.array([*loop.data.energy, -work.done])
+            rows.append((loop.data.qpos[O2], loop.data.qvel[O2], terms.sum(), np.abs(terms).sum()))
+        theta_2, omega, energy, terms = np.array(rows).T
+        return ReleasedAnswer(RELEASED, setting, theta_2, omega, energy, terms, detector.stopped_at)
+
+
+class _Work:
+    """Work of loads, damping and dry friction on the bars, by MuJoCo's own powers at the ends of each step, J."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, timestep: float) -> None:
+        self.model, self.data, self.timestep, self.done = model, data, timestep, 0.0
+        damped = model.dof_damping.any() or model.tendon_damping.any()
+        dry = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
+        self.any = bool(model.nu or damped or dry)
+        mujoco.mj_forward(model, data)
+        self.before = self._compute_power()
+
+    def add(self) -> None:
+        """Add the step just made; after a Runge-Kutta step some fields are still of the step before."""
+        if self.any:
+            mujoco.mj_forward(self.model, self.data)
+            now = self._compute_power()
+            self.done += 0.5 * self.timestep * (self.before + now)
+            self.before = now
+
+    def _compute_power(self) -> float:
+        d = self.data
+        rubbing = np.isin(d.efc_type, FRICTION)
+        power = float(d.qvel @ (d.qfrc_actuator + d.qfrc_damper))
+        return power + float(d.efc_force[rubbing] @ d.efc_vel[rubbing])
+
+
+RUNGS = (0.9999, 0.9998, 0.9996, 0.9992)
+"""Impedances to extrapolate from; MuJoCo clamps at the first."""
+
+
+@dataclass(slots=True)
+class MujocoOneState:
+    """Forward dynamics at each position by itself, at one impedance or extrapolated from several."""
+
+    impedances: tuple[float, ...] = RUNGS
+    name: str = ONE_STATE
+
+    def answer(self, scene: Scene, at: Command) -> Answer:
+        """Answer, or refuse a bar that MuJoCo cannot hold."""
+        began = time.perf_counter()
+        setting = "extrapolated" if len(self.impedances) > 1 else f"d = {self.impedances[0]:g}"
+        try:
+            rungs = [_compute_at_impedance(scene, at, d) for d in self.impedances]
+        except InputError as error:
+            return Answer(ONE_STATE, setting, refusal=str(error))
+        values, assembled = extrapolate(self.impedances, [rung for rung, _ in rungs]), rungs[0][1]
+        return Answer(
+            ONE_STATE,
+            setting,
+            at,
+            assembled,
+            values,
+            shared="lengths, masses, inertias, centres, loads and effects as MJCF text; the command",
+            own="assembly, velocities, accelerations, drive torque, pin forces",
+            seconds=time.perf_counter() - began,
+        )
+
+
+def extrapolate(impedances: tuple[float, ...], rungs: list[dict[str, Array]]) -> dict[str, Array]:
+    """Extrapolate to x = 0 the polynomial in x = (1-d)/d through the rungs (Lagrange)."""
+    x = np.array([(1.0 - d) / d for d in impedances])
+    weights = [float(np.prod([xj / (xj - xi) for j, xj in enumerate(x) if j != i])) for i, xi in enumerate(x)]
+    return {name: sum(w * rung[name] for w, rung in zip(weights, rungs, strict=True)) for name in rungs[0]}  # type: ignore[misc]
+
+
+def _compute_at_impedance(scene: Scene, at: Command, d: float) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+    """Compute torque and pin forces at every position that assembles."""
+    # no flywheel: the torque is on the driven bar itself
+    settings = Settings(timestep=1e-3, impedance=d, pad=None, flywheel=0.0)
+    loop, drive = ClosedLoop(write_mjcf(scene, settings, keyframe=False)), name_driving(scene)
+
+    def read(q: Angles, omega_2: float, alpha_2: float) -> Values:
+        loop.set_state(unwind(scene, q), omega_2)
+        torque = loop.solve_drive(scene.drive_bar, alpha_2, (0.0, 1.0), refinements=1)
+        return {drive: math.nan if torque is None else torque, **loop.forces()}
+
+    return read_each(loop, at, (drive, *PIN_FORCES), read)[:2]
