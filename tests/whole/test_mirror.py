@@ -50,7 +50,7 @@ JUDGED_BY = {
     "validation/engines/test_free_body.py": "validation/engines: free_body_closure free_body_effects",
     "validation/scenes/test_hard_families.py": "validation/engines: exact; validation/engines/mujoco: shipped",
     "validation/report/test_sections.py": "validation/report: hard_picture",
-    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives monitor runner",
+    "validation/engines/mujoco/test_simulate.py": "validation/engines/mujoco: drives monitor",
     "validation/run/shipped/test_shipped.py": "validation/run/shipped: bounds cuts sensitivities equilibria "
     "files variants",
     "validation/run/test_released.py": "validation/engines/mujoco: forward",

@@ -29,9 +29,8 @@ from fourbar.scene.motion import Motion
 from fourbar_validation.engines.free_body_closure import find_angle
 from fourbar_validation.engines.limits import compute_least_sine
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.mujoco.called_back import take_full_size
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
-from fourbar_validation.engines.mujoco.runner import Steady, find_assembled
+from fourbar_validation.engines.mujoco.runner import Steady, find_assembled, take_full_size
 from fourbar_validation.engines.tree import solve_closed
 
 WHEEL = 1e8

@@ -20,27 +20,25 @@ from fourbar_validation.engines.description import list_speeds, list_unknowns, n
 from fourbar_validation.engines.limits import NEAREST_TOGGLE, compute_least_sine, find_exceeded
 from fourbar_validation.engines.loaded import Values
 from fourbar_validation.engines.loop import MADE, Assembler, make_blank
-from fourbar_validation.engines.mujoco.called_back import (
-    ActuatorForce,
-    clip_angles,
-    evaluate_loads,
-    receive_forces,
-    supply_forces,
-    take_full_size,
-)
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.mujoco.drives import Lead, Led
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, list_alarms
 from fourbar_validation.engines.mujoco.runner import (
     LIGHT_FLYWHEEL,
+    ActuatorForce,
     Lawful,
     MotionSegment,
     SimulatedRun,
     Steady,
+    clip_angles,
+    evaluate_loads,
     find_assembled,
     find_extremes,
     order_in_time,
+    receive_forces,
     split_segments,
+    supply_forces,
+    take_full_size,
 )
 
 SHARED = (

@@ -15,7 +15,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Law
 from fourbar_validation.compare.rows import Row
 from fourbar_validation.engines.mujoco import runner, simulate
-from fourbar_validation.engines.mujoco.called_back import OVERRUN, clip_angles
+from fourbar_validation.engines.mujoco.runner import OVERRUN, clip_angles
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
