@@ -70,7 +70,6 @@ def present(*names: str) -> list[Any]:
     ]
 
 
-each_engine = pytest.mark.parametrize("name", present(*ENGINE))
 each_engine = pytest.mark.parametrize("name", present(*BARS))
 each_tree = pytest.mark.parametrize("name", present(*TREES))
 further = pytest.mark.parametrize("name", present(*(engine.name for engine in load_further())))
