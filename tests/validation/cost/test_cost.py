@@ -25,7 +25,6 @@ from fourbar_validation.cost.series import BEST
 from fourbar_validation.engines.mujoco import drives
 from fourbar_validation.engines.mujoco.forward import MujocoOneState
 from fourbar_validation.engines.mujoco.trial import Build, TrialSetup
-from fourbar_validation.engines.pinocchio import PinocchioForward
 from tests.support.scenes import crank_rocker, thesis
 
 
@@ -138,17 +137,6 @@ def test_one_state_is_wrong_in_proportion_and_right_in_the_limit() -> None:
         soft, stiff = wrong(0.999), wrong(0.9999)
         assert soft / stiff == pytest.approx(10.0, rel=0.1)
         assert wrong(0.9999, 0.9998, 0.9996, 0.9992) < 1e-5 * stiff
-
-
-@pytest.mark.parametrize(
-    "scene", [turning(), crank_rocker(), crank_rocker(drive_bar=4)], ids=["plain", "loads", "bar 4"]
-)
-def test_pinocchio_forward_converges_to_the_formulas(scene: fourbar.Scene) -> None:
-    found = []
-    for n in (80, 160):
-        ran = PinocchioForward(scene, command(scene), n, n / 4).forward()
-        found.append(compute_errors(scene, ran.at, ran.quantities).worst)
-    assert found[1] < 1e-6 and found[0] / found[1] > 8.0, found
 
 
 def test_formulas_in_four_precisions() -> None:
@@ -291,7 +279,6 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
     few = {"RK4, tc held", "RK4, MuJoCo's defaults", "tolerance, Newton", "softness d", "sag d, slow"}
     every = study.design_curves
     monkeypatch.setattr(study, "design_curves", lambda scene: [c for c in every(scene) if c.name in few])
-    monkeypatch.setattr(study, "FORWARD_STEPS", (20, 40))
     monkeypatch.setattr(study, "REQUIRED", (1e-3, 1e-5))
     monkeypatch.setattr(study, "ROUNDS", 1)
     result = CliRunner().invoke(cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False)

@@ -12,8 +12,7 @@ from fourbar.mjcf.settings import LIGHT
 from fourbar.scene import Command, Scene
 from fourbar.solve import solve
 from fourbar_validation.advise.worst_errors import NO_ANSWER, WorstErrors, compute_errors
-from fourbar_validation.engines.loop import Trial
-from fourbar_validation.engines.mujoco.trial import LONGEST, SHORTEST, TrialSetup
+from fourbar_validation.engines.mujoco.trial import LONGEST, SHORTEST, Trial, TrialSetup
 
 MATTERS = 2.0
 """A setting that a change of a factor of two, or its loss, makes the error grow by less does not matter."""

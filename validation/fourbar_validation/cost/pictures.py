@@ -24,7 +24,6 @@ SHOWN: dict[str, Look] = {
     "RK4, MuJoCo's defaults": ("RK4, MuJoCo's defaults", "#e69f00", "D", (0, (1, 1.5))),
     "Euler, stiff closure": ("Euler, tc held", "#cc79a7", "v", (0, (6, 2, 1, 2))),
     "RK4, d = 0.9999, tc = 10 h": ("RK4, no pads, tc = 10 h", "#56b4e9", "P", (0, (5, 1))),
-    "Pinocchio forward, RK4": ("Pinocchio forward", "#999999", "x", (0, (3, 2))),
     "MuJoCo, recommended": ("recommended", "#0072b2", "o", "solid"),
 }
 SOFTNESS: dict[str, Look] = {

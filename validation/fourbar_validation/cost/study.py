@@ -20,8 +20,7 @@ from fourbar_validation.advise.worst_errors import NO_ANSWER, WorstErrors, compu
 from fourbar_validation.compare.answer import Adapter
 from fourbar_validation.cost import formulas
 from fourbar_validation.cost.series import BEST, SLOW, Curve, Spot, design_curves
-from fourbar_validation.engines.loop import Trial
-from fourbar_validation.engines.mujoco.trial import TrialSetup
+from fourbar_validation.engines.mujoco.trial import Trial, TrialSetup
 from fourbar_validation.report.machine import list_versions
 from fourbar_validation.run.store import Store
 
@@ -29,12 +28,10 @@ ROUNDS, ANSWERS = 7, 3
 """Timings of each setting, and of an engine that answers position by position."""
 TIMED_STEPS = 200
 """Steps per timing: some 3 ms of RK4, so that a round of a curve passes within one spell of the machine."""
-FORWARD_STEPS = (20, 40, 80, 160, 320, 640)
-FORWARD_TIME_CONSTANT = 0.25
 REQUIRED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 ONE_STATE = (0.9, 0.99, 0.999, 0.9999)
-VERSION = 6
+VERSION = 7
 """Version of what is tried; parts made with another version are made again."""
 EXACT, STEPPED, FORMULAS = "exact", "stepped", "formulas"
 T = TypeVar("T")
@@ -94,7 +91,6 @@ class CostStudy:
             "formulas": self._time_formulas,
             "inverse": self._time_inverse,
             "one state": self._time_one_state,
-            "Pinocchio forward": self._time_pinocchio_forward,
             "recommended": self._try_recommended,
             **{curve.name: partial(self._try_curve, curve) for curve in design_curves(scene)},
         }
@@ -252,23 +248,6 @@ class CostStudy:
             for d in ONE_STATE
         ]
         return [*points, self._time_answer("one state", MujocoOneState(), "MuJoCo at one state, extrapolated", 0.0)]
-
-    def _time_pinocchio_forward(self) -> list[CostPoint]:
-        from fourbar_validation.engines.pinocchio import PinocchioForward
-
-        points = []
-        reference = self._time_rk4_step()
-        for n in FORWARD_STEPS:
-            ran = PinocchioForward(self.scene, self.command, n, FORWARD_TIME_CONSTANT * n).forward()
-            errors = compute_errors(self.scene, ran.at, ran.quantities)
-            cost = ran.stepping / ran.steps * ran.steps_per_revolution
-            points.append(
-                CostPoint(
-                    *("Pinocchio forward", STEPPED, f"Pinocchio RK4, {n}/rev", n, ran.steps, ran.steps_per_revolution),
-                    *(*errors, cost, math.nan, cost / reference, math.nan),
-                )
-            )
-        return points
 
 
 def _leave_out_first(trial: Trial) -> None:

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -202,27 +202,6 @@ def split_answer(out: dict[str, Array], branch: NDArray[np.int8]) -> tuple[Comma
     theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
     rest = {name: values for name, values in out.items() if name not in MADE}
     return Command(theta_2, branch, omega_2, alpha_2), rest
-
-
-@dataclass(slots=True, eq=False)
-class Trial:
-    """Result of one run through a scene with some settings."""
-
-    at: Command
-    """Motion that was really made."""
-    quantities: dict[str, Array] = field(default_factory=dict)
-    """Torque (n,) and pin forces (n, 2), under the names of `fourbar.Solution`."""
-    steps: int = 0
-    steps_per_revolution: float = 0.0
-    """Steps per revolution at the fastest speed of the run."""
-    stepping: float = 0.0
-    """CPU seconds in steps."""
-    reading: float = 0.0
-    """CPU seconds in reading the samples."""
-    segments: tuple[tuple[slice, int], ...] = ()
-    """The samples of each segment, and its steps: several samples are of one step where these are fewer."""
-    broken: str = ""
-    """Report of the engine on itself, if it lost the motion."""
 
 
 class LimitDetector:

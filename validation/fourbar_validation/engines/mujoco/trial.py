@@ -15,7 +15,7 @@ from its own residuals, never by what the formulas say: how wrong it is against 
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -26,7 +26,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED, mark_turning
 from fourbar_validation.compare.tolerance import divide, magnitude
-from fourbar_validation.engines.loop import Assembler, Trial, make_blank, split_answer
+from fourbar_validation.engines.loop import Assembler, make_blank, split_answer
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import (
     LIGHT_FLYWHEEL,
@@ -82,6 +82,27 @@ def silence() -> Iterator[None]:
         yield
     finally:
         mujoco.set_mju_user_warning(before)
+
+
+@dataclass(slots=True, eq=False)
+class Trial:
+    """Result of one run through a scene with some settings."""
+
+    at: Command
+    """Motion that was really made."""
+    quantities: dict[str, Array] = field(default_factory=dict)
+    """Torque (n,) and pin forces (n, 2), under the names of `fourbar.Solution`."""
+    steps: int = 0
+    steps_per_revolution: float = 0.0
+    """Steps per revolution at the fastest speed of the run."""
+    stepping: float = 0.0
+    """CPU seconds in steps."""
+    reading: float = 0.0
+    """CPU seconds in reading the samples."""
+    segments: tuple[tuple[slice, int], ...] = ()
+    """The samples of each segment, and its steps: several samples are of one step where these are fewer."""
+    broken: str = ""
+    """Report of the engine on itself, if it lost the motion."""
 
 
 class TrialSetup:
