@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -210,30 +211,26 @@ WRONG_SETTINGS = [[], {"name": 1}, {"steps_per_turn": 3.5}, {"steps_per_turn": 0
                   {"steps_per_turn": 9, "error": 0.1}, {"timestep": 0.1}]  # fmt: skip
 
 
-def one_line(error):
-    return "\n" not in str(error) and str(error)
-
-
-@pytest.mark.parametrize("data", WRONG_SCENES, ids=str)
-def test_a_scene_that_is_none_is_refused_in_one_line(data):
-    with pytest.raises(InputError) as raised:
-        protocol.scene_from_json(data)
-    assert one_line(raised.value)
-
-
-@pytest.mark.parametrize("data", WRONG_COMMANDS, ids=str)
-def test_a_command_that_is_none_is_refused_in_one_line(data):
-    with pytest.raises(InputError) as raised:
-        protocol.command_from_json(crank_rocker(), data)
-    assert one_line(raised.value)
-
-
-@pytest.mark.parametrize("data", WRONG_ANSWERS, ids=lambda data: str(data)[:60])
-def test_an_answer_that_is_none_is_refused_in_one_line(data):
+def read_answer(data):
     at = list_positions(crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0)))
+    return protocol.answer_from_json("mine", at, data)
+
+
+READ = {
+    "scene": (protocol.scene_from_json, WRONG_SCENES),
+    "command": (partial(protocol.command_from_json, crank_rocker()), WRONG_COMMANDS),
+    "answer": (read_answer, WRONG_ANSWERS),
+}
+
+
+@pytest.mark.parametrize(
+    ("part", "number"), [(part, n) for part, (_, wrong) in READ.items() for n in range(len(wrong))]
+)
+def test_what_is_none_is_refused_in_one_line(part, number):
+    read, wrong = READ[part]
     with pytest.raises(FourBarError) as raised:
-        protocol.answer_from_json("mine", at, data)
-    assert one_line(raised.value)
+        read(wrong[number])
+    assert str(raised.value) and "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize("data", WRONG_SETTINGS, ids=str)

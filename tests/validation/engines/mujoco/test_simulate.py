@@ -15,7 +15,7 @@ from fourbar.mjcf.settings import WindowMotion
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Held
-from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES
+from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.drives import Lead
@@ -68,12 +68,17 @@ SCENES = {
 }
 
 
+def compared(posed: fourbar.Scene, answer: Answer) -> list[Row]:
+    """Rows of the simulation against the formulas at the motion that it made."""
+    return Comparison("", posed, answer, fourbar.solve(posed, at=answer.at), Held(SIMULATED, UNKNOWNS)).rows()
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_within_1e_5_of_the_scale(name: str) -> None:
     posed = SCENES[name]
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     assert answer.refusal is None and answer.at is not None
-    rows = Comparison(name, posed, answer, fourbar.solve(posed, at=answer.at), Held(SIMULATED, UNKNOWNS)).rows()
+    rows = compared(posed, answer)
     assert {row.quantity for row in rows} == {"assembled", "undecided", *UNKNOWNS}
     assert all(row.passed for row in rows), [row for row in rows if not row.passed]
     assert answer.evidence["time_went_back"] == answer.evidence["bad_states"] == 0.0
@@ -87,7 +92,7 @@ def test_slow_linkages_hold_as_well(loaded: bool, index: int) -> None:
     slow = replace(drawn, motion=drawn.motion.replace(speed=0.001 if loaded else 0.01, acceleration=0.0), drive_bar=2)
     posed = slow if loaded else replace(slow, loads=(), effects=())
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
-    rows = Comparison("", posed, answer, fourbar.solve(posed, at=answer.at), Held(SIMULATED, UNKNOWNS)).rows()
+    rows = compared(posed, answer)
     assert all(row.passed for row in rows), [row for row in rows if not row.passed]
 
 
@@ -108,8 +113,7 @@ def test_a_wrong_load_is_seen() -> None:
     posed = SCENES["crank-rocker"]
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
     other = replace(posed, loads=(replace(posed.loads[0], bar=3), *posed.loads[1:]))
-    rows = Comparison("", other, answer, fourbar.solve(other, at=answer.at), Held(SIMULATED, UNKNOWNS)).rows()
-    assert {row.quantity for row in rows if not row.passed} >= {"F12", "F32", "F43", "F14", "torque"}
+    assert {row.quantity for row in compared(other, answer) if not row.passed} >= {"F12", "F32", "F43", "F14", "torque"}
 
 
 def test_positions_outside_the_range_are_not_assembled() -> None:
@@ -211,6 +215,10 @@ def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links: 
     assert {row.verdict for row in judge("hood", scene, SIMULATION).rows} == {AGREES}
 
 
+def by_quantity(scene: fourbar.Scene) -> dict[str, Row]:
+    return {row.quantity: row for row in judge("", scene, SIMULATION).rows if row.engine == "mujoco-simulated"}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), list(combinations((1, 2, 3, 4), 2)))
 def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
@@ -218,34 +226,20 @@ def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
 ) -> None:
     drive = fourbar.LinearDrive(SpringEnd(one, 0.17, -1.1), SpringEnd(other, 0.09, 0.7))
     scene = crank_rocker(motion=fourbar.Motion(TURN, 10.0, 5.0), drive=drive, effects=(fourbar.Gravity(),))
-    (simulated,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
-    rows = {
-        row.quantity: row for row in judge("", scene, [simulated], order=False).rows if row.engine == simulated.name
-    }
+    rows = by_quantity(scene)
     assert {row.verdict for row in rows.values()} == {AGREES}
-    assert {
-        "drive_force",
-        "drive_force_inertia",
-        "stroke",
-        "stroke_speed",
-        "F12",
-        "F43",
-        "F14",
-        "as shipped",
-    } <= rows.keys()
+    assert {"drive_force", "drive_force_inertia", "stroke", "stroke_speed", "F12", "F43", "as shipped"} <= rows.keys()
     assert max(rows[name].error for name in ("drive_force", "F12", "F32", "F43", "F14")) < 1e-6
     right = ClosedLoop.work
     monkeypatch.setattr(ClosedLoop, "work", lambda self, bar, size, *rest: right(self, bar, 1.01 * size, *rest))
-    rows = {
-        row.quantity: row for row in judge("", scene, [simulated], order=False).rows if row.engine == simulated.name
-    }
+    rows = by_quantity(scene)
     assert rows["drive_force"].verdict == FAILS
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["theta_3", "theta_4", "stroke of bar 2", "stroke of bar 4"])
 def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    (simulated,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
+    (simulated,) = SIMULATION
     for branch in (1, -1):
         scene = commanded(what, branch)
         question = Question("", scene, fourbar.command(scene))
@@ -262,15 +256,14 @@ def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(what: str, mon
         np.testing.assert_allclose(speeds[closes], due, rtol=1e-6)
     right = Lead.alpha_2
     monkeypatch.setattr(Lead, "alpha_2", lambda *given: 0.9 * right(*given))
-    failed = [row for row in judge("", scene, [simulated], order=False).rows if row.failed]
+    failed = [row for row in judge("", scene, SIMULATION).rows if row.failed]
     assert any("speed_error" in row.reason for row in failed)
 
 
 def test_an_input_that_must_hurry_is_not_led() -> None:
     near = float(fourbar.formulas.mobility.find_limit_angles(crank_rocker().linkage, 4)[0])
-    (simulated,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
     motion = fourbar.Motion(theta_4=near + np.linspace(0.3, 1e-6, 20), omega_4=-1.0)
-    rows = judge("", crank_rocker(motion=motion), [simulated], order=False).rows
+    rows = judge("", crank_rocker(motion=motion), SIMULATION).rows
     assert [row.reason for row in rows if row.verdict == REFUSES and "as fast as on the mean" in row.reason]
 
 
@@ -278,5 +271,4 @@ def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused() -> N
     """One of ten thousand random linkages stands 1.5e-3 rad from where omega_3 vanishes: T3 and every force diverge."""
     scene = draw_random_scene(2026, 2265, tuple(DrawnType))
     assert np.nanmin(fourbar.solve(scene).drive_condition) < 0.003
-    (simulated,) = [engine for engine in ENGINES if engine.name == "mujoco-simulated"]
-    assert not [row for row in judge("", scene, [simulated]).rows if row.failed]
+    assert not [row for row in judge("", scene, SIMULATION).rows if row.failed]
