@@ -3,7 +3,6 @@
 NAME is one of our adapters. docs/protocol.md states what a class has.
 """
 
-import hashlib
 import json
 import os
 import sys
@@ -21,7 +20,7 @@ from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer, explain_refusal
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.engines import protocol
-from fourbar_validation.engines.guests import NOT_FOUND, adjust_engines
+from fourbar_validation.engines.guests import NOT_FOUND, adjust_engines, hash_files
 from fourbar_validation.engines.registry import BALLS, ENGINES, load_further
 from fourbar_validation.report.machine import DISTRIBUTIONS
 
@@ -107,11 +106,8 @@ def hash_code(module: str) -> str:
     files = {getattr(each, "__file__", None) for name, each in list(sys.modules.items()) if name not in OURS}
     if file := sys.modules[module].__file__:
         files |= {str(path) for path in Path(file).parent.glob("*.py")}
-    digest = hashlib.sha256()
-    for path in sorted(file for file in files if file and os.path.isfile(file)):  # modules made by code may name none
-        digest.update(f"{path} ".encode() + hashlib.sha256(Path(path).read_bytes()).digest())
-    digest.update(repr(sorted(f"{each.name} {each.version}" for each in distributions())).encode())
-    return digest.hexdigest()[:16]
+    present = sorted(file for file in files if file and os.path.isfile(file))  # modules made by code may name none
+    return hash_files(present, repr(sorted(f"{each.name} {each.version}" for each in distributions())))
 
 
 def answer(make: Factory, question: dict[str, Any]) -> dict[str, Any]:

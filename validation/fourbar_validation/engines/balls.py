@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from flint import acb, arb, arb_mat, ctx
 
-from fourbar.effects import Flywheel, Friction, Gravity, LinearDrive, Spring, Springs, Table, Torsion, Viscous
+from fourbar.effects import Flywheel, Friction, Gravity, LinearDrive, Springs, Table, Torsion, Viscous
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene import Scene
 from fourbar_validation.engines.description import PINS, find_centre, find_inertia
@@ -41,6 +41,8 @@ BITS = 320
 """Working precision; 50 digits are 167 bits, the rest is what the worst sample (a limit position at 1e-20) cancels."""
 OF_PIECE = ("table_start", "table_stop", "table_first", "table_last")
 """Angles and factors of the piece of a load's table that a position is in."""
+ENDS = ("from", "to")
+"""Names of the points between which a linear drive acts."""
 STEP_BITS = 90
 """Sensitivities are difference quotients with a relative step of 2^-90: wrong by about 2^-90 / (distance to the
 nearest singular position), and the cancelled 90 bits are there to lose."""
@@ -52,7 +54,9 @@ def collect_inputs(scene: Scene, angle: float) -> dict[str, float]:
     d, a, b, c = link.lengths
     values = {"d": d, "a": a, "b": b, "c": c, "theta_1": link.ground_angle}
     values |= dict(zip(motion.names, (angle, motion.speed or 0.0, motion.acceleration), strict=True))
-    values |= collect_ends(scene.drive)
+    if scene.drive is not None:
+        for name, point in zip(ENDS, (scene.drive.start, scene.drive.end), strict=True):
+            values |= {name: point.distance, f"{name}_angle": point.angle}
     for k in MOVING_BARS:
         bar = link.bar(k)
         values |= {f"m{k}": bar.mass, f"I{k}": find_inertia(bar)}
@@ -257,7 +261,13 @@ def _sum_acting(scene: Scene, x: Values, bars: BallBars) -> tuple[dict[int, Comp
                     w[bar] * polar(x[f"{name}_{k}"], x[f"{name}_angle_{k}"])
                     for bar, name in ((start, "start"), (end, "end"))
                 ]
-                pull = _pull(spring, x, k, first_pin[end] + arms[1] - first_pin[start] - arms[0])
+                across = first_pin[end] + arms[1] - first_pin[start] - arms[0]
+                if spring.preload == spring.stiffness * spring.length:  # k times the distance, wherever that ends
+                    pull = x[f"stiffness_{k}"] * across
+                else:
+                    distance = abs(across)
+                    tension = x[f"pull_{k}"] + x[f"stiffness_{k}"] * (distance - x[f"length_{k}"])
+                    pull = tension / distance * across
                 for bar, arm, f in ((start, arms[0], pull), (end, arms[1], -pull)):
                     if bar in force:
                         force[bar] += f
@@ -331,23 +341,6 @@ def _interpolate_factor(table: Table, theta_2: Ball, x: Values, k: int) -> Ball:
         arb(value) * x.get(f"{name}_{k}", 1) for name, value in zip(OF_PIECE, piece, strict=True)
     )
     return first + (last - first) * (angle - start) / (stop - start)
-
-
-def _pull(spring: Spring, x: Values, k: int, across: Complex) -> Complex:
-    """Preload + stiffness (distance - length) along the line of the two points, and nothing where they meet."""
-    if spring.preload == spring.stiffness * spring.length:  # the pull is k times the distance, wherever that ends
-        return x[f"stiffness_{k}"] * across
-    distance = abs(across)
-    return (x[f"pull_{k}"] + x[f"stiffness_{k}"] * (distance - x[f"length_{k}"])) / distance * across
-
-
-ENDS = ("from", "to")
-
-
-def collect_ends(drive: LinearDrive | None) -> dict[str, float]:
-    """Collect the stored doubles of a drive."""
-    points = () if drive is None else zip(ENDS, (drive.start, drive.end), strict=True)
-    return {key: value for name, point in points for key, value in zip((name, f"{name}_angle"), point[1:], strict=True)}
 
 
 def turn_by_stroke(scene: Scene, x: Values) -> Values | None:

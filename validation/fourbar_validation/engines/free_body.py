@@ -123,7 +123,11 @@ def _answer_positions(
     for bar in MOVING_BARS:
         forces |= {f"omega_{bar}": motion.omega[bar], f"alpha_{bar}": motion.alpha[bar]}
     a_A = motion.swing(2, motion.first_pin[3])
-    forces["drive_condition"] = _compute_drive_condition(scene, motion) * from_jamming
+    if (line := _place_line(scene, motion)) is None:  # the sine between the bars that are not driven
+        condition = np.abs(cross(*(motion.unit[number] for number in MOVING_BARS if number != scene.drive_bar)))
+    else:
+        condition = line.condition
+    forces["drive_condition"] = condition * from_jamming
     forces |= {
         "a_A": _split_components(a_A),
         "a_B": _split_components(motion.swing(4, scene.linkage.output.length * motion.unit[4])),
@@ -143,16 +147,7 @@ def _answer_positions(
     return forces | {drive.value: unknowns[:, DRIVE]}, residual
 
 
-def _compute_drive_condition(scene: Scene, motion: BodyMotion) -> Array:
-    """Compute the sine between the bars that are not driven, or the leverage of a line."""
-    if (line := _place_line(scene, motion)) is not None:
-        return line.condition
-    one, second = (motion.unit[bar] for bar in MOVING_BARS if bar != scene.drive_bar)
-    return np.asarray(np.abs(cross(one, second)))
-
-
 def _place_line(scene: Scene, motion: BodyMotion) -> DriveLine | None:
-    """Place the line of a linear drive."""
     theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
     return None if scene.drive is None else place_line(scene.linkage, scene.drive, theta)
 
@@ -279,7 +274,6 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
 
 
 def _make_right_sides(linkage: FourBar, wrenches: BodyWrenches) -> Array:
-    """Right-hand sides, (n, 13), N."""
     right = np.zeros((len(wrenches.moment[2]), 13))
     for bar, (row, _, _) in ROWS.items():
         right[:, row : row + 2] = -_split_components(wrenches.force[bar])
@@ -359,5 +353,4 @@ def _improve_couples(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array,
 
 
 def _split_components(vectors: Complex) -> Array:
-    """Components, (n, 2)."""
     return np.stack((vectors.real, vectors.imag), axis=-1)

@@ -145,12 +145,9 @@ def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     drive = scene.drive
     assert drive is not None
     on_bar, on_ground = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
-    pivot = 0.0j
-    if on_bar.bar == 4:
-        pivot = complex(*resolve(scene.linkage.ground, scene.linkage.ground_angle))
-    return complex(*resolve(on_bar.distance, on_bar.angle)), complex(
-        *place(on_ground, scene.linkage.ground_angle)
-    ) - pivot
+    d, theta_1 = scene.linkage.ground, scene.linkage.ground_angle
+    pivot = complex(*resolve(d, theta_1)) if on_bar.bar == 4 else 0.0j
+    return complex(*resolve(on_bar.distance, on_bar.angle)), complex(*place(on_ground, theta_1)) - pivot
 
 
 def find_angle(command: Command, motion: Motion, arm: complex, ground: complex) -> Command:

@@ -59,8 +59,6 @@ class Hello:
 class Guest(Engine):
     """Engine in a process outside."""
 
-    code: str = ""
-    """Hashes of what its answers come from."""
     version: str = ""
     number: int = 0
     """Number of the engine, so that it is drawn with the same mark in every process."""
@@ -109,24 +107,21 @@ def name_guests(entries: Sequence[tuple[str, str, Program]], known: Iterable[str
                 break
             name = f"{stem}-{count}"
         names.add(name)
-        guests.append(_make_guest(name, program, hello, trouble, number=len(names)))
+        guest = Guest(
+            name,
+            partial(Asked, name, program, hello, trouble),
+            hello.tolerance,
+            answers=hello.answers,
+            positions=tuple(quantity for quantity in hello.answers if quantity in ANGLES),
+            stated=False,
+            code=hash_files(filter(os.path.isfile, program.command)),
+            version=" on ".join(filter(None, (hello.version, hello.device))),
+            number=len(names),
+            seconds=program.seconds,
+            releases="release" in hello.effects,
+        )
+        guests.append(guest)
     return tuple(guests)
-
-
-def _make_guest(name: str, program: Program, hello: Hello, trouble: str, number: int) -> Guest:
-    return Guest(
-        name,
-        partial(Asked, name, program, hello, trouble),
-        hello.tolerance,
-        answers=hello.answers,
-        positions=tuple(name for name in hello.answers if name in ANGLES),
-        stated=False,
-        code=_hash_files(program.command),
-        version=" on ".join(filter(None, (hello.version, hello.device))),
-        number=number,
-        seconds=program.seconds,
-        releases="release" in hello.effects,
-    )
 
 
 def adjust_engines(engines: Sequence[Engine], error: float) -> tuple[Engine, ...]:
@@ -176,11 +171,12 @@ def _name_program(entry: str, program: Program) -> str:
     return write_one_line(Path(next(filter(os.path.isfile, arguments), first)).stem) or "guest"
 
 
-def _hash_files(command: Sequence[str]) -> str:
-    """Hash the files that a command line names."""
+def hash_files(paths: Iterable[str], besides: str = "") -> str:
+    """Hash files with their names, and a text."""
     digest = hashlib.sha256()
-    for part in filter(os.path.isfile, command):
-        digest.update(f"{part} ".encode() + hashlib.sha256(Path(part).read_bytes()).digest())
+    for path in paths:
+        digest.update(f"{path} ".encode() + hashlib.sha256(Path(path).read_bytes()).digest())
+    digest.update(besides.encode())
     return digest.hexdigest()[:16]
 
 

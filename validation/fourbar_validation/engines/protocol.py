@@ -88,20 +88,16 @@ def command_to_json(scene: Scene, at: Command) -> dict[str, Any]:
     if at.time is not None:
         data["time"] = at.time.tolist()
     if at.remainder is not None:
-        data["remainder"] = [_write_digits(at.remainder)] * len(at.angle)
+        from mpmath import mp, mpf
+
+        with mp.workdps(DIGITS):
+            digits = str(mp.nstr(mpf(at.remainder), DIGITS + 5))  # they read back as they were
+        data["remainder"] = [digits] * len(at.angle)
     return data
 
 
 def _write_numbers(value: Any) -> Any:
     return float(value) if np.ndim(value) == 0 else np.asarray(value, dtype=float).tolist()
-
-
-def _write_digits(value: Any) -> str:
-    """Write a number of many digits so that it reads back as it was."""
-    from mpmath import mp, mpf
-
-    with mp.workdps(DIGITS):
-        return str(mp.nstr(mpf(value), DIGITS + 5))
 
 
 def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:

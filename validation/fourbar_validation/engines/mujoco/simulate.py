@@ -70,48 +70,36 @@ class MujocoSimulated:
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Run the sweep through in time; read every quantity at the crank's own angle, speed and acceleration."""
-        began = time.perf_counter()
+        began, lead = time.perf_counter(), None
         try:
-            refusal, lead = _find_refusal_of_motion(scene, command), None
-            if refusal is None and (command.bar != 2 or command.stroke is not None):
+            if scene.motion.free is not None:
+                raise LimitError("a free motion has no commanded sweep")
+            if command.speed is None or not np.any(command.speed):
+                raise LimitError(f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate through time")
+            if command.bar != 2 or command.stroke is not None:
                 lead = Lead(scene, command)
                 scene, command = lead.scene, lead.command
-            if (
-                refusal is None
-                and (refusal := _find_refusal(scene, command if lead is None else lead.of_input)) is None
-            ):
-                answer = _Simulation(self.settings, scene, command, lead).answer()
+            _require_run(scene, command if lead is None else lead.of_input)
+            answer = _Simulation(self.settings, scene, command, lead).answer()
         except (LimitError, InputError) as error:  # anything else is a failure, not a declared limit
-            refusal = str(error)
-        if refusal is not None:
-            answer = Answer(self.name, self.settings.integrator, refusal=refusal)
+            answer = Answer(self.name, self.settings.integrator, refusal=str(error))
         answer.shared, answer.own, answer.seconds = SHARED, OWN, time.perf_counter() - began
         return answer
 
 
-def _find_refusal_of_motion(scene: Scene, command: Command) -> str | None:
-    """Say why there is no motion to simulate, or None."""
-    if scene.motion.free is not None:
-        return "a free motion has no commanded sweep"
-    if command.speed is None or not np.any(command.speed):
-        return f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate through time"
-    return None
-
-
-def _find_refusal(scene: Scene, command: Command) -> str | None:
-    """Say why this motion of the input is not simulated, or None."""
+def _require_run(scene: Scene, command: Command) -> None:
+    """Raise LimitError where this motion of the input is not simulated."""
     law = scene.motion.law if command.time is not None else None
     if law is None and any(np.ptp(values) != 0.0 for values in list_speeds(command)):
-        return "omega_2 or alpha_2 differs from position to position: that is no one motion through time"
+        raise LimitError("omega_2 or alpha_2 differs from position to position: that is no one motion through time")
     if np.ptp(command.theta_2) == 0.0:
-        return "one position: nothing to run through"
+        raise LimitError("one position: nothing to run through")
     run = make_run_scene(scene, command)
-    reason = find_exceeded(run, abs(run.motion.omega_2 or 0.0))
-    if reason is not None:
-        return reason
+    if reason := find_exceeded(run, abs(run.motion.omega_2 or 0.0)):
+        raise LimitError(reason)
     if _passes_change_point(scene, command):
-        return "the sweep meets a change point, where all bars are collinear and MuJoCo's closure loses a direction"
-    return None
+        raise LimitError("the sweep meets a change point, where all bars are collinear and MuJoCo's closure loses a "
+                         "direction")  # fmt: skip
 
 
 def _passes_change_point(scene: Scene, command: Command) -> bool:
