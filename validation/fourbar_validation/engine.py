@@ -39,10 +39,10 @@ def open_engine(entry: str) -> tuple[Factory, dict[str, Any]]:
     """Return what makes an engine, and its hello; NotFoundError where there is none."""
     if ":" in entry:
         return _open_class(entry)
-    known = {engine.name: engine for engine in (*ENGINES, *load_further(), BALLS)}
-    if entry not in known:
-        raise NotFoundError(f"must be module:Class, or one of {', '.join(known)}")
-    engine = known[entry]
+    engines = {engine.name: engine for engine in (*ENGINES, *load_further(), BALLS)}
+    if entry not in engines:
+        raise NotFoundError(f"must be module:Class, or one of {', '.join(engines)}")
+    engine = engines[entry]
     if reason := engine.missing():
         raise NotFoundError(reason)
     adapter = engine.start()
@@ -77,37 +77,37 @@ def _open_class(entry: str) -> tuple[Factory, dict[str, Any]]:
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     try:
-        made = getattr(import_module(module), name)
+        served = getattr(import_module(module), name)
     except (ModuleNotFoundError, AttributeError) as error:
         if getattr(error, "name", None) in (module, module.partition(".")[0], name):
             raise NotFoundError(say_error(error)) from None
         raise
     hello: dict[str, Any] = {
-        "engine": getattr(made, "name", None),
-        "answers": getattr(made, "quantities", UNKNOWNS),
-        "commands": getattr(made, "commands", ("theta_2",)),
-        "effects": [*getattr(made, "effects", ALL_BUT_CYLINDER), *(["release"] * hasattr(made, "release"))],
-        "tolerance": getattr(made, "tolerance", "equivalence"),
-        "version": str(getattr(made, "version", "")),
+        "engine": getattr(served, "name", None),
+        "answers": getattr(served, "quantities", UNKNOWNS),
+        "commands": getattr(served, "commands", ("theta_2",)),
+        "effects": [*getattr(served, "effects", ALL_BUT_CYLINDER), *(["release"] * hasattr(served, "release"))],
+        "tolerance": getattr(served, "tolerance", "equivalence"),
+        "version": str(getattr(served, "version", "")),
         "code": hash_code(module),
-        "settings": list(getattr(made, "settings", ())),
-        "device": getattr(made, "device", ""),
-        "made_for": getattr(made, "made_for", ""),
+        "settings": list(getattr(served, "settings", ())),
+        "device": getattr(served, "device", ""),
+        "made_for": getattr(served, "made_for", ""),
     }
 
     def make(step: float | None = None, **setting: Any) -> Any:
-        return _apply_setting(made() if step is None else made(step), setting, hello["settings"])
+        return _apply_setting(served() if step is None else served(step), setting, hello["settings"])
 
     return make, hello
 
 
 def hash_code(module: str) -> str:
     """Hash of the modules imported with a class, of the others in its folder, and of what is installed."""
-    files = {getattr(each, "__file__", None) for name, each in list(sys.modules.items()) if name not in OURS}
+    files = {getattr(loaded, "__file__", None) for name, loaded in list(sys.modules.items()) if name not in OURS}
     if file := sys.modules[module].__file__:
         files |= {str(path) for path in Path(file).parent.glob("*.py")}
     present = sorted(file for file in files if file and os.path.isfile(file))  # modules made by code may name none
-    return hash_files(present, repr(sorted(f"{each.name} {each.version}" for each in distributions())))
+    return hash_files(present, repr(sorted(f"{package.name} {package.version}" for package in distributions())))
 
 
 def answer(make: Factory, question: dict[str, Any]) -> dict[str, Any]:
@@ -119,16 +119,16 @@ def answer(make: Factory, question: dict[str, Any]) -> dict[str, Any]:
         return protocol.released_to_json(make(**step).release(scene, np.array(question["times"])))
     scene, command = protocol.command_from_json(scene, question["command"])
     try:
-        made = make(**protocol.read_setting(question.get("setting")))
+        engine = make(**protocol.read_setting(question.get("setting")))
     except LimitError as limit:
         return {"refusal": str(limit)}
     if question["ask"] == "slopes":
-        return {"slopes": made.slopes(scene)} if hasattr(made, "slopes") else {"refusal": "it has no derivatives"}
-    if not hasattr(made, "answer"):
+        return {"slopes": engine.slopes(scene)} if hasattr(engine, "slopes") else {"refusal": "it has no derivatives"}
+    if not hasattr(engine, "answer"):
         return {"refusal": "it integrates released motions alone"}
-    if refusal := explain_refusal(made, command):
+    if refusal := explain_refusal(engine, command):
         return {"refusal": refusal}
-    reply = made.answer(scene, command)
+    reply = engine.answer(scene, command)
     if not isinstance(reply, Answer):
         raise TypeError(f"the answer is a {type(reply).__name__}, not a fourbar_validation.Answer")
     return protocol.answer_to_json(scene, command, reply)

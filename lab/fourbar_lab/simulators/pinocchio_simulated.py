@@ -41,11 +41,11 @@ class LoopConstrained(ClosedTree):
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
         """Accelerate the closed loop."""
-        return pin.lcaba(self.tree.model, self.data, q, v, tau, self.models, self.found, self.proximal).copy()
+        return pin.lcaba(self.tree.model, self.data, q, v, tau, self.models, self.closure_data, self.proximal).copy()
 
     def loop_force(self) -> Array:
         """F43: lcaba leaves the force on bar 4, in the axes of bar 3, whatever frame the closure was given."""
-        return np.array(-self.tree.rotation(3) @ self.found[0].contact_force.linear[:2])
+        return np.array(-self.tree.rotation(3) @ self.closure_data[0].contact_force.linear[:2])
 
 
 class Impulses:
@@ -59,7 +59,7 @@ class Impulses:
         self.model, self.data = tree.model, tree.model.createData()
         ends = [(tree.joint[bar], self.model.frames[tree.frame[f"end{bar}"]].placement) for bar in (3, 4)]
         self.closure = pin.ConstraintModel(pin.PointAnchorConstraintModel(self.model, *ends[0], *ends[1]))
-        self.models, self.found = [self.closure], [self.closure.createData()]
+        self.models, self.closure_data = [self.closure], [self.closure.createData()]
         self.cholesky: Any = None
         self.solver = getattr(pin, f"{solver}ConstraintSolver")()
         self.settings, self.result = getattr(pin, f"{solver}SolverSettings")(), getattr(pin, f"{solver}SolverResult")()
@@ -73,13 +73,13 @@ class Impulses:
         model, data, h, none = self.model, self.data, self.h, np.zeros(3)
         pin.crba(model, data, q, pin.Convention.WORLD)
         free = v + h * pin.aba(model, data, q, v, none)
-        self.closure.calc(model, data, self.found[0])
+        self.closure.calc(model, data, self.closure_data[0])
         if self.cholesky is None:
-            self.cholesky = pin.ConstraintCholeskyDecomposition(model, data, self.models, self.found)
-        self.cholesky.compute(model, data, self.models, self.found, PROXIMAL)
-        jacobian = pin.getConstraintsJacobian(model, data, self.models, self.found)
-        g = jacobian @ free + self.found[0].extract().constraint_position_error / h
-        self.solver.solve(self.cholesky.getDelassusOperatorCholeskyExpression(), g, self.models, self.found,
+            self.cholesky = pin.ConstraintCholeskyDecomposition(model, data, self.models, self.closure_data)
+        self.cholesky.compute(model, data, self.models, self.closure_data, PROXIMAL)
+        jacobian = pin.getConstraintsJacobian(model, data, self.models, self.closure_data)
+        g = jacobian @ free + self.closure_data[0].extract().constraint_position_error / h
+        self.solver.solve(self.cholesky.getDelassusOperatorCholeskyExpression(), g, self.models, self.closure_data,
                           self.settings, self.result)  # fmt: skip
         force = np.array(self.result.retrieveConstraintImpulses()) / h
         self.tree.place(q.tolist())

@@ -116,13 +116,13 @@ def _solve_newton(
         part = np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(step).max(axis=0), LONGEST_STEP))
         pending, moved = np.arange(len(moving)), np.zeros(len(moving), dtype=bool)
         for _ in range(HALVINGS):
-            at = moving[pending]
-            trial = theta[:, at] + part[pending] * step[:, pending]
-            there = look(trial, at)[3]
-            falls = there < size[at]
-            theta[:, at[falls]], size[at[falls]] = trial[:, falls], there[falls]
+            indices = moving[pending]
+            trial = theta[:, indices] + part[pending] * step[:, pending]
+            trial_size = look(trial, indices)[3]
+            falls = trial_size < size[indices]
+            theta[:, indices[falls]], size[indices[falls]] = trial[:, falls], trial_size[falls]
             moved[pending[falls]] = True
-            pending = pending[~falls & (size[at] > closed)]
+            pending = pending[~falls & (size[indices] > closed)]
             if not len(pending):
                 break
             part[pending] *= 0.5

@@ -211,11 +211,11 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     theta = {1: np.full(len(path), link.ground_angle), 2: path}
     theta |= {bar: np.unwrap(closed.theta[bar - 3][closed.assembled]) for bar in (3, 4)}
     start = begins.theta_2[on_path][0]
-    first, here = int(np.searchsorted(path, start)), np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1)
+    first, places = int(np.searchsorted(path, start)), np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1)
     for pin, _, rest, _ in springs:
         i, j = PINS[pin]
         away = theta[j] - theta[i] - rest
-        gone |= np.abs(away[here] - 2.0 * np.pi * np.floor(away[first] / (2.0 * np.pi) + 0.5)) > HALF_TURN
+        gone |= np.abs(away[places] - 2.0 * np.pi * np.floor(away[first] / (2.0 * np.pi) + 0.5)) > HALF_TURN
     return gone
 
 

@@ -63,8 +63,8 @@ class Assembler:
         # the triangle as measured is the nearest start, also where a bar is a millionth of the others
         triangle = _compute_triangle_angle(e, near, far), _compute_triangle_angle(e, far, near)
         for alpha, beta in (triangle, *START_ANGLES):
-            one, other = phi + branch * alpha, phi + math.pi - branch * beta
-            around = {2: (theta, one, other), 3: (one, theta, other), 4: (other + math.pi, one, theta)}
+            first, second = phi + branch * alpha, phi + math.pi - branch * beta
+            around = {2: (theta, first, second), 3: (first, theta, second), 4: (second + math.pi, first, theta)}
             theta_2, theta_3, theta_4 = around[bar]
             q = theta_2, math.remainder(theta_3 - theta_2, math.tau), math.remainder(theta_4, math.tau)
             assembled = close_gap(tree, q, branch, closed, bar)
@@ -107,25 +107,25 @@ def close_gap(tree: Assembled, q: Angles, branch: int, closed: float, bar: int =
             return q[0] + one, theta_3 - (q[0] + one), q[2] + turned
         return q[0] + turned, q[1] + (one - turned), q[2]
 
-    here = look(q)
-    if here[6] * branch >= 0.0:
+    state = look(q)
+    if state[6] * branch >= 0.0:
         return None
     for _ in range(NEWTON_STEPS):
-        x, y, a, b, c, d, det = here
-        one, second = (b * y - d * x) / det, (c * x - a * y) / det
+        x, y, a, b, c, d, det = state
+        first, second = (b * y - d * x) / det, (c * x - a * y) / det
         size = math.hypot(x, y)
-        part = min(1.0, LONGEST_STEP / max(abs(one), abs(second), LONGEST_STEP))
+        part = min(1.0, LONGEST_STEP / max(abs(first), abs(second), LONGEST_STEP))
         while True:
-            trial = moved(q, part * one, part * second)
-            there = look(trial)
-            if math.hypot(there[0], there[1]) < size and there[6] * branch < 0.0:
+            trial = moved(q, part * first, part * second)
+            trial_state = look(trial)
+            if math.hypot(trial_state[0], trial_state[1]) < size and trial_state[6] * branch < 0.0:
                 break
             part /= 2.0
             if size <= closed or part < SHORTEST_STEP:
                 tree.place(q)
                 return q if size <= closed else None
-        q, here = trial, there
-    return q if math.hypot(here[0], here[1]) <= closed else None
+        q, state = trial, trial_state
+    return q if math.hypot(state[0], state[1]) <= closed else None
 
 
 @dataclass(slots=True)

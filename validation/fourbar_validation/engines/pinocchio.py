@@ -130,11 +130,11 @@ class ClosedTree:
         )
         gains = pin.BaumgarteCorrectorParameters(1.0 / time_constant**2, 2.0 / time_constant)
         closure.setBaumgarteCorrectorParameters(gains)
-        self.models, self.found = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+        self.models, self.closure_data = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
         self.models.append(closure)
-        self.found.append(closure.createData())
+        self.closure_data.append(closure.createData())
         self.data = tree.model.createData()
-        pin.initConstraintDynamics(tree.model, self.data, self.models, self.found)
+        pin.initConstraintDynamics(tree.model, self.data, self.models, self.closure_data)
         self.proximal = pin.ProximalSettings(*PROXIMAL)
 
     def start(self, theta_2: float, branch: int, omega_2: float) -> tuple[Array, Array] | None:
@@ -145,11 +145,11 @@ class ClosedTree:
     def acceleration(self, q: Array, v: Array, tau: Array) -> Any:
         """Accelerate the closed loop under loads, effects and the flywheel's motor."""
         model, data = self.tree.model, self.data
-        return pin.constraintDynamics(model, data, q, v, tau, self.models, self.found, self.proximal).copy()
+        return pin.constraintDynamics(model, data, q, v, tau, self.models, self.closure_data, self.proximal).copy()
 
     def loop_force(self) -> Array:
         """F43 of the acceleration last found, (2,), N."""
-        return np.array(self.found[0].contact_force.linear[:2])
+        return np.array(self.closure_data[0].contact_force.linear[:2])
 
 
 def make_step(f: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Array]:

@@ -130,8 +130,8 @@ def _find_names(data: Any) -> tuple[str, str, str]:
         raise InputError("command", data, "must be an object")
     stated = [names for names in KINDS_OF_COMMAND if names[0] in data]
     if len(stated) != 1:
-        one = ", ".join(names[0] for names in KINDS_OF_COMMAND)
-        raise InputError("command", sorted(map(str, data)), f"must have one of {one}")
+        kinds = ", ".join(names[0] for names in KINDS_OF_COMMAND)
+        raise InputError("command", sorted(map(str, data)), f"must have one of {kinds}")
     return stated[0]
 
 

@@ -250,10 +250,10 @@ def make_nearby(engine: Engine, scene: Scene, at: Command, formulas: Solution) -
         for i in np.flatnonzero(mask & np.isfinite(formulas.sin_mu)).tolist():
             shift = shift_to(scene.linkage, float(at.theta_2[i]), float(formulas.sin_mu[i]))
             if shift is not None:
-                one = slice(i, i + 1)
-                moved = Command(at.theta_2[one], at.branch[one], omega[one], alpha[one], shift)
+                row = slice(i, i + 1)
+                moved = Command(at.theta_2[row], at.branch[row], omega[row], alpha[row], shift)
                 for name, values in adapter.answer(scene, moved).quantities.items():
-                    out[name][one] = values
+                    out[name][row] = values
         return out
 
     return answer

@@ -188,6 +188,6 @@ def solve_multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
     det = p * u + q * v + r * w
     if det == 0.0:
         raise np.linalg.LinAlgError("the torque is at a pole")
-    one = x * (e * r - f * q) + y * (f * p - d * r) + z * (d * q - e * p)
-    permanent = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
-    return np.array([one / det, permanent / det, (x * u + y * v + z * w) / det])
+    force_x = x * (e * r - f * q) + y * (f * p - d * r) + z * (d * q - e * p)
+    force_y = x * (q * c - r * b) + y * (r * a - p * c) + z * (p * b - q * a)
+    return np.array([force_x / det, force_y / det, (x * u + y * v + z * w) / det])

@@ -161,9 +161,9 @@ class _Simulation:
         self.out["theta_2"] = clip_angles(self.scene, self.out["theta_2"])
         # the command stands for the motion where nothing moved
         commanded = zip(COMMANDS[bar], (self.command.angle, *list_speeds(self.command)), strict=True)
-        made = [np.where(np.isnan(self.out[name]), x, self.out[name]) for name, x in commanded]
-        made[0] = made[0] + 2.0 * np.pi * np.round((self.command.angle - made[0]) / (2.0 * np.pi))
-        motion = Command(made[0], self.branch, made[1], made[2], bar=bar)
+        motion_made = [np.where(np.isnan(self.out[name]), x, self.out[name]) for name, x in commanded]
+        motion_made[0] = motion_made[0] + 2.0 * np.pi * np.round((self.command.angle - motion_made[0]) / (2.0 * np.pi))
+        motion = Command(motion_made[0], self.branch, motion_made[1], motion_made[2], bar=bar)
         values = {name: x for name, x in self.out.items() if bar != 2 or name not in MADE}
         setting = f"{self.settings.integrator} {self.steps_per_revolution:.0f}/rev"
         return Answer(

@@ -178,8 +178,8 @@ class TrialSetup:
                 trial.broken = "MuJoCo lost the motion: a value not finite, or too large"
                 break
             torque, pins = run.read()
-            made = {"theta_2": d.qpos[O2] - run.turns, "omega_2": d.qvel[O2], "alpha_2": d.qacc[O2]}
-            for name, value in (made | pins | {"torque": np.nan if torque is None else torque}).items():
+            motion = {"theta_2": d.qpos[O2] - run.turns, "omega_2": d.qvel[O2], "alpha_2": d.qacc[O2]}
+            for name, value in (motion | pins | {"torque": np.nan if torque is None else torque}).items():
                 out[name][row] = value
             trial.stepping += stepped - began
             trial.reading += time.process_time() - stepped
@@ -237,8 +237,8 @@ class SimulatedToError:
             growth = ratio ** (1.0 / ORDER) if np.isfinite(ratio) else MOST_GROWTH
             growth = min(max(growth, LEAST_GROWTH), MOST_GROWTH)
             # a run has at least as many steps as it has positions to read
-            made = float(answer.setting.rpartition(" ")[2].removesuffix("/rev"))  # of "RK4 628/rev"
-            steps = max(steps, made) * growth
+            steps_made = float(answer.setting.rpartition(" ")[2].removesuffix("/rev"))  # of "RK4 628/rev"
+            steps = max(steps, steps_made) * growth
             tc = min(tc * growth, LONGEST)
         answer.evidence |= {"wanted_error": self.error, "expected_error": expected}
         answer.evidence |= {"steps_with_the_search": spent, "runs": float(runs)}
