@@ -18,8 +18,8 @@ from fourbar_validation.compare.compare import Comparison, Held
 from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
-from fourbar_validation.engines.mujoco.drives import Lead
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
+from fourbar_validation.engines.mujoco.runner import Lead
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated, observe_order
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.answers import compare_answer

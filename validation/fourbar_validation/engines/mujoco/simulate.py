@@ -21,12 +21,13 @@ from fourbar_validation.engines.limits import NEAREST_TOGGLE, compute_least_sine
 from fourbar_validation.engines.loaded import Values
 from fourbar_validation.engines.loop import MADE, Assembler, make_blank
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
-from fourbar_validation.engines.mujoco.drives import Lead, Led
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, list_alarms
 from fourbar_validation.engines.mujoco.runner import (
     LIGHT_FLYWHEEL,
     ActuatorForce,
     Lawful,
+    Lead,
+    Led,
     MotionSegment,
     SimulatedRun,
     Steady,
