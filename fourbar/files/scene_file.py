@@ -6,19 +6,20 @@ Numbers are rounded once when they are read; what is written reads back bit for 
 import math
 import re
 import tomllib
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fourbar import writing
-from fourbar.effects import LinearDrive, Load, Table, list_kinds
+from fourbar.effects import Effect, Gravity, LinearDrive, Load, Spring, SpringEnd, Springs, Table, list_kinds
+from fourbar.effects.effect import PinRows
+from fourbar.effects.spring import END_POSITION, GAS
 from fourbar.errors import InputError, expect
-from fourbar.files.effects import read_effect, read_ends
 from fourbar.files.fields import BARE_KEY, Reader
 from fourbar.files.scene_text import BARS, BRANCHES, SIGMA
-from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, POSITIVE, Bar, FourBar
+from fourbar.linkage import ANY, BAR_NAMES, MOST_STEPS, PINS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, SPLINES, STROKE_COMMAND, Free, FromLimit, Law, Motion, Sweep
 from fourbar.scene.numbers import Point, Tolerance
@@ -34,6 +35,7 @@ LONGEST_LINE = 60
 """Characters shown of a line that cannot be read."""
 MOST_LOADS = 1000
 """Each load is a term at every position."""
+MOST_SPRINGS = 1000
 THROUGH = ("sign", "follow")
 TABLES = ("title", "source", "lengths", "bars", "motion", "drive", "points", "loads", "effects", "tolerances")
 MOST_POINTS = 1000
@@ -102,7 +104,7 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
     if "from" in drive or "to" in drive:
         if "bar" in drive:
             raise read.refuse("drive.bar", drive["bar"], "a drive acts on a bar or along a line: bar, or from and to")
-        line = LinearDrive(*read_ends(read, "drive", drive))
+        line = LinearDrive(*_read_ends(read, "drive", drive))
     entries = top.get("loads", [])
     if not isinstance(entries, list) or len(entries) > MOST_LOADS:
         raise read.refuse("loads", entries, f"must be written as [[loads]], at most {MOST_LOADS}")
@@ -112,7 +114,7 @@ def read_scene(read: Reader, document: dict[str, Any], folder: str) -> Scene:
         _read_motion(read, top.get("motion", {})),
         None if line else read.whole("drive.bar", drive.get("bar", 2), 2, 4),  # type: ignore[arg-type]
         tuple(_load(read, f"loads[{index}]", entry) for index, entry in enumerate(entries)),
-        tuple(read_effect(key, value, read) for key, value in effects.items()),
+        tuple(_read_effect(read, key, value) for key, value in effects.items()),
         read.text("title", top.get("title", "")),
         read.text("source", top.get("source", "")),
         _read_pictures(read, top.get("bars", {}), folder),
@@ -249,6 +251,62 @@ def _load(read: Reader, key: str, value: object) -> Load:
         frame=read.choice(f"{key}.frame", entry.get("frame", "world"), ("world", "bar")),
         table=table,
     )
+
+
+def _read_effect(read: Reader, key: str, value: object) -> Effect:
+    """Read an effect from the value under its key."""
+    kind: Any = list_kinds()[key]
+    path = f"effects.{key}"
+    if kind is Gravity:
+        return Gravity(*read.polar(path, value, kind.numbers["magnitude"].unit))
+    if kind is Springs:
+        return _read_springs(read, path, value)
+    if issubclass(kind, PinRows):
+        rows = []
+        for pin, entry in read.table(path, value, PINS).items():
+            stated = {"": entry} if "" in kind.numbers else read.table(f"{path}.{pin}", entry, kind.numbers)
+            rows.append((pin, *read.numbers(f"{path}.{pin}", stated, kind.numbers).values()))
+        return kind(tuple(rows))  # type: ignore[no-any-return]
+    bars = {field.name: field.default for field in fields(kind) if field.name == "bar"}
+    stated = read.table(path, value, (*bars, *kind.numbers))
+    bar = {
+        name: read.whole(f"{path}.{name}", stated.get(name, None if default is MISSING else default), 2, 4)
+        for name, default in bars.items()
+    }
+    return kind(**bar, **read.numbers(path, stated, kind.numbers))  # type: ignore[no-any-return]
+
+
+def _read_springs(read: Reader, key: str, value: object) -> Springs:
+    """Read springs and gas springs."""
+    if not isinstance(value, list) or not 1 <= len(value) <= MOST_SPRINGS:
+        raise read.refuse(key, value, f"must be a list of 1 to {MOST_SPRINGS} springs")
+    springs = []
+    for index, entry in enumerate(value):
+        path = f"{key}[{index}]"
+        row = read.table(path, entry, ("from", "to", *Spring.numbers, "gas"))
+        start, end = _read_ends(read, path, row)
+        if gas := "gas" in row:
+            read.table(path, entry, ("from", "to", "gas"))
+            words = read.table(f"{path}.gas", row["gas"], GAS)
+            stated = read.numbers(f"{path}.gas", {"compressed_force": words.get("extended_force"), **words}, GAS)
+        else:
+            stated = read.numbers(path, row, Spring.numbers)
+        try:
+            springs.append(Spring.gas(start, end, **stated) if gas else Spring(start, end, **stated))
+        except InputError as error:  # which knows of one spring alone
+            raise read.refuse(error.key.replace(key, path), error.value, error.allowed) from None
+    return Springs(tuple(springs))
+
+
+def _read_ends(read: Reader, key: str, row: dict[str, Any]) -> tuple[SpringEnd, SpringEnd]:
+    """Read the entries `from` and `to` of a line between two bars; an end without `at` is at the bar's first pin."""
+    ends = []
+    for name in ("from", "to"):
+        path = f"{key}.{name}"
+        entry = read.table(path, row.get(name), ("bar", "at"))
+        bar = read.whole(f"{path}.bar", entry.get("bar"), 1, 4)
+        ends.append(SpringEnd(bar, *read.declared(f"{path}.at", entry.get("at"), END_POSITION)))
+    return ends[0], ends[1]
 
 
 def _read_tolerances(read: Reader, scene: Scene, value: object) -> tuple[Tolerance, ...]:

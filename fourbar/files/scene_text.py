@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from fourbar.effects import Load
+from fourbar.effects import Effect, Gravity, Load, Springs, list_kinds
+from fourbar.effects.effect import PinRows
+from fourbar.effects.spring import END_POSITION
 from fourbar.errors import InputError, expect
-from fourbar.files.effects import write_effect, write_ends
-from fourbar.files.fields import Reader, convert_to_polar, write_numbers, write_polar, write_quantity
+from fourbar.files.fields import Reader, convert_to_polar, write_declared, write_numbers, write_polar, write_quantity
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, POSITIVE, Bar, FourBar
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, FromLimit, Law, Motion, Sweep
@@ -88,7 +89,7 @@ def describe(scene: Scene) -> dict[str, Any]:
         for name, length in zip(BAR_NAMES.values(), scene.linkage.lengths, strict=True)
     }
     lengths["ground_angle"] = write_quantity(scene.linkage.ground_angle, "rad")
-    effects = {effect.key: write_effect(effect) for effect in scene.effects}
+    effects = {effect.key: _write_effect(effect) for effect in scene.effects}
     if len(effects) != len(scene.effects):
         raise InputError(
             "effects", [effect.key for effect in scene.effects], "a scene file holds one effect of each kind"
@@ -97,7 +98,7 @@ def describe(scene: Scene) -> dict[str, Any]:
     return {
         "lengths": lengths,
         "bars": {name: entry for name, entry in bars.items() if entry},
-        "drive": {"bar": scene.drive_bar} if scene.drive is None else write_ends(scene.drive),
+        "drive": {"bar": scene.drive_bar} if scene.drive is None else _write_ends(scene.drive),
         "loads": [_load_entry(load) for load in scene.loads],
         "effects": effects,
     }
@@ -151,6 +152,33 @@ def _load_entry(load: Load) -> dict[str, Any]:
         angles = [write_quantity(angle, "rad") for angle in load.table.theta_2]
         entry["table"] = {"theta_2": angles, "factor": list(load.table.factor)}
     return entry
+
+
+def _write_effect(effect: Effect) -> Any:
+    """Write the value of an effect under its key; InputError where a scene file has no form of it."""
+    if list_kinds().get(effect.key) is not type(effect):
+        raise InputError(f"effects.{effect.key}", type(effect).__name__, "a scene file cannot state this effect")
+    if isinstance(effect, Gravity):
+        return write_polar(effect.magnitude, effect.angle, effect.numbers["magnitude"].unit)
+    if isinstance(effect, Springs):
+        return [{**_write_ends(spring), **write_numbers(spring)} for spring in effect.springs]
+    if isinstance(effect, PinRows):
+        rows = {}
+        for pin, *values in effect.rows:
+            texts = {
+                name: write_declared(x, declared)
+                for (name, declared), x in zip(effect.numbers.items(), values, strict=True)
+            }
+            rows[pin] = texts.get("", texts)
+        return rows
+    bar = {"bar": effect.bar} if hasattr(effect, "bar") else {}
+    return {**bar, **write_numbers(effect)}
+
+
+def _write_ends(line: Any) -> dict[str, Any]:
+    """Write the entries `from` and `to` of a line between two bars."""
+    ends = {"from": line.start, "to": line.end}
+    return {name: {"bar": end.bar, "at": write_declared(end[1:], END_POSITION)} for name, end in ends.items()}
 
 
 def _write_table(name: str, entries: dict[str, Any]) -> str:

@@ -27,7 +27,7 @@ JUDGED_BY = {
     "fourbar/effects/test_effects.py": "fourbar/effects: *",
     "fourbar/edit/test_session.py": "fourbar/edit: document dragging exports",
     "fourbar/edit/test_server.py": "fourbar/edit: redirect",
-    "fourbar/files/test_files.py": "fourbar/files: effects fields scene_text",
+    "fourbar/files/test_files.py": "fourbar/files: fields scene_text",
     "fourbar/formulas/test_formulas.py": "fourbar/formulas: arithmetic many_digits path",
     "fourbar/studies/test_equilibrium.py": "fourbar/studies: circuit_curve zeros; fourbar/show: studies",
     "fourbar/test_solve.py": "fourbar: linkage solution; fourbar/scene: motion; fourbar/evaluation: case",
