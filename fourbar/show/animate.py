@@ -26,9 +26,9 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.pictures import encode_picture
-from fourbar.show.acting import Symbol, list_acting
 from fourbar.show.duty import compute_energies
 from fourbar.show.plot.style import format_of, shorten_text
+from fourbar.show.plot.symbols import Symbol, list_acting
 from fourbar.show.plot.view import is_over_time, list_sweep, set_branch
 from fourbar.show.tolerances import collect_tolerances
 from fourbar.show.units import choose_unit

@@ -36,8 +36,7 @@ JUDGED_BY = {
     "fourbar/mjcf/test_mjcf.py": "fourbar/mjcf: document effects model settings",
     "fourbar/show/test_animate.py": "fourbar/show/plot: film",
     "fourbar/show/test_page.py": "fourbar/show: tolerances",
-    "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody labels linkage "
-    "studies style symbols view",
+    "fourbar/show/plot/test_plot.py": "fourbar/show/plot: curves figures freebody labels linkage studies style view",
     # a comparison is tested by engines with given answers
     "validation/run/test_judge.py": "validation/compare: answer compare effects; "
     "validation/run: answers command identities question run",

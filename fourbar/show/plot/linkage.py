@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fourbar.linkage import ENDS, MOVING_BARS
-from fourbar.show.acting import list_acting
 from fourbar.show.plot import symbols
 from fourbar.show.plot.labels import Label, Labels
 from fourbar.show.plot.style import BAR_COLOURS, INK, MUTED, OPEN, POINT, find_greatest, write_quantity
-from fourbar.show.plot.symbols import Place, draw_vectors, place_of, split_components
+from fourbar.show.plot.symbols import Place, draw_vectors, list_acting, place_of, split_components
 from fourbar.show.plot.view import View
 from fourbar.show.units import choose_unit
 from fourbar.solution import Array, Solution
