@@ -2,10 +2,7 @@
 
 import shutil
 import sys
-from collections.abc import Callable
-from functools import wraps
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import click
 
@@ -13,7 +10,7 @@ from fourbar.cli import given
 from fourbar.errors import InputError, NotAssembledError
 from fourbar.linkage import POSITIVE
 from fourbar.scene import Scene
-from fourbar.solution import DEGREES, Conversion, Solution
+from fourbar.solution import DEGREES, Conversion
 
 
 @click.command()
@@ -75,54 +72,38 @@ def new(file: Path | None, out: Path | None, lengths: tuple[str, ...], unit: str
     click.echo(f"wrote {file}; edit it, then: fourbar analyze {shown}")
 
 
-class Form(NamedTuple):
-    """Output format of `analyze`: "summary", "table", "json" or "csv", with its options."""
-
-    kind: str
-    decimal: str
-    """Decimal sign of CSV."""
-    every: int | None
-    """Show every so many positions of the table; None: as many as suit."""
-
-
-def _form_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options that choose between summary, table, JSON and CSV, of which there is one."""
-
-    @click.option("--table", is_flag=True, help="Print the positions one by one.")
-    @click.option("--every", type=click.IntRange(min=1), metavar="N", help="Print every N-th position of the table.")
-    @click.option("--all", "every", flag_value=1, help="Print every position of the table.")
-    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object in SI units.")
-    @click.option("--csv", "decimal", flag_value=".", help="Print one line per position in SI units.")
-    @click.option("--csv-comma", "decimal", flag_value=",", help="Print CSV with decimal commas and semicolons.")
-    @wraps(command)
-    def formed(table: bool, every: int | None, as_json: bool, decimal: str | None, **others: Any) -> None:
-        if as_json and decimal:
-            raise click.UsageError("--json and --csv are two forms of the output; give one of them")
-        table = table or every is not None
-        if table and (as_json or decimal):
-            raise click.UsageError("--table, --every and --all shape the table; --json and --csv hold every position")
-        out = others["out"]
-        kind = "json" if as_json else "csv" if decimal else "table" if table else "summary"
-        if kind == "summary" and given.ends_in(out, ".json"):
-            kind = "json"
-        if kind == "summary" and given.ends_in(out, ".csv"):
-            kind = "csv"
-        command(form=Form(kind, decimal or ".", every), **others)
-
-    return formed
+def _choose_form(table: bool, as_json: bool, as_csv: bool, out: Path | None) -> str:
+    """Choose between "summary", "table", "json" and "csv", by the options or by the ending of the file."""
+    if as_json and as_csv:
+        raise click.UsageError("--json and --csv are two forms of the output; give one of them")
+    if table and (as_json or as_csv):
+        raise click.UsageError("--table, --every and --all shape the table; --json and --csv hold every position")
+    if table:
+        return "table"
+    if as_json or (given.ends_in(out, ".json") and not as_csv):
+        return "json"
+    return "csv" if as_csv or given.ends_in(out, ".csv") else "summary"
 
 
 @click.command()
 @given.scene_argument
-@_form_options
+@click.option("--table", is_flag=True, help="Print the positions one by one.")
+@click.option("--every", type=click.IntRange(min=1), metavar="N", help="Print every N-th position of the table.")
+@click.option("--all", "every", flag_value=1, help="Print every position of the table.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object in SI units.")
+@click.option("--csv", "decimal", flag_value=".", help="Print one line per position in SI units.")
+@click.option("--csv-comma", "decimal", flag_value=",", help="Print CSV with decimal commas and semicolons.")
 @click.option("--degrees/--radians", default=None, help="Unit of the angles (default: degrees; rad in JSON and CSV).")
 @given.own_units_option
 @click.option("--pressure", metavar="P", help='Pressure of the cylinder, like "210 bar"; adds the bore that it needs.')
 @click.option("--sensitivity", is_flag=True, help="Rank the numbers of the scene by what the results depend on.")
 @given.text_option(*given.TABLES, ".csv")
-def analyze(
+def analyze(  # noqa: PLR0913 - one for each option
     scene: Path,
-    form: Form,
+    table: bool,
+    every: int | None,
+    as_json: bool,
+    decimal: str | None,
     degrees: bool | None,
     units: Conversion | None,
     pressure: str | None,
@@ -133,20 +114,24 @@ def analyze(
 
     A FILE that ends in .csv or .json asks for that form.
     """
+    form = _choose_form(table or every is not None, as_json, decimal is not None, out)
     if sensitivity:
-        if form.kind in ("csv", "table") or degrees or units:
+        if form in ("csv", "table") or degrees or units:
             raise click.UsageError("--sensitivity is a table, or with --json all of it, SI and rad")
-        _write_sensitivity(scene, form.kind == "json", out)
+        _print_sensitivity(scene, form == "json", out)
         return
+    from fourbar.show.block import write_block, write_motor
+    from fourbar.show.tables import print_positions
     from fourbar.show.units import units_of_file
+    from fourbar.solution import write_csv, write_json
     from fourbar.solve import find_last_stage, solve
 
     with given.open_scene(scene) as described, given.show_waiting(described):
         bore = _read_pressure(described, pressure)
         shown = dict(units or {})
-        if form.kind == "table" or (form.kind == "summary" and units is not None):
+        if form == "table" or (form == "summary" and units is not None):
             shown = {**DEGREES, **shown}
-        elif form.kind == "summary":
+        elif form == "summary":
             shown = dict(units_of_file(scene))
         if degrees:
             shown |= DEGREES
@@ -154,27 +139,23 @@ def analyze(
             shown.pop("rad", None)
         solution = solve(described, find_last_stage(described))
     if not solution.assembled.any():
-        raise NotAssembledError(
-            f"{scene}: motion.{described.motion.commanded}: the linkage assembles at none of the positions requested"
-        )
-    given.print_to(_write_solution(described, solution, form, shown, bore, out), out)
-
-
-def _write_solution(
-    scene: Scene, solution: Solution, form: Form, units: Conversion, pressure: float | None, out: Path | None
-) -> str:
-    from fourbar.show.block import write_block, write_motor
-    from fourbar.show.tables import print_positions
-    from fourbar.solution import write_csv, write_json
-
-    if form.kind == "json":
-        return write_json(solution, units, motor=write_motor(scene, solution, units))
-    if form.kind == "csv":
-        return write_csv(solution, units, form.decimal)
-    if form.kind == "table":
+        raise _assembles_nowhere(scene, described)
+    if form == "json":
+        text = write_json(solution, shown, motor=write_motor(described, solution, shown))
+    elif form == "csv":
+        text = write_csv(solution, shown, decimal or ".")
+    elif form == "table":
         width = None if out or not sys.stdout.isatty() else shutil.get_terminal_size().columns
-        return print_positions(solution, width, units, every=form.every)
-    return "\n".join([*write_block(scene, solution, units, pressure=pressure), ""])
+        text = print_positions(solution, width, shown, every=every)
+    else:
+        text = "\n".join([*write_block(described, solution, shown, pressure=bore), ""])
+    given.print_to(text, out)
+
+
+def _assembles_nowhere(path: Path, scene: Scene) -> NotAssembledError:
+    return NotAssembledError(
+        f"{path}: motion.{scene.motion.commanded}: the linkage assembles at none of the positions requested"
+    )
 
 
 def _read_pressure(scene: Scene, pressure: str | None) -> float | None:
@@ -188,16 +169,14 @@ def _read_pressure(scene: Scene, pressure: str | None) -> float | None:
     return given.read_number("--pressure", pressure, "Pa", POSITIVE)
 
 
-def _write_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
+def _print_sensitivity(scene: Path, as_json: bool, out: Path | None) -> None:
     from fourbar.show.studies import write_sensitivity, write_sensitivity_json
     from fourbar.studies.derivatives import sensitivity
 
     with given.open_scene(scene) as stated:
         derivatives = sensitivity(stated)
     if not derivatives.solution.assembled.any():
-        raise NotAssembledError(
-            f"{scene}: motion.{stated.motion.commanded}: the linkage assembles at none of the positions"
-        )
+        raise _assembles_nowhere(scene, stated)
     given.print_to((write_sensitivity_json if as_json else write_sensitivity)(derivatives), out)
 
 
@@ -221,9 +200,7 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units:
     with given.open_scene(scene) as stated, show_running("samples are solved") as progress:
         spreads = tolerances(stated, SAMPLES if samples is None else samples, seed, progress=progress)
     if (spreads.without == spreads.samples).all():
-        raise NotAssembledError(
-            f"{scene}: motion.{stated.motion.commanded}: the linkage assembles at none of the positions"
-        )
+        raise _assembles_nowhere(scene, stated)
     if out is not None:
         draw_tolerances(spreads, out, units)
     if as_json:
