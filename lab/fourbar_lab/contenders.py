@@ -18,7 +18,7 @@ from fourbar import Bar, FourBar, Gravity, Motion, Scene, vary
 from fourbar.errors import say_install
 from fourbar.quantities import UNKNOWNS, VECTORS
 from fourbar.scene import Command
-from fourbar.show.plot.style import apply_style, format_of, save
+from fourbar.show.plot.style import Drawing, apply_style
 from fourbar.solve import solve
 from fourbar.studies.function import function
 from fourbar_validation.cost.study import time_call, time_in_turns
@@ -188,7 +188,6 @@ def time_linkages(largest: int, rounds: int) -> Times:
 
 def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
     """Draw both growths on logarithmic axes into a file."""
-    kind = format_of(path)
     with apply_style():
         from matplotlib.figure import Figure
 
@@ -197,7 +196,7 @@ def draw_bench(over_positions: Times, over_linkages: Times, path: Path) -> None:
         _draw_panel(positions_axes, over_positions, "ns per position, every unknown", "positions")
         _draw_panel(linkages_axes, over_linkages, "ns per linkage, every force at one position", "linkages")
         figure.supxlabel(f"One core: {name_machine()}", size=6.8, x=0.012, ha="left", parse_math=False)
-        save(figure, path, kind)
+        Drawing(figure).save(path)
 
 
 def _draw_panel(axes: "Axes", times: Times, title: str, over: str) -> None:

@@ -15,7 +15,7 @@ from fourbar.show.block import explain_static
 from fourbar.show.plot import curves, freebody, linkage, studies
 from fourbar.show.plot.curves import draw_transmission
 from fourbar.show.plot.labels import Labels
-from fourbar.show.plot.style import CAPTION, TITLE, apply_style, format_of, render_figure, save, shorten_text
+from fourbar.show.plot.style import CAPTION, TITLE, Drawing, apply_style, format_of, shorten_text
 from fourbar.show.plot.view import View, choose_common_position, is_over_time, make_view, set_branch
 from fourbar.show.summary import locate_between
 from fourbar.solution import SI, Conversion, require_units
@@ -122,23 +122,6 @@ def _choose_painter(scene: Scene, figure: str, branches: str) -> tuple[Painter, 
     if figure == "torque" and scene.motion.free is not None:
         raise InputError("figure", figure, "a free motion has no driving torque; energy shows what moves it")
     return painter, size
-
-
-class Drawing:
-    """A figure that a notebook shows, and that `save` writes."""
-
-    def __init__(self, figure: "Figure") -> None:
-        self.figure = figure
-
-    def _repr_svg_(self) -> str:
-        with apply_style():
-            return render_figure(self.figure, "svg").decode("utf-8")
-
-    def save(self, path: str | Path) -> None:
-        """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
-        with apply_style():
-            kind = format_of(path)
-            save(self.figure, Path(path), kind)
 
 
 def draw_figure(

@@ -15,10 +15,10 @@ from fourbar.show.plot.style import (
     FORCE_COLOURS,
     INK,
     TITLE,
+    Drawing,
     apply_style,
     find_greatest,
     format_of,
-    save,
     set_degree_ticks,
     shorten_text,
 )
@@ -55,8 +55,7 @@ def draw_tolerances(spreads: Tolerances, path: str | Path, units: Conversion = S
     Raises InputError for another ending than of svg, png, pdf, or a single position; DependencyError without
     matplotlib.
     """
-    target = Path(path)
-    kind = format_of(target)
+    format_of(path)
     if len(spreads.theta_2) < 2:
         raise InputError(f"motion.{spreads.scene.motion.commanded}", "one position", "a picture of bands needs a sweep")
     with apply_style():
@@ -79,7 +78,7 @@ def draw_tolerances(spreads: Tolerances, path: str | Path, units: Conversion = S
         )
         lines = [caption, *(line for part in parts if (line := describe_parted(spreads, part)))]
         figure.supxlabel("\n".join(textwrap.fill(line, 52 * columns) for line in lines), **CAPTION)
-        save(figure, target, kind)
+        Drawing(figure).save(path)
 
 
 def _list_positions(axes: "Axes", spreads: Tolerances, units: Conversion) -> Any:

@@ -86,21 +86,32 @@ def format_of(path: str | Path, formats: tuple[str, ...] = FORMATS) -> str:
     return kind
 
 
-def save(figure: "Figure", path: Path, file_format: str) -> None:
-    """Write a figure whole or not at all."""
-    write_bytes(path, render_figure(figure, file_format))
+METADATA: dict[str, dict[str, Any]] = {
+    "svg": {"Date": None, "Creator": "fourbar"},
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": "fourbar"},
+    "png": {"Software": "fourbar"},
+}
+"""Without a date: the same scene gives the same bytes."""
 
 
-def render_figure(figure: "Figure", file_format: str) -> bytes:
-    """Write a figure as SVG, PNG or PDF, without a date in it."""
-    metadata: dict[str, dict[str, Any]] = {
-        "svg": {"Date": None, "Creator": "fourbar"},
-        "pdf": {"CreationDate": None, "Producer": None, "Creator": "fourbar"},
-        "png": {"Software": "fourbar"},
-    }
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=file_format, dpi=DPI, metadata=metadata[file_format])
-    return buffer.getvalue()
+class Drawing:
+    """A figure that a notebook shows, and that `save` writes."""
+
+    def __init__(self, figure: "Figure") -> None:
+        self.figure = figure
+
+    def _repr_svg_(self) -> str:
+        return self._render("svg").decode("utf-8")
+
+    def save(self, path: str | Path) -> None:
+        """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
+        write_bytes(Path(path), self._render(format_of(path)))
+
+    def _render(self, file_format: str) -> bytes:
+        buffer = io.BytesIO()
+        with apply_style():
+            self.figure.savefig(buffer, format=file_format, dpi=DPI, metadata=METADATA[file_format])
+        return buffer.getvalue()
 
 
 def shorten_text(text: str, width: int) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.show.plot.labels import Label, Labels
-from fourbar.show.plot.style import apply_style, save
+from fourbar.show.plot.style import Drawing, apply_style
 from fourbar_validation.advise.worst_errors import QUANTITIES
 from fourbar_validation.cost.laws import TOO_LARGE, find_jumps, find_pareto
 from fourbar_validation.cost.study import EXACT, FORMULAS, STEPPED, CostPoint
@@ -62,7 +62,7 @@ def draw(curves: Mapping[str, Sequence[CostPoint]], title: str, folder: Path) ->
         for name, figure in made.items():
             for kind in ("svg", "png"):
                 written.append(folder / f"{name}.{kind}")
-                save(figure, written[-1], kind)
+                Drawing(figure).save(written[-1])
     return written
 
 
