@@ -2,10 +2,9 @@
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from itertools import cycle
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,7 +33,7 @@ from fourbar.show.plot.style import (
 )
 from fourbar.show.plot.view import View, collect_point_vectors
 from fourbar.show.units import choose_unit
-from fourbar.solution import Array, Solution
+from fourbar.solution import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -202,12 +201,10 @@ draw_speeds = partial(_draw_points, letter="v", unit="m/s", title="Speeds of poi
 draw_point_accelerations = partial(_draw_points, letter="a", unit="m/s^2", title="Accelerations of points")
 
 
-def _draw_drive(
-    axes: "Axes", view: View, read: Callable[[Solution], Array], letter: str, unit: str, title: str
-) -> None:
+def _draw_drive(axes: "Axes", view: View, name: str, letter: str, unit: str, what: str) -> None:
     """Draw a quantity of the drive, with its poles."""
     over, bar, poles = draw_axes(axes, view), view.scene.drive_bar, find_poles(view)
-    values, everywhere = read(view.sweep), [read(branch.sweep) for branch in view.alike]
+    values, everywhere = getattr(view.sweep, name), [getattr(branch.sweep, name) for branch in view.alike]
     limit = choose_limit(everywhere)
     factor, shown_unit = choose_unit(limit or find_greatest(*everywhere), unit, view.units)
     symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
@@ -218,23 +215,18 @@ def _draw_drive(
         poles_of = f"torque on bar {bar} ({POLE_REASON[bar]})" if bar else "drive's force (its line has no lever)"
         note(view, f"Dotted: poles of the {poles_of}.")
     axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
-    axes.set(ylabel=f"{symbol} ({shown_unit})", title=title)
-    clip(axes, view, {f"{letter}{'₂₃₄'[bar - 2]}" if bar else letter: values}, limit, title.split(maxsplit=1)[0], unit)
+    axes.set(ylabel=f"{symbol} ({shown_unit})", title=f"{what} of the drive{f' on bar {bar}' if bar else ''}")
+    clip(axes, view, {f"{letter}{'₂₃₄'[bar - 2]}" if bar else letter: values}, limit, what, unit)
 
 
 def draw_drive(axes: "Axes", view: View) -> None:
     """Draw the torque or force of the drive."""
-    drive, bar = read_drive(view.sweep), view.scene.drive_bar
-    title = f"Torque of the drive on bar {bar}" if bar else "Force of the drive"
-    _draw_drive(axes, view, attrgetter(drive.keys.value), drive.symbol[0], drive.unit, title)
+    drive = read_drive(view.sweep)
+    what = "Torque" if view.scene.drive is None else "Force"
+    _draw_drive(axes, view, drive.keys.value, drive.symbol[0], drive.unit, what)
 
 
-def draw_power(axes: "Axes", view: View) -> None:
-    """Draw the power of the drive."""
-    bar = view.scene.drive_bar
-    _draw_drive(
-        axes, view, attrgetter("power"), "P", "W", f"Power of the drive on bar {bar}" if bar else "Power of the drive"
-    )
+draw_power = partial(_draw_drive, name="power", letter="P", unit="W", what="Power")
 
 
 def draw_stroke(axes: "Axes", view: View) -> None:
@@ -373,7 +365,8 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     top = limit or 1.08 * find_greatest(*everywhere) or 1.0
     factor, unit = choose_unit(top, "N", view.units)
     poles = find_poles(view)
-    over, every, apart = _describe_spacing(view)
+    over = view.axis.values
+    every, apart = _choose_spacing(view)
     marks = np.unique(np.round((over - over[0]) / every).astype(int))
     dots = [int(np.argmin(np.abs(over - over[0] - every * k))) for k in marks]
     # drawn as a polyline in x, y: unwrapped angles keep matplotlib from going round by the longer arc
@@ -400,15 +393,15 @@ def draw_hodograph(axes: "PolarAxes", view: View, name: str) -> None:
     note(view, f"Hodographs: open dot at the start, dots every {apart}; angles are directions in the x-y plane.")
 
 
-def _describe_spacing(view: View) -> tuple[Array, float, str]:
-    """Say what the dots are evenly spaced in, by how much, and that in words."""
+def _choose_spacing(view: View) -> tuple[float, str]:
+    """Choose the distance of the dots along the axis, in its unit, and say it in words."""
     axis = view.axis
     if axis.unit == "°":
-        return axis.values, EVERY, f"{EVERY:g}° of {axis.symbol}"
+        return EVERY, f"{EVERY:g}° of {axis.symbol}"
     duration = float(axis.values[-1] - axis.values[0]) or 1.0
     step = 10.0 ** math.floor(math.log10(duration))
     every = next(share * step for share in (0.1, 0.2, 0.5, 1.0) if duration <= MOST_DOTS * share * step)
-    return axis.values, every, f"{every:g}{axis.unit}"
+    return every, f"{every:g}{axis.unit}"
 
 
 def _find_free_direction(directions: Array) -> float:
