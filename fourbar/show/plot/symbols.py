@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from fourbar.effects import Flywheel, Gravity, LinearDrive, Spring, Springs
 from fourbar.effects.effect import PinRows
 from fourbar.linkage import FIRST_PIN, FourBar
 from fourbar.scene import Scene
@@ -83,8 +84,7 @@ def list_acting(scene: Scene) -> list[Symbol]:
     """List everything that acts, the drive first; nothing that has no size."""
     symbols = []
     if scene.drive is not None and scene.motion.free is None:
-        (bar, *start), (bar_2, *end) = scene.drive.start, scene.drive.end
-        symbols.append(Symbol("cylinder", "F", bar, cmath.rect(*start), end=(bar_2, cmath.rect(*end))))
+        symbols.append(_join_ends("cylinder", "F", scene.drive))
     elif scene.motion.free is None:
         symbols.append(Symbol("drive", f"T{scene.drive_bar}", scene.drive_bar, pin=FIRST_PIN[scene.drive_bar]))
     for number, load in enumerate(scene.loads, 1):
@@ -95,24 +95,21 @@ def list_acting(scene: Scene) -> list[Symbol]:
         if load.moment != 0.0:
             symbols.append(Symbol("moment", f"load {number}", load.bar, foot, moment=load.moment, table=load.table))
     for effect in scene.effects:
-        symbols += _list_symbols(effect)
+        if isinstance(effect, PinRows):
+            symbols += [Symbol(effect.key, effect.key.replace("_", " "), pin=pin) for pin, *_ in effect.rows]
+        elif isinstance(effect, Gravity):
+            symbols.append(Symbol("gravity", "g", vector=complex(*effect.vector)))
+        elif isinstance(effect, Flywheel):
+            symbols.append(Symbol("flywheel", "flywheel", effect.bar, pin=FIRST_PIN[effect.bar]))
+        elif isinstance(effect, Springs):
+            symbols += [_join_ends("spring", "spring", spring) for spring in effect.springs]
     return symbols
 
 
-def _list_symbols(effect: Any) -> list[Symbol]:
-    """List the symbols of one effect; none of a kind without one."""
-    if isinstance(effect, PinRows):
-        return [Symbol(effect.key, effect.key.replace("_", " "), pin=pin) for pin, *_ in effect.rows]
-    if effect.key == "gravity":
-        return [Symbol("gravity", "g", vector=complex(*effect.vector))]
-    if effect.key == "flywheel":
-        return [Symbol("flywheel", "flywheel", effect.bar, pin=FIRST_PIN[effect.bar])]
-    if effect.key == "springs":
-        return [
-            Symbol("spring", "spring", s.start.bar, cmath.rect(*s.start[1:]), end=(s.end.bar, cmath.rect(*s.end[1:])))
-            for s in effect.springs
-        ]
-    return []
+def _join_ends(kind: str, name: str, line: LinearDrive | Spring) -> Symbol:
+    """Make the symbol of a line between two points."""
+    (bar, *start), (bar_2, *end) = line.start, line.end
+    return Symbol(kind, name, bar, cmath.rect(*start), end=(bar_2, cmath.rect(*end)))
 
 
 class Place(NamedTuple):
