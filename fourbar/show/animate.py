@@ -66,7 +66,11 @@ def collect_page_data(
         columns |= {name: null_nan(column) for name, column in columns.items() if isinstance(column, np.ndarray)}
     encoded = {str(number): picture for number, picture in _encode_pictures(scene, pictures).items()}
     spreads = collect_tolerances(scene, data["over"]["values"] or data["theta_2"]) if scene.tolerances else None
-    return data | {"pictures": encoded, "tolerances": spreads, "toml": _write_scene_file(scene)}
+    try:
+        text = dump(scene)
+    except InputError:  # a file has no form of what acts
+        text = None
+    return data | {"pictures": encoded, "tolerances": spreads, "toml": text}
 
 
 def collect_live_data(
@@ -125,14 +129,6 @@ def _write_symbol(symbol: Symbol, theta_2: list[float]) -> dict[str, Any]:
     table = entry.pop("table")
     entry["factor"] = None if table is None else np.asarray(table.at(theta_2)).tolist()
     return entry
-
-
-def _write_scene_file(scene: Scene) -> str | None:
-    """Write the scene as its file, to be downloaded; None where a file has no form of what acts."""
-    try:
-        return dump(scene)
-    except InputError:
-        return None
 
 
 def _collect_sweep(scene: Scene, signs: tuple[int, ...], stage: str | None) -> dict[str, Any]:

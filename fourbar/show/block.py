@@ -364,11 +364,10 @@ def explain_static(scene: Scene) -> str:
 
 def write_motor(scene: Scene, solution: Solution, units: Conversion) -> dict[str, Any] | None:
     """Write the duty and the loads of the pins as the JSON has them, in the units of the output; as `motor_duty`."""
-    if motor_duty(solution) is None:
-        return None
     between = locate_between(scene, solution)
     duty = motor_duty(solution, between.drive)
-    assert duty is not None
+    if duty is None:
+        return None
     si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
     shown = {name: find_unit_in(unit, units) for name, unit in si.items()}
     numbers = {name: getattr(duty, name) for name in si}

@@ -220,17 +220,16 @@ class Driving(NamedTuple):
     keys: DriveNames
     """Names of its torque or force among the quantities."""
     speed_key: str
-    speed: Array | None
-    """rad/s of the driven bar, or m/s of the stroke."""
+    """Name of the speed of the driven bar, or of the stroke."""
 
 
 def read_drive(solution: Solution) -> Driving:
-    """Return torque or force of the drive, with its error bar and speed."""
+    """Return torque or force of the drive, with its error bar."""
     names, symbol, word, speed = COUPLE, f"T{solution.drive_bar}", "torque", f"omega_{solution.drive_bar}"
     if solution.drive is not None:
         names, symbol, word, speed = LINE, "F", "drive force", "stroke_speed"
     values, error = (getattr(solution, name) for name in names[:2])
-    return Driving(word, symbol, UNITS[names.value], values, error, names, speed, getattr(solution, speed))
+    return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
 
 
 def describe_drive(scene: Scene) -> str:

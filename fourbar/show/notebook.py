@@ -64,8 +64,6 @@ def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
     if solution.theta_2.ndim == 2:
         return f"<div><b>{escape(solution.title or 'Study')}</b>: {describe_extent(solution.theta_2)}</div>"
     cells = list_columns(solution, units)
-    if (solution.status_code != 0).any():
-        cells = {"status": [status.replace("_", " ") for status in solution.status], **cells}
     count = len(solution)
     places = list(range(count)) if count <= 2 * SHOWN else [*range(SHOWN), *range(count - SHOWN, count)]
     head = "".join(f"<th>{escape(name.strip()).replace(chr(10), '<br>')}</th>" for name in cells)

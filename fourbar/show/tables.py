@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fourbar.errors import clean_line
-from fourbar.quantities import ANGLES, PIN_FORCES, UNITS
+from fourbar.quantities import ANGLES, OK, PIN_FORCES, UNITS
 from fourbar.show.duty import read_drive
 from fourbar.solution import DEGREES, Array, Conversion, Solution, find_unit, find_unit_in
 
@@ -97,8 +97,10 @@ def write_value(number: float, unit: str, units: Conversion) -> str:
 
 
 def list_columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, list[str]]:
-    """List the columns of the table, most wanted first: heading with unit -> cells."""
+    """List the columns of the table, most wanted first, a status only if one is not ok: heading with unit -> cells."""
     shown: dict[str, list[str]] = {}
+    if (solution.status_code != OK).any():
+        shown["status\n"] = [status.replace("_", " ") for status in solution.status]
 
     def add(name: str, unit: str, values: Array | None) -> None:
         assert values is not None
@@ -117,8 +119,8 @@ def list_columns(solution: Solution, units: Conversion = DEGREES) -> dict[str, l
             add(f"|{name}|", "N", np.hypot(*getattr(solution, name).T))
     moving = {"": solution.points, "v_": solution.velocity, "a_": solution.acceleration}
     for name, vector in ((start + name, v) for start, arrays in moving.items() for name, v in arrays.items()):
-        for axis, letter in enumerate("xy"):
-            add(f"{name}_{letter}", find_unit(name), vector[:, axis])
+        add(f"{name}_x", find_unit(name), vector[:, 0])
+        add(f"{name}_y", find_unit(name), vector[:, 1])
     for name in ANGLES:
         add(name, "rad", getattr(solution, name))
     sought = [bar for bar in "234" if bar != solution.commanded[-1]]
@@ -139,8 +141,6 @@ def make_table(
     Every so many positions are shown, the last one always.
     """
     cells = list_columns(solution, units)
-    if (solution.status_code != 0).any():
-        cells = {"status\n": [status.replace("_", " ") for status in solution.status], **cells}
     needed = -GAP
     kept: list[str] = []
     for name, column in cells.items():
