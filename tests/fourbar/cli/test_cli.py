@@ -422,10 +422,10 @@ def test_plot_and_animate_write_what_their_ending_says(tmp_path: Path, run: Four
 def test_what_goes_wrong_is_one_line_and_a_status(
     error: BaseException, code: int, run: Fourbar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    def broken(_: object, stage: str) -> None:
+    def broken(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr(import_module("fourbar.solve"), "solve", broken)
+    monkeypatch.setattr(Case, "of", broken)
     monkeypatch.delenv("FOURBAR_TRACEBACK", raising=False)
     found, out, err = run("analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out")
     # after an interrupt click ends the line that the terminal has started with ^C
