@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fourbar.cli import given
-from fourbar.cli.given import FILE
 from fourbar.errors import DependencyError, InputError, say_install
-from fourbar.scene import Scene
 from fourbar.solution import Conversion
 
 if TYPE_CHECKING:
@@ -119,19 +117,15 @@ def mjcf(
     if scene is not None and omega is not None:
         raise click.UsageError("--omega goes with --lengths; a scene states its own omega_2")
 
-    def put(described: Scene) -> None:
-        given.print_to(writer.write_mjcf_for(described, simulator, drive), out)
-
-    if lengths is None:
-        assert scene is not None
+    if scene is not None:
         with given.open_scene(scene) as described:
-            put(described)
-        return
-    speed = {} if omega is None else {"omega": given.read_number("--omega", omega, "rad/s")}
-    made = writer.make_scene(*given.read_lengths(lengths), **speed)
-    put(made)
-    for line in writer.list_defaults(made):
-        click.echo(line)
+            given.print_to(writer.write_mjcf_for(described, simulator, drive), out)
+    elif lengths is not None:
+        speed = {} if omega is None else {"omega": given.read_number("--omega", omega, "rad/s")}
+        made = writer.make_scene(*given.read_lengths(lengths), **speed)
+        given.print_to(writer.write_mjcf_for(made, simulator, drive), out)
+        for line in writer.list_defaults(made):
+            click.echo(line)
 
 
 @click.command()
@@ -167,9 +161,11 @@ def usd(scene: Path, without_loads: bool, out: Path) -> None:
 
 
 @click.command()
-@click.argument("scene", type=FILE, required=False)
+@click.argument("scene", type=given.FILE, required=False)
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of this machine (default: any free one).")
-@click.option("--exports", type=FILE, metavar="FOLDER", help="Folder of exports and reports (default: SCENE_exports).")
+@click.option(
+    "--exports", type=given.FILE, metavar="FOLDER", help="Folder of exports and reports (default: SCENE_exports)."
+)
 @click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
 def edit(scene: Path | None, port: int, exports: Path | None, no_browser: bool) -> None:
     """Edit a scene in the browser while torque and forces follow; without SCENE a new one.

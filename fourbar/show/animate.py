@@ -27,6 +27,7 @@ from fourbar.quantities import ANGLES, OK, PIN_FORCES
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.pictures import encode_picture
 from fourbar.show.duty import compute_energies
+from fourbar.show.plot.film import write_film
 from fourbar.show.plot.style import format_of, shorten_text
 from fourbar.show.plot.symbols import Symbol, list_acting
 from fourbar.show.plot.view import is_over_time, list_sweep, set_branch
@@ -288,8 +289,6 @@ def write(
         return
     if pictures:
         raise InputError("picture", sorted(pictures), "pictures are shown in an .html page only")
-    from fourbar.show.plot.film import write_film
-
     write_film(scene, target, kind, seconds, units, moving=vectors)
 
 

@@ -4,9 +4,14 @@ from base64 import b64encode
 from html import escape
 
 from fourbar.errors import FourBarError, expect
+from fourbar.formulas.mobility import classify
 from fourbar.linkage import BAR_NAMES
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES
+from fourbar.show.duty import describe_drive
+from fourbar.show.plot import draw_figure
+from fourbar.show.tables import list_columns, write_value
+from fourbar.show.units import units as read_units
 from fourbar.solution import DEGREES, SI, Conversion, Solution
 from fourbar.writing import describe_extent
 
@@ -16,8 +21,6 @@ SHOWN = 5
 
 def show_scene(scene: Scene, units: Conversion = SI) -> str:
     """Draw the linkage as `scene.plot("linkage")` does, next to what the scene states."""
-    from fourbar.show.plot import draw_figure
-
     try:
         drawn = b64encode(draw_figure(scene, "linkage", units=units)._repr_svg_().encode()).decode()
         picture = f'<img alt="The linkage" style="width:100%" src="data:image/svg+xml;base64,{drawn}">'
@@ -35,10 +38,6 @@ def show_scene(scene: Scene, units: Conversion = SI) -> str:
 
 
 def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
-    from fourbar.formulas.mobility import classify
-    from fourbar.show.duty import describe_drive
-    from fourbar.show.tables import write_value
-
     motion = scene.motion
     facts = [("type", classify(scene.linkage).name)]
     masses = (0.0, *(bar.mass for bar in scene.linkage.moving))
@@ -59,8 +58,6 @@ def _list_facts(scene: Scene, units: Conversion) -> list[tuple[str, str]]:
 
 def show_solution(solution: Solution, units: Conversion = DEGREES) -> str:
     """Show the first and last positions as a table; angles in degrees by default."""
-    from fourbar.show.tables import list_columns
-
     if solution.theta_2.ndim == 2:
         return f"<div><b>{escape(solution.title or 'Study')}</b>: {describe_extent(solution.theta_2)}</div>"
     cells = list_columns(solution, units)
@@ -83,11 +80,8 @@ class InUnits:
     """A scene or a solution that a notebook shows in other units."""
 
     def __init__(self, shown: Scene | Solution, units: str) -> None:
-        from fourbar.show.units import units as units_of
-
         expect("shown", shown, Scene, Solution)
-
-        self.shown, self.units = shown, units_of(units)
+        self.shown, self.units = shown, read_units(units)
 
     def _repr_html_(self) -> str:
         if isinstance(self.shown, Solution):

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -32,9 +31,6 @@ from fourbar.studies.enclosure import PROVEN, Extremes
 from fourbar.studies.equilibrium import Equilibria, Equilibrium
 from fourbar.writing import write_object
 
-if TYPE_CHECKING:
-    from rich.table import Table
-
 
 def write_type(linkage: FourBar, units: Conversion | None = COMMON, *, everything: bool = False) -> Iterator[str]:
     """Write the type of a linkage, the condition that decides it, what turns, how far, and between which limits.
@@ -44,19 +40,16 @@ def write_type(linkage: FourBar, units: Conversion | None = COMMON, *, everythin
     mobility = classify(linkage)
     relation = "<" if mobility.surplus > 0.0 else ">" if mobility.surplus < 0.0 else "="
     outer = min(linkage.lengths) + max(linkage.lengths)
-    write = partial(_write_length, linkage=linkage, units=units)
+    factor, unit = (1.0, "") if units is None else choose_unit(max(linkage.lengths), "m", units)
+
+    def write(length: float) -> str:
+        return f"{factor * length:.6g} {unit}".rstrip()
+
     yield mobility.name
     yield f"s + l = {write(outer)} {relation} p + q = {write(sum(linkage.lengths) - outer)}"
     yield "bars that turn fully: " + (", ".join(BAR_NAMES[number] for number in mobility.turning) or "none")
     if mobility.barker is not None:  # a structure does not move
         yield from _write_mobility(linkage, write, everything)
-
-
-def _write_length(length: float, linkage: FourBar, units: Conversion | None) -> str:
-    if units is None:
-        return f"{length:.6g}"
-    factor, name = choose_unit(max(linkage.lengths), "m", units)
-    return f"{factor * length:.6g} {name}"
 
 
 def write_type_json(linkage: FourBar) -> str:
@@ -145,18 +138,14 @@ def find_largest(derivatives: Sensitivity, quantity: str) -> float:
 
 def write_sensitivity(derivatives: Sensitivity) -> str:
     """Write the table of the numbers that matter most, below what each quantity depends on most."""
-    return write_table(derivatives.solution.title, _say_influences(derivatives), _make_influence_table(derivatives))
-
-
-def _say_influences(derivatives: Sensitivity) -> list[str]:
-    """Write the lines above the table."""
+    names = list_shown(derivatives)
+    influences = {name: derivatives.influences(name) for name in names}
     lines = [
         "largest change over the positions by 1 % of a number, of an angle by 1 deg; pin forces by their magnitude"
     ]
-    for name in list_shown(derivatives):
-        influences = derivatives.influences(name)
-        angles = [row for row in influences if derivatives.keys[row.key].unit == "rad"]
-        most = [rows[0] for rows in ([row for row in influences if row not in angles], angles) if rows]
+    for name in names:
+        angles = [row for row in influences[name] if derivatives.keys[row.key].unit == "rad"]
+        most = [rows[0] for rows in ([row for row in influences[name] if row not in angles], angles) if rows]
         if most:
             parts = [f"{row.key} (at theta_2 = {math.degrees(row.theta_2):.6g} deg)" for row in most]
             lines.append(f"{name} depends most on " + ", of the angles on ".join(parts))
@@ -164,16 +153,12 @@ def _say_influences(derivatives: Sensitivity) -> list[str]:
     if without:
         counts = ", ".join(f"{without.count(word)} {word.replace('_', ' ')}" for word in dict.fromkeys(without))
         lines.append(f"positions without all derivatives: {counts}")
-    return lines
-
-
-def _make_influence_table(derivatives: Sensitivity) -> "Table":
-    """List a row for each number that matters, those first that change any quantity most against its largest value."""
-    names = list_shown(derivatives)
-    by = {name: {row.key: row.change for row in derivatives.influences(name)} for name in names}
+    changes = {name: {row.key: row.change for row in influences[name]} for name in names}
     rows = [["largest value", *(f"{find_largest(derivatives, name):.4g}" for name in names)]]
-    rows += [[key, *(f"{by[name].get(key, 0.0):.3g}" for name in names)] for key in rank_numbers(derivatives, names)]
-    return make_plain_table(["", *(f"{name}\n{find_unit(name)}" for name in names)], rows, left=("",))
+    for key in rank_numbers(derivatives, names):
+        rows.append([key, *(f"{changes[name].get(key, 0.0):.3g}" for name in names)])
+    table = make_plain_table(["", *(f"{name}\n{find_unit(name)}" for name in names)], rows, left=("",))
+    return write_table(derivatives.solution.title, lines, table)
 
 
 def rank_numbers(derivatives: Sensitivity, names: list[str]) -> list[str]:
@@ -207,14 +192,9 @@ EXTREMES_SCHEMA = "fourbar-extremes/1"
 
 def write_extremes(scene: Scene, proof: Extremes, units: Conversion) -> str:
     """Write each enclosure with its angle, below what it holds over."""
-    return write_table(scene.title, _say_proof(scene, proof, units), _make_extremes_table(proof, units))
-
-
-def _say_proof(scene: Scene, proof: Extremes, units: Conversion) -> list[str]:
-    """Write the lines above the table."""
-    unit, factor = find_unit_in("rad", units)
-    parts = " and ".join(f"{low * factor:.6g} to {high * factor:.6g}" for low, high in proof.parts)
-    lines = [f"guaranteed over theta_2 = {parts} {unit}, by interval arithmetic in {proof.boxes} pieces of it"]
+    angle_unit, of_angle = find_unit_in("rad", units)
+    parts = " and ".join(f"{low * of_angle:.6g} to {high * of_angle:.6g}" for low, high in proof.parts)
+    lines = [f"guaranteed over theta_2 = {parts} {angle_unit}, by interval arithmetic in {proof.boxes} pieces of it"]
     if proof.distance:
         lines.append(
             f"left out: theta_2 within {write_value(proof.distance, 'rad', units)} "
@@ -231,12 +211,7 @@ def _say_proof(scene: Scene, proof: Extremes, units: Conversion) -> list[str]:
             " none goes beyond the outer number, the inner number is that of a linkage that was tried; over-estimate: "
             "how many times as far from the nominal extreme the outer number lies as the inner one"
         )
-    return lines
-
-
-def _make_extremes_table(proof: Extremes, units: Conversion) -> "Table":
-    """Make two rows for each quantity."""
-    rows, (angle_unit, of_angle) = [], find_unit_in("rad", units)
+    rows = []
     for name in proof.least:
         unit, factor = find_unit_in("rad" if name == "transmission" else find_unit(name.strip("|")), units)
         for word, sign, extreme in (("least", -1, proof.least[name]), ("greatest", 1, proof.greatest[name])):
@@ -246,7 +221,7 @@ def _make_extremes_table(proof: Extremes, units: Conversion) -> "Table":
                 over = proof.over_estimate(name, sign)
                 rows[-1].append("-" if over is None else f"{over:.3g} times")
     heads = ("", "unit", "", "from", "to", f"theta_2 ({angle_unit})", *(["over-estimate"] if proof.nominal else []))
-    return make_plain_table(heads, rows, left=("", "unit", "over-estimate"))
+    return write_table(scene.title, lines, make_plain_table(heads, rows, left=("", "unit", "over-estimate")))
 
 
 def write_extremes_json(scene: Scene, proof: Extremes) -> str:
