@@ -9,7 +9,7 @@ import secrets
 import tomllib
 from collections.abc import Callable
 from functools import cache
-from itertools import product
+from itertools import chain, pairwise, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,7 +29,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, require_steps
 from fourbar.scene.stroke import SIDES
 from fourbar.show.units import suit_units, units
-from fourbar.solution import Conversion
+from fourbar.solution import Conversion, Solution
 from fourbar.solve import solve
 from fourbar.studies.keys import list_entries, read_place
 from fourbar.writing import read_bytes, write_bytes
@@ -99,8 +99,7 @@ class Session:
             self.texts, self.place = [str(text) for text in state["texts"]], int(state["place"])
             self.kept = {str(name): str(text) for name, text in state["kept"].items()}
             self.reference, self.unit_names, self.disk = str(state["reference"]), str(state["units"]), state["disk"]
-            if self.unit_names != AS_THE_FILE:
-                _read_units(self.unit_names)
+            _require_units(self.unit_names)
             self.pressure_text = _read_pressure(state.get("pressure", ""))
             if self.place < 0 or self.reference not in self.kept:
                 raise ValueError("it names a state that it does not hold")
@@ -120,13 +119,8 @@ class Session:
     def keep(self) -> None:
         """Write the state file, readable by its owner alone as the scene may be."""
         state = {
-            **{"schema": SCHEMA, "disk": self.disk, "texts": self.texts, "place": self.place},
-            **{
-                "kept": self.kept,
-                "reference": self.reference,
-                "units": self.unit_names,
-                "pressure": self.pressure_text,
-            },
+            **{"schema": SCHEMA, "disk": self.disk, "texts": self.texts, "place": self.place, "kept": self.kept},
+            **{"reference": self.reference, "units": self.unit_names, "pressure": self.pressure_text},
         }
         write_bytes(self.state_file, json.dumps(state, ensure_ascii=False).encode(), private=True)
 
@@ -222,10 +216,7 @@ class Session:
         if not goes_on:
             self.base = self.now
         alter(self.document)
-        self._step_through_history(self.read(self.document.text()), goes_on)
-        self.gesture = gesture
-
-    def _step_through_history(self, now: SceneState, goes_on: bool) -> None:
+        now = self.read(self.document.text())
         if goes_on:
             self.texts = [*self.texts[: self.place], now.text]
         elif now.text != self.now.text:
@@ -233,10 +224,18 @@ class Session:
             self.place += 1
         while len(self.texts) > MOST_STATES or sum(map(len, self.texts)) > MOST_CHARACTERS:
             self.texts, self.place = self.texts[1:], self.place - 1
-        self.now = now
+        self.now, self.gesture = now, gesture
+        if not gesture:  # what was put in then stands as in a file; for each step of a gesture this is too slow
+            self.document = SceneDocument(now.text)
 
 
 _read_units, _suit_units = cache(units), cache(suit_units)
+
+
+def _require_units(name: str) -> None:
+    """Raise InputError for units that cannot be read."""
+    if name != AS_THE_FILE:
+        _read_units(name)
 
 
 def _hash_text(data: bytes) -> str:
@@ -253,26 +252,19 @@ def _add(session: Session, asked: dict[str, Any]) -> None:
             size = abs(float(read_place(session.now.scene, entries[name].place) or 1.0)) / 1000.0
             value = f"{size:.1g} {entries[name].unit}"
     session.change(lambda document: document.put(path, value))
-    session.document = SceneDocument(session.now.text)
-
-
-def _remove(session: Session, asked: dict[str, Any]) -> None:
-    session.change(lambda document: document.remove(asked["path"]))
-    session.document = SceneDocument(session.now.text)
 
 
 def _drag(session: Session, asked: dict[str, Any]) -> None:
     numbers = {name: float(asked[name]) for name in ("grain", "theta_2", "stretch") if name in asked}
     dragged = Dragged(asked["what"], complex(*map(float, asked["to"])), branch=int(asked["branch"]), **numbers)
-    gesture = str(asked.get("gesture", ""))
-    from_state = session.base if gesture and gesture == session.gesture else session.now
-    session.change(lambda document: drag(document, from_state.scene, from_state.plain, dragged), gesture)
+    session.change(
+        lambda document: drag(document, session.base.scene, session.base.plain, dragged), str(asked.get("gesture", ""))
+    )
 
 
 def _write_text(session: Session, asked: dict[str, Any]) -> None:
-    now = session.read(str(asked["text"]))
-    session._step_through_history(now, False)
-    session.document, session.gesture = SceneDocument(now.text), ""
+    text = session.read(str(asked["text"])).text  # refused in the words of the file's reader
+    session.change(lambda document: document.become(text))
 
 
 def _move(session: Session, by: int) -> None:
@@ -299,9 +291,7 @@ def _refer(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
 
 
 def _choose_units(session: Session, asked: dict[str, Any]) -> dict[str, Any]:
-    name = str(asked["units"])
-    if name != AS_THE_FILE:
-        _read_units(name)
+    _require_units(name := str(asked["units"]))
     session.unit_names = name
     return {"refer": True}
 
@@ -339,41 +329,37 @@ def _command(session: Session, asked: dict[str, Any]) -> None:
     ends = [write_rounded(factor * x, abs(factor * inset), unit) for x in (values[first] + inset, values[last] - inset)]
     rate = getattr(before, names[place][1], None)
     speed = 0.1 * abs(values[last] - values[first]) if rate is None else float(rate[middle])
-    for name in {*(one for row in names.values() for one in row), "side", "free", "law"} & session.now.plain[
-        "motion"
-    ].keys():
+    stated = {*chain(*names.values()), "side", "free", "law"} & session.now.plain["motion"].keys()
+    for name in stated:
         document.remove(["motion", name])
     document.put(["motion", place], {"from": ends[0], "to": ends[1], "steps": max(60, min(last - first, 360))})
     if scene.motion.speed is not None:
         document.put(
             ["motion", names[place][1]], write_rounded(factor * speed, abs(factor * speed) / 100.0, f"{unit}/s")
         )
-    tried: list[tuple[float, str]] = []
+    pose, distances = _read_pose(before, middle), dict[str, float]()
     for branch, side in product(BRANCHES, SIDES if place == "stroke" else [""]):
         document.put(["motion", "branch"], branch)
         if side:
             document.put(["motion", "side"], side)
         after = solve(session.read(document.text()).scene, "position")
-        pose = np.array([after.theta_2, after.theta_3, after.theta_4])[:, len(after) // 2]
-        wanted = np.array([before.theta_2, before.theta_3, before.theta_4])[:, middle]
-        tried.append(
-            (float(np.nan_to_num(np.abs(np.exp(1j * pose) - np.exp(1j * wanted)).sum(), nan=np.inf)), document.text())
-        )
-    text = min(tried)[1]
+        distance = np.abs(_read_pose(after, len(after) // 2) - pose).sum()
+        distances[document.text()] = float(np.nan_to_num(distance, nan=np.inf))
+    text = min(distances, key=distances.__getitem__)
     session.change(lambda changed: changed.become(text))
+
+
+def _read_pose(solution: Solution, index: int) -> Any:
+    """Return the directions of the three moving bars at one position."""
+    return np.exp(1j * np.array([solution.theta_2[index], solution.theta_3[index], solution.theta_4[index]]))
 
 
 def _find_monotone(values: Any) -> tuple[int, int]:
     """Return the ends of the longest run in which numbers exist and rise, or fall, throughout."""
     signs = np.nan_to_num(np.sign(np.diff(values)))
-    best = (0, 0)
-    start = 0
-    for n in range(1, len(signs) + 1):
-        if n == len(signs) or signs[n] != signs[start]:
-            if signs[start] and n - start > best[1] - best[0]:
-                best = (start, n)
-            start = n
-    return best
+    ends = np.concatenate([[0], np.flatnonzero(np.diff(signs)) + 1, [len(signs)]])
+    runs = [(int(start), int(stop)) for start, stop in pairwise(ends) if signs[start : start + 1].any()]
+    return max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
 
 
 def _restate(session: Session, asked: dict[str, Any]) -> None:
@@ -384,7 +370,6 @@ def _restate(session: Session, asked: dict[str, Any]) -> None:
         raise InputError(name_entry(path), by, 'must be stated by "xy" or "polar"')
     place = parse_place(stated)
     session.change(lambda document: put_place(document, path, place, 1e-6 * abs(place), by))
-    session.document = SceneDocument(session.now.text)
 
 
 def _draw(session: Session, asked: dict[str, Any]) -> None:
@@ -421,7 +406,7 @@ ACTIONS: dict[str, Callable[[Session, dict[str, Any]], dict[str, Any] | None]] =
         lambda of: of.set(asked["path"], str(asked["value"])), str(asked.get("gesture", ""))
     ),
     "add": _add,
-    "remove": _remove,
+    "remove": lambda session, asked: session.change(lambda document: document.remove(asked["path"])),
     "drag": _drag,
     "text": _write_text,
     "undo": lambda session, asked: _move(session, -1),

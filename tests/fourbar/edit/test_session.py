@@ -449,7 +449,7 @@ def test_the_history_of_a_large_scene_stays_within_what_the_next_start_reads(ses
     assert len(large) == pytest.approx(205_000, rel=0.05)
     session.do({"do": "text", "text": large})
     for size in range(1, 531):
-        session.change(lambda document, size=size: document.set(["lengths", "input"], f"{100 + 0.01 * size:.2f} mm"))
+        session.do({"do": "set", "path": ["lengths", "input"], "value": f"{100 + 0.01 * size:.2f} mm", "gesture": size})
         if size % 20 == 0:
             session.do({"do": "keep"})
     session.keep()
