@@ -15,7 +15,9 @@ from fourbar.formulas.mobility import change_points, choose_range, turns_fully
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, uniform
 from fourbar.mjcf.effects import find_row, unwind
 from fourbar.mjcf.model import (
+    RECIPE,
     Model,
+    Settings,
     add_appearance,
     join,
     make_constant_motor,
@@ -23,7 +25,6 @@ from fourbar.mjcf.model import (
     make_servo,
     require_carriable,
 )
-from fourbar.mjcf.settings import FULL_TURN, RECIPE, Settings, WindowMotion, fit_pad
 from fourbar.quantities import OK
 from fourbar.scene import Command, Scene, command, require_input
 from fourbar.scene.motion import Motion
@@ -40,6 +41,14 @@ RELEASED_STEPS = 6280
 """Number of timesteps, without a flywheel, in the time in which weights and loads would turn the linkage once."""
 RELEASED_CLOSURE = 2.0
 """Time constant of the closure of a released linkage, in timesteps: measured, 2 takes the least energy out of it."""
+STIFF_PAD, SOFT_PAD = 1e-4, 2e-3
+"""Stiff: the closure's softness plays no part above 1e-9. Soft: its forces have 7 digits after a single pass."""
+QUICK = 1.0
+"""rad/s^2. Newton stops where a pass moves the accelerations by less than 1e-15 rad/s^2 (mjMINVAL): below about
+this acceleration there is no second pass, and with stiff pads the forces of the first are wrong by up to 1e-3."""
+LIGHT = 100.0
+"""A bar this many times lighter than the other that the closure joins makes the closure softer than loads do: 10 g
+and 1 g on 14.5 kg had the inertial torque 3e-5 and 3e-3 wrong, in proportion to the ratio. Pads follow it from here."""
 Drive = Literal["flywheel", "motor", "none"]
 """Kind of drive: a flywheel that keeps omega_2 or alpha_2; a motor on the driven bar whose control is its couple;
 none. A free motion has none."""
@@ -89,7 +98,7 @@ def write_mjcf(
     else:
         raise InputError("timestep", None, "is missing: state it, or request a keyframe")
     if settings.pad == "fitted":
-        settings = replace(settings, pad=_fit_pad(scene))
+        settings = replace(settings, pad=fit_pad(scene))
     model = Model(scene.linkage, settings, timestep)
     model.cylinder = cylinder
     for term in (*scene.effects, *scene.loads):
@@ -174,11 +183,17 @@ def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
     return replace(settings, pad=None, time_constant_steps=RELEASED_CLOSURE)
 
 
-def _fit_pad(scene: Scene) -> float:
+def fit_pad(scene: Scene) -> float:
+    """Choose the pad that leaves the closure stiff enough for the loads, and soft enough for one pass of Newton.
+
+    The sag of the closure grows as pad^2 times the loads, the rounding of one pass as 1/(pad^2 times the loads).
+    """
     _, a, b, c = scene.linkage.lengths
-    return fit_pad(
-        _compute_quickness(scene) * a / max(b, c), compute_load_ratio(scene), compute_mass_ratio(scene.linkage)
+    least_sag = SOFT_PAD / math.sqrt(
+        (1.0 + compute_load_ratio(scene)) * max(1.0, compute_mass_ratio(scene.linkage) / LIGHT)
     )
+    acceleration = _compute_quickness(scene) * a / max(b, c)  # of bars 3 and 4, by its size
+    return least_sag if acceleration < QUICK else min(STIFF_PAD, least_sag)
 
 
 def compute_mass_ratio(linkage: FourBar) -> float:
@@ -213,6 +228,48 @@ def _sum_work(scene: Scene) -> float:
     speed = math.sqrt(quickness)
     couples = (find_row(term).couple(term, scene.linkage, speed) for term in (*scene.loads, *scene.effects))
     return sum(couples) / quickness
+
+
+FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
+"""rad; a sweep over 0..360 deg may miss the turn by its rounding."""
+
+
+class WindowMotion:
+    """The input's motion through a window of theta_2, in time.
+
+    theta_2 = start + omega t + alpha t^2/2 from `start` to `stop`, at the speed `omega` at the start.
+    """
+
+    def __init__(self, start: float, stop: float, omega: float, alpha: float) -> None:
+        if (stop - start) * omega < 0.0:
+            raise ValueError("the input turns away from the end of its window")
+        self.start, self.stop, self.omega, self.alpha = start, stop, omega, alpha
+
+    @property
+    def fastest(self) -> float:
+        """The greatest |omega_2| in the window, rad/s."""
+        return math.sqrt(max(self.omega**2, self.omega**2 + 2.0 * self.alpha * (self.stop - self.start)))
+
+    def time(self, theta_2: float) -> float:
+        """Return the time when the input passes an angle, s; LimitError where alpha_2 stops it before."""
+        angle = theta_2 - self.start
+        squared = self.omega**2 + 2.0 * self.alpha * angle
+        if squared <= 0.0:
+            raise LimitError(f"alpha_2 brings the input to rest before theta_2 = {theta_2:.6g} rad")
+        return 2.0 * angle / (self.omega + math.copysign(math.sqrt(squared), self.omega))
+
+    def timestep(self, settings: Settings = RECIPE, at_least: int = 0) -> float:
+        """Choose a timestep that divides the turn: at least so many steps per revolution, per window and in all, s."""
+        if settings.timestep is not None:
+            return settings.timestep * settings.timestep_scale
+        duration = self.time(self.stop)
+        per_revolution = duration * self.fastest / (2.0 * math.pi) * settings.steps_per_revolution
+        # at the greatest speed throughout: an input that speeds up covers the end of its window in few steps
+        width = abs(self.stop - self.start)
+        window = settings.steps_per_window * duration * self.fastest / width if 0.0 < width < FULL_TURN else 1.0
+        # a window of 628 steps per revolution must not become one more by a rounding
+        steps = max(math.ceil(max(per_revolution, window) * (1.0 - 1e-9)), at_least)
+        return duration / steps * settings.timestep_scale
 
 
 class Start(NamedTuple):

@@ -1,20 +1,57 @@
-"""The bodies, joints and sites of an MJCF model, and how they look."""
+"""The settings, bodies, joints and sites of an MJCF model, and how they look."""
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
-from fourbar.mjcf.settings import Settings
 
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive, Load
     from fourbar.effects.spring import Spring, SpringEnd
 
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Settings of MuJoCo in the file; the defaults carry a linkage of 5 mm to 100 m at any speed.
+
+    Parameters
+    ----------
+    timestep : s; None: from the two numbers of steps.
+    steps_per_window : at least so many where the input does not turn fully: towards a limit position
+        bars 3 and 4 speed up without bound, and 628 steps per revolution are too few there.
+    timestep_scale : factor on the timestep.
+    integrator : "RK4", "Euler", "implicit" or "implicitfast".
+    time_constant_steps : solref's time constant of the loop's closure, in timesteps.
+    impedance : solimp's impedance d; MuJoCo clamps it at 0.9999.
+    pad : where the inertial frame of the massless pads that carry the closure lies, as a part of
+        the bar's length: the softness of the closure goes as its square. None: no pads; "fitted": to
+        the speed and the loads (`fit_pad`).
+    solver, tolerance, iterations : of the constraint solver. MuJoCo divides the tolerance by the
+        flywheel's inertia, so only 0 is tight, and the number of iterations is then what stops it.
+    flywheel : inertia on pin O2 relative to the linkage's own; the speed ripples by about its inverse.
+    """
+
+    timestep: float | None = None
+    timestep_scale: float = 1.0
+    steps_per_revolution: float = 628.0
+    steps_per_window: int = 2000
+    integrator: str = "RK4"
+    time_constant_steps: float = 20.0
+    impedance: float = 0.9999
+    pad: float | Literal["fitted"] | None = "fitted"
+    solver: str = "Newton"
+    tolerance: float = 0.0
+    iterations: int = 10
+    flywheel: float = 1e8
+
+
+RECIPE = Settings()
 
 FOVY = 45.0
 """Vertical field of view, deg."""

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from fourbar.effects import Gravity
 from fourbar.errors import InputError, LimitError, NotAssembledError
+from fourbar.mjcf import RECIPE
 from fourbar.mjcf.document import Start, choose_run
-from fourbar.mjcf.settings import RECIPE
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.answer import Answer, Array

@@ -7,7 +7,7 @@ from functools import partial
 
 from fourbar.errors import LimitError
 from fourbar.formulas import mobility
-from fourbar.mjcf.settings import LIGHT
+from fourbar.mjcf.document import LIGHT
 from fourbar.quantities import COUPLE, FORCES
 from fourbar.scene import Scene
 from fourbar_validation.compare.answer import Adapter, Answer

@@ -10,8 +10,7 @@ import pytest
 
 import fourbar
 from fourbar.effects import SpringEnd
-from fourbar.mjcf import RECIPE
-from fourbar.mjcf.settings import WindowMotion
+from fourbar.mjcf import RECIPE, WindowMotion
 from fourbar.quantities import UNKNOWNS
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Held
