@@ -97,9 +97,9 @@ def test_reports_hold_hostile_text_as_text(
     assert {path.name for path in tmp_path.rglob("*") if path.is_dir()} == {"deep", "out"}
 
 
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_mjcf_holds_a_hostile_title_as_an_attribute(kind: str) -> None:
-    root = ET.fromstring(write_mjcf(crank_rocker(title=HOSTILE[kind])))
+@pytest.mark.parametrize("title", [*HOSTILE.values(), "\ud800", "é" * 10_000, ""])
+def test_mjcf_holds_a_hostile_title_as_an_attribute(title: str) -> None:
+    root = ET.fromstring(write_mjcf(crank_rocker(title=title)))
     assert root.tag == "mujoco"
     assert not STEERING.search(root.attrib["model"])
     assert not root.findall(".//script")
