@@ -37,14 +37,32 @@ OPEN: list = []
 
 
 @pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
-    """Run a coroutine against a workbench that listens; it gets the workbench and its address."""
-    monkeypatch.setattr(server, "GONE", 0.3)
+def path(tmp_path: Path) -> Path:
     path = tmp_path / "scene.toml"
     path.write_bytes(CRANK_ROCKER.read_bytes())
+    return path
+
+
+def start(path: Path, *options: str, **environment: str) -> subprocess.Popen:
+    """The command, in a process of its own; its first line is the address."""
+    command = [sys.executable, "-m", "fourbar", "edit", str(path), *options]
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, env=os.environ | environment, **streams)
+
+
+def wait_until(happened: Callable[[], object]) -> None:
+    deadline = time.monotonic() + 20
+    while not happened() and time.monotonic() < deadline:
+        time.sleep(0.05)
+
+
+@pytest.fixture
+def bench(path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
+    """Run a coroutine against a workbench that listens; it gets the workbench and its address."""
+    monkeypatch.setattr(server, "GONE", 0.3)
 
     def run(what: Callable[[Workbench, str], Awaitable[None]]) -> Session:
-        session = Session(path, tmp_path / "exports")
+        session = Session(path, path.parent / "exports")
 
         async def both() -> None:
             made = Workbench(session)
@@ -83,15 +101,24 @@ async def page(address: str):
     return OPEN[-1]
 
 
-async def told(line, request: dict | None = None, *, settled: bool = False) -> dict:
-    """The answer to a request, or the next settled one."""
-    if request is not None:
-        await line.write_message(json.dumps({"id": "mine"} | request))
+async def heard(line, wanted: Callable[[dict], object]) -> dict:
+    """The next answer of the kind wanted."""
     while True:
         data = await asyncio.wait_for(line.read_message(), 10.0)
         about = json.loads(data[4 : 4 + struct.unpack("<I", data[:4])[0]])
-        if about.get("settled") if settled else about.get("for") == "mine":
+        if wanted(about):
             return about
+
+
+async def settled(line) -> dict:
+    return await heard(line, lambda about: about.get("settled"))
+
+
+async def told(line, request: dict | None = None) -> dict:
+    """The answer to a request."""
+    if request is not None:
+        await line.write_message(json.dumps({"id": "mine"} | request))
+    return await heard(line, lambda about: about.get("for") == "mine")
 
 
 def test_only_a_page_with_the_token_from_this_address_is_answered(bench) -> None:
@@ -101,15 +128,9 @@ def test_only_a_page_with_the_token_from_this_address_is_answered(bench) -> None
         fetched = await AsyncHTTPClient(force_instance=True).fetch(address)
         assert fetched.code == 200 and b"Crank-rocker" in fetched.body
         assert fetched.headers["Referrer-Policy"] == "no-referrer" and fetched.headers["Cache-Control"] == "no-store"
-        for path in (
-            "",
-            "x" * 43 + "/",
-            "x/",
-            "../scene.toml",
-            "%2e%2e/scene.toml",
-            address.split("/")[3] + "/scene.toml",
-        ):
-            assert await status(root + path) == 404, path
+        inside = address.split("/")[3] + "/scene.toml"
+        for place in ("", "x" * 43 + "/", "x/", "../scene.toml", "%2e%2e/scene.toml", inside):
+            assert await status(root + place) == 404, place
         assert await status(address + "report") == 404
         for host in (f"example.org:{port}", "example.org", "127.0.0.1", f"127.0.0.1:{int(port) ^ 1}"):
             assert await status(address, headers={"Host": host}) == 403, host
@@ -122,15 +143,8 @@ def test_only_a_page_with_the_token_from_this_address_is_answered(bench) -> None
         assert await status(address + "live", headers={"Origin": root[:-1]}) == 400  # as it should be, but no WebSocket
         assert await status(address, method="POST", body="x") == 405
         assert not made.pages
-
-    bench(ask)
-
-
-def test_it_listens_on_the_loopback_address_alone(bench) -> None:
-    async def ask(made: Workbench, address: str) -> None:
-        port = int(port_of(address))
-        with pytest.raises(ConnectionRefusedError):
-            socket.create_connection(("127.0.0.2", port), timeout=1.0)  # as is every other address of this machine
+        with pytest.raises(ConnectionRefusedError):  # as is every other address of this machine
+            socket.create_connection(("127.0.0.2", int(port)), timeout=1.0)
 
     bench(ask)
 
@@ -183,7 +197,7 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench) -> None:
         about = await told(one, {"do": "set", "path": ["lengths", "input"], "value": "4 in"})
         assert not about["settled"] and "torque_error" not in str(about["columns"])
         for line in (one, other):
-            about = await told(line, settled=True)
+            about = await settled(line)
             assert '"4 in"' in about["text"] and "torque_error" in str(about["columns"]) and about["saved"] is False
             assert "  torque   peak" in "".join(about["data"]["summary"])
         assert "refused" in await told(other, {"do": "set", "path": ["lengths", "input"], "value": "9 ft"})
@@ -247,15 +261,10 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(bench
         for wait, stopped in (("0", False), ("60", True)):
             (folder / "wait").write_text(wait)
             await line.write_message(json.dumps({"do": "check"}))
-            while True:
-                data = await asyncio.wait_for(line.read_message(), 10.0)
-                about = json.loads(data[4 : 4 + struct.unpack("<I", data[:4])[0]])
-                if not (check := about.get("check")):
-                    continue
-                if check["running"] and stopped and check["lines"]:
-                    await line.write_message(json.dumps({"do": "stop"}))
-                if not check["running"]:
-                    break
+            if stopped:
+                await heard(line, lambda about: about.get("check", {}).get("lines"))
+                await line.write_message(json.dumps({"do": "stop"}))
+            check = (await heard(line, lambda about: "check" in about and not about["check"]["running"]))["check"]
             assert check["lines"] == ["agrees"] and check["report"] and check["stopped"] is stopped
         answer = await AsyncHTTPClient(force_instance=True).fetch(address + "report")
         assert answer.body == b"<p>report" and "sandbox" in answer.headers["Content-Security-Policy"]
@@ -283,7 +292,7 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch)
             assert f'"{size} mm"' in about["text"] and not about["settled"]
             await asyncio.sleep(server.SETTLED * 1.2)  # each asks for a summary of its own
         released.set()
-        about = await told(line, settled=True)
+        about = await settled(line)
         assert '"110 mm"' in about["text"] and summaries == [0.1, 0.11]  # the one of each state between was given up
 
     monkeypatch.setattr(server, "evaluate_scene", slow)
@@ -336,11 +345,9 @@ def processor_time(process: subprocess.Popen) -> float:
 @pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.parametrize("files", [256, 40], ids=["within its limit of files", "beyond its limit of files"])
-def test_half_open_connections_neither_stop_the_server_nor_stay(tmp_path: Path, files: int) -> None:
+def test_half_open_connections_neither_stop_the_server_nor_stay(path: Path, files: int) -> None:
     import resource
 
-    path = tmp_path / "scene.toml"
-    path.write_bytes(CRANK_ROCKER.read_bytes())
     # imported before the limit holds: the server alone is tried
     program = f"""
 import resource, sys, fourbar.edit.server as server, fourbar.show.animate, fourbar.mjcf
@@ -404,20 +411,13 @@ def test_a_page_in_the_background_which_is_woken_once_a_minute_finds_its_server(
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_processes(tmp_path: Path) -> None:
-    path, seen = tmp_path / "scene.toml", tmp_path / "seen"
-    path.write_bytes(CRANK_ROCKER.read_bytes())
-    browser = tmp_path / "browser"
+def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_processes(path: Path) -> None:
+    seen, browser = path.with_name("seen"), path.with_name("browser")
     browser.write_text(f'#!/bin/sh\necho "$@" >> {seen}.part; mv {seen}.part {seen}\n')
     browser.chmod(0o755)
-    command = [sys.executable, "-m", "fourbar", "edit", str(path)]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, env={**os.environ, "BROWSER": f"{browser} %s"}
-    ) as process:
+    with start(path, BROWSER=f"{browser} %s") as process:
         address = process.stdout.readline().strip()
-        deadline = time.monotonic() + 20
-        while not seen.exists() and time.monotonic() < deadline:
-            time.sleep(0.05)
+        wait_until(seen.exists)
         (given,) = seen.read_text().split()
         redirect = Path(given.removeprefix("file://"))
         assert given.startswith("file://") and address.split("/")[3] not in given
@@ -429,26 +429,18 @@ def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_proc
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_a_second_workbench_on_one_file_leads_to_the_first(tmp_path: Path) -> None:
-    path, link = tmp_path / "scene.toml", tmp_path / "link.toml"
-    path.write_bytes(CRANK_ROCKER.read_bytes())
+def test_a_second_workbench_on_one_file_leads_to_the_first(path: Path) -> None:
+    link = path.with_name("link.toml")
     link.symlink_to(path)
-
-    def start(name: Path) -> subprocess.Popen:
-        command = [sys.executable, "-m", "fourbar", "edit", str(name), "--no-browser"]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-    first, second = start(path), start(link)
+    first, second = (start(name, "--no-browser") for name in (path, link))
     addresses = [process.stdout.readline() for process in (first, second)]
     assert addresses[0] == addresses[1] and addresses[0].startswith("http://127.0.0.1:")
-    deadline = time.monotonic() + 20
-    while first.poll() is None and second.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.05)
+    wait_until(lambda: first.poll() is not None or second.poll() is not None)
     guest, host = (first, second) if first.poll() is not None else (second, first)
     assert (guest.returncode, guest.communicate(), host.poll()) == (0, ("", ""), None)
     host.kill()
     host.communicate()
-    with start(path) as third:  # the page of a server that was killed leads nobody astray
+    with start(path, "--no-browser") as third:  # the page of a server that was killed leads nobody astray
         assert third.stdout.readline() not in addresses
         third.send_signal(2)
         assert third.communicate(timeout=20) == ("", "")
@@ -471,19 +463,15 @@ def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(tmp_pat
 
 @pytest.mark.slow
 @pytest.mark.posix
-def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_bytes(CRANK_ROCKER.read_bytes())
-    command = [sys.executable, "-m", "fourbar", "edit", str(path), "--no-browser"]
+def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(path: Path) -> None:
     began = time.monotonic()
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with start(path, "--no-browser") as process:
         address = process.stdout.readline()
         assert address.startswith("http://127.0.0.1:")
-        port = port_of(address)
-        other = [sys.executable, "-m", "fourbar", "edit", str(tmp_path / "other.toml"), "--port", port]
-        taken = subprocess.run(other, capture_output=True, text=True, check=False)
-        assert taken.returncode == 2 and "--port" in taken.stderr and "Traceback" not in taken.stderr
+        with start(path.with_name("other.toml"), "--port", port_of(address)) as taken:
+            error = taken.communicate()[1]
+        assert taken.returncode == 2 and "--port" in error and "Traceback" not in error
         process.send_signal(2)
         out, error = process.communicate(timeout=20)
     assert (process.returncode, out, error) == (0, "", "")
-    assert list(tmp_path.iterdir()) == [path] and time.monotonic() - began < 60
+    assert list(path.parent.iterdir()) == [path] and time.monotonic() - began < 60

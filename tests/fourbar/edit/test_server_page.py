@@ -19,6 +19,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 from fourbar.files import loads
+from tests.fourbar.edit.test_server import start
 
 PRINTED = 6e-5
 """Numbers are shown with five significant digits."""
@@ -41,21 +42,8 @@ return found;
 """Pairs of labels in the picture whose boxes overlap by more than the space around letters."""
 
 
+SAVED = "/^saved|is saved/.test(document.getElementById('bench').textContent)"
 MODELS = Path(__file__).parents[3] / "models"
-
-
-class Opened:
-    """The command, and what it says."""
-
-    def __init__(self, path: Path, port: str = "0") -> None:
-        command = [sys.executable, "-m", "fourbar", "edit", str(path), "--no-browser", "--port", port]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        assert self.process.stdout is not None
-        self.address = self.process.stdout.readline().strip()
-
-    def end(self) -> None:
-        self.process.terminate()
-        self.process.communicate(timeout=20)
 
 
 def wait_for(driver, expression: str):
@@ -66,9 +54,9 @@ def wait_for(driver, expression: str):
     return found
 
 
-def open_scene(driver, server: Opened) -> None:
+def open_scene(driver, address: str) -> None:
     """Open the page; where it is a new scene, with the linkage that it begins with."""
-    driver.get(server.address)
+    driver.get(address)
     wait_for(driver, "offers && document.getElementById('field:lengths/input')")
     if driver.execute_script("return Boolean(sketch)"):
         driver.find_element("id", "no-sketch").click()
@@ -78,6 +66,25 @@ def type_into(driver, field: str, text: str) -> None:
     entry = driver.find_element("id", field)
     entry.send_keys(Keys.CONTROL, "a")
     entry.send_keys(text)
+
+
+def resize(driver, width: int) -> None:
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+def click_pins(driver, width: str, *pixels: tuple[float, float]) -> None:
+    """Draw O2, A, B and O4 in an empty drawing of a width."""
+    type_into(driver, "sketch-width", width)
+    picture = driver.find_element("id", "picture")
+    middle = picture.size["width"] / 2, picture.size["height"] / 2
+    for x, y in pixels:
+        ActionChains(driver).move_to_element_with_offset(picture, x - middle[0], y - middle[1]).click().perform()
+
+
+def save(driver) -> None:
+    driver.find_element("id", "save").click()
+    wait_for(driver, SAVED)
 
 
 def drag_pin_B(driver) -> None:
@@ -96,31 +103,38 @@ def drag_pin_B(driver) -> None:
     assert moved == pytest.approx([20.0, 20.0], abs=PIXELS)
 
 
+class Servers:
+    """The command for scene files: called, it starts one and returns the address that this prints."""
+
+    def __init__(self) -> None:
+        self.processes: list[subprocess.Popen] = []
+
+    def __call__(self, path: Path, port: str = "0") -> str:
+        self.processes.append(start(path, "--no-browser", "--port", port))
+        return self.processes[-1].stdout.readline().strip()
+
+    def end(self) -> None:
+        while self.processes:
+            process = self.processes.pop()
+            process.terminate()
+            process.communicate(timeout=20)
+
+
 @pytest.fixture
-def opened(chromium, tmp_path: Path):
-    chromium.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride", {"width": 1280, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-    )
-    servers = []
-
-    def start(path: Path, port: str = "0") -> Opened:
-        servers.append(Opened(path, port))
-        return servers[-1]
-
-    yield start
+def opened(chromium):
+    resize(chromium, 1280)
+    servers = Servers()
+    yield servers
     chromium.get("about:blank")
-    for server in servers:
-        server.end()
+    servers.end()
     chromium.get_log("browser")  # of lines that were cut on purpose
 
 
 @pytest.mark.slow
 def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(chromium, opened, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(fourbar.dump(fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22))))
-    chromium.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride", {"width": 400, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-    )
-    chromium.get(opened(tmp_path / "a.toml").address)
+    resize(chromium, 400)
+    chromium.get(opened(tmp_path / "a.toml"))
     lines = "[...document.querySelectorAll('#summary .columns')]"
     wait_for(chromium, f"{lines}.length")
     told, heights = zip(
@@ -134,8 +148,7 @@ def test_the_table_of_limits_keeps_its_columns_in_a_narrow_window(chromium, open
 @pytest.mark.slow
 def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, tmp_path: Path) -> None:
     path, driver = tmp_path / "mine.toml", chromium
-    server = opened(path)
-    open_scene(driver, server)
+    open_scene(driver, opened(path))
     type_into(driver, "field:title", "<b>Mine</b><script>alert(1)</script>")
     type_into(driver, "field:lengths/input", "4 in")
     wait_for(driver, "data.lengths[1] === 0.1016")
@@ -166,8 +179,7 @@ def test_a_designer_goes_from_an_empty_scene_to_a_saved_file(chromium, opened, t
     assert driver.execute_script("return plain") == steps and driver.find_element("tag name", "h1").text.startswith(
         "<b>"
     )
-    driver.find_element("id", "save").click()
-    wait_for(driver, "/^saved|is saved/.test(document.getElementById('bench').textContent)")
+    save(driver)
     solution = fourbar.solve(loads(path.read_text(), str(path)), "error")
     for row in (0, 90, 217):
         driver.execute_script(f"go({row})")
@@ -191,16 +203,12 @@ SHOWN_FIELDS = (
 @pytest.mark.slow
 def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(chromium, opened, tmp_path: Path) -> None:
     path, driver = tmp_path / "mine.toml", chromium
-    driver.get(opened(path).address)
+    driver.get(opened(path))
     wait_for(driver, "offers && sketch")
     assert not driver.find_element("id", "bar-2").is_displayed()  # the drawing is empty
-    type_into(driver, "sketch-width", "50 in")
-    picture = driver.find_element("id", "picture")
-    corner = picture.size["width"] / 2, picture.size["height"] / 2
-    scale = 50.0 / picture.size["width"]
     pixels = {"O2": (120, 300), "A": (170, 220), "B": (400, 120), "O4": (380, 330)}
-    for x, y in pixels.values():
-        ActionChains(driver).move_to_element_with_offset(picture, x - corner[0], y - corner[1]).click().perform()
+    click_pins(driver, "50 in", *pixels.values())
+    scale = 50.0 / driver.find_element("id", "picture").size["width"]
     wait_for(driver, "!sketch && plain.lengths.ground.endsWith(' in')")
     pins = {name: complex(x - 120, 300 - y) * scale for name, (x, y) in pixels.items()}
     drawn = {
@@ -235,13 +243,9 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(chromi
 @pytest.mark.slow
 def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(chromium, opened, tmp_path: Path) -> None:
     path, driver = tmp_path / "mine.toml", chromium
-    driver.get(opened(path).address)
+    driver.get(opened(path))
     wait_for(driver, "offers && sketch")
-    type_into(driver, "sketch-width", "1000 mm")
-    picture = driver.find_element("id", "picture")
-    corner = picture.size["width"] / 2, picture.size["height"] / 2
-    for x, y in ((120, 300), (170, 180), (400, 120), (380, 330)):
-        ActionChains(driver).move_to_element_with_offset(picture, x - corner[0], y - corner[1]).click().perform()
+    click_pins(driver, "1000 mm", (120, 300), (170, 180), (400, 120), (380, 330))
     wait_for(driver, "!sketch && plain.lengths.ground !== '300 mm'")
     type_into(driver, "field:bars/output/mass", "80 kg")
     wait_for(driver, "plain.bars.output.mass === '80 kg'")
@@ -259,8 +263,7 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(chromium, 
     type_into(driver, "pressure", "210 bar" + Keys.ENTER)
     wait_for(driver, "document.getElementById('summary').textContent.includes('bore     at least')")
     summary = driver.find_element("id", "summary").text
-    driver.find_element("id", "save").click()
-    wait_for(driver, "/^saved|is saved/.test(document.getElementById('bench').textContent)")
+    save(driver)
     scene = fourbar.load(path)
     assert scene.drive is not None and scene.effects and scene.motion.stroke is not None
     assert 'at = {x = "300 mm", y = "-250 mm"}' in path.read_text()
@@ -275,7 +278,7 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(chromium, 
 @pytest.mark.slow
 def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(chromium, opened, tmp_path: Path) -> None:
     path, driver = tmp_path / "mine.toml", chromium
-    driver.get(opened(path).address)
+    driver.get(opened(path))
     wait_for(driver, "offers && sketch && document.activeElement === picture")
 
     def press(*keys: str) -> None:
@@ -323,7 +326,7 @@ def test_the_keyboard_alone_draws_types_drags_undoes_and_saves(chromium, opened,
     wait_for(driver, f"plain.lengths.coupler === {before!r}")
     assert driver.execute_script("return data.lengths") == lengths
     with_control("s")
-    wait_for(driver, "/^saved|is saved/.test(document.getElementById('bench').textContent)")
+    wait_for(driver, SAVED)
     assert fourbar.load(path).linkage.coupler.mass == 2.01
 
 
@@ -365,13 +368,11 @@ def test_it_opens_in_the_middle_with_a_linkage_that_fills_half_and_labels_apart(
     chromium, opened, tmp_path: Path, width: int
 ) -> None:
     driver = chromium
-    driver.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride", {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-    )
+    resize(driver, width)
     for model in ("crank_rocker", "gallery/excavator_bucket", "gallery/tailgate", "gallery/landing_gear"):
         path = tmp_path / f"{model.rpartition('/')[2]}.toml"
         path.write_text((MODELS / f"{model}.toml").read_text())
-        driver.get(opened(path).address)
+        driver.get(opened(path))
         wait_for(driver, "data.summary")
         rows = driver.execute_script("return [row, grid.length]")
         assert abs(rows[0] - rows[1] / 2) <= 1, model
@@ -416,29 +417,20 @@ def test_undo_takes_a_refused_entry_back_and_leaves_the_last_good_state(chromium
 
 
 @pytest.mark.slow
-def test_a_page_whose_line_is_cut_finds_its_server_again(chromium, opened, tmp_path: Path) -> None:
-    driver = chromium
-    open_scene(driver, opened(tmp_path / "mine.toml"))
+def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(chromium, opened, tmp_path: Path) -> None:
+    path, driver = tmp_path / "mine.toml", chromium
+    server = opened(path)
+    open_scene(driver, server)
     driver.execute_script("line.close()")
     type_into(driver, "field:lengths/input", "110 mm")
     wait_for(driver, "data.lengths[1] === 0.11")
-
-
-@pytest.mark.slow
-def test_a_stopped_server_is_named_and_a_new_one_goes_on_from_its_state(chromium, opened, tmp_path: Path) -> None:
-    path, driver = tmp_path / "mine.toml", chromium
-    server = opened(path)
-    port = server.address.split("/")[2].partition(":")[2]
-    open_scene(driver, server)
-    type_into(driver, "field:lengths/input", "110 mm")
-    wait_for(driver, "data.lengths[1] === 0.11")
-    server.end()
+    opened.end()
     wait_for(driver, "document.getElementById('bench').textContent.includes('The server has stopped')")
-    again = opened(path, port)
-    assert again.address != server.address  # the token is another one, and the old page is told nothing
+    again = opened(path, server.split("/")[2].partition(":")[2])
+    assert again != server  # the token is another one, and the old page is told nothing
     time.sleep(2.0)
     assert driver.execute_script("return line.readyState") != 1
-    driver.get(again.address)
+    driver.get(again)
     wait_for(driver, "offers && data.lengths[1] === 0.11")
     driver.find_element("id", "undo").click()
     wait_for(driver, "data.lengths[1] === 0.1")
