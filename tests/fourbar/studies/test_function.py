@@ -66,6 +66,9 @@ def _torch() -> Library:
 @pytest.fixture(params=LIBRARIES)
 def library(request: pytest.FixtureRequest) -> Iterator[Library]:
     name = request.param
+    if name == "numpy":
+        yield Library(array=np.asarray, jit=lambda f: f, xp=np)
+        return
     for needed in (name, "array_api_compat"):
         if importlib.util.find_spec(needed) is None:
             pytest.skip(f"{needed} is not installed")
@@ -91,7 +94,6 @@ LOADED = Scene(
     ),
     points=(Point("P", 3, (0.1, 0.4)),),
 )
-CYLINDER = replace(LOADED, drive_bar=None, drive=LinearDrive(SpringEnd(1, 0.1, 1.0), SpringEnd(4, 0.1, -1.0)))
 EVERY = [*(name for name in STAGE_OF if name not in {*NEVER, *LINE_QUANTITIES}), "P", "v_P", "a_P"]
 ANGLES = np.linspace(0.0, 6.0, 13)
 
@@ -116,124 +118,81 @@ def wrapped(x: Any) -> Any:
     return (x + np.pi) % (2.0 * np.pi) - np.pi
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("drive_bar", [2, 3, 4])
-def test_every_quantity_is_that_of_solve(library: Library, drive_bar: int) -> None:
-    scene = replace(LOADED, drive_bar=drive_bar)
-    solution = fourbar.solve(fourbar.vary(scene, {"motion.theta_2": ANGLES}))
-    keys = ["lengths.coupler", "effects.gravity.0", "motion.theta_2"]
-    found = library.jit(function(scene, keys, EVERY))(*map(library.array, (0.25, 9.81, ANGLES)))
-    assert set(found) == set(EVERY)
-    for name in EVERY:
-        ours, theirs = np.asarray(found[name]), of_solution(solution, name)[0]
-        gap = wrapped(ours - theirs) if name.startswith("theta") else ours - theirs
-        assert np.abs(gap).max() <= ROUNDED * max(1.0, np.abs(theirs).max()), name
+def on_line(one: int, other: int) -> Scene:
+    line = LinearDrive(SpringEnd(one, 0.1, 1.0), SpringEnd(other, 0.1, -1.0))
+    return replace(LOADED, drive_bar=None, drive=line)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("ends", [(1, 3), (1, 4), (2, 4)])
-def test_a_drive_along_a_line(library: Library, ends: tuple[int, int]) -> None:
-    """Its force, with the derivative by where it is pinned, which `sensitivity` has by another route."""
-    line = LinearDrive(*(SpringEnd(bar, 0.1, side) for bar, side in zip(ends, (1.0, -1.0), strict=True)))
-    scene = replace(CYLINDER, drive=line)
-    names = [*LINE_QUANTITIES[:4], "power", "drive_condition", "F12", "F43"]
-    keys = ["drive.from.at.0", "lengths.coupler"]
-    solution, slopes = fourbar.solve(scene), fourbar.sensitivity(scene)
-    f, values = function(scene, keys, names), library.array([0.1, 0.25])
-    found = library.jit(lambda x: f(*x))(values)
-    assert {"drive_force", "stroke", "stroke_speed"} <= found.keys()
-    by = (library.jacrev if library.xp.__name__ == "torch" else library.jacfwd)(lambda x: f(*x))(values)
-    for name in names:
-        theirs = getattr(solution, name)[0]
-        assert np.abs(np.asarray(found[name]) - theirs).max() <= ROUNDED * np.abs(theirs).max(), name
-        exact = np.stack([slopes.of(name, key)[0] for key in keys], axis=-1)
-        assert np.abs(np.asarray(by[name]) - exact).max() <= ROUNDED * np.abs(exact).max(), name
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("motion", [Motion(theta_3=0.6, omega_3=2.0), Motion(theta_4=2.2, omega_4=-1.0, alpha_4=2.0)])
-def test_other_bars_command(library: Library, motion: Motion) -> None:
-    scene = replace(LOADED, motion=motion, loads=())
-    solution = fourbar.solve(scene)
-    f = function(scene, ["lengths.output", command_key(scene)], ["torque", "F12", "condition"])
-    found = f(library.array(0.22), library.array(motion.angle))
-    for name, value in found.items():
-        assert np.asarray(value) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
-
-
-COMMANDS = [
-    Motion(0.7, 8.0, 3.0),
-    Motion(theta_3=0.6, omega_3=2.0),
-    Motion(theta_4=2.2, omega_4=-1.0, alpha_4=2.0),
-]
-
-
-@pytest.mark.parametrize("drive_bar", [2, 3, 4])
-@pytest.mark.parametrize("motion", COMMANDS, ids=lambda motion: motion.commanded)
-def test_power_and_condition_are_those_of_the_definitions(motion: Motion, drive_bar: int) -> None:
-    """Torque times the speed of the driven bar; the sine between the two bars that are not commanded."""
-    scene = replace(LOADED, motion=motion, drive_bar=drive_bar, loads=())
-    names = ["power", "condition", "torque", "theta_2", "theta_3", "theta_4", *(f"omega_{bar}" for bar in (2, 3, 4))]
-    found = function(scene, ["lengths.output"], names)(0.22)
-    one, other = (found[f"theta_{bar}"] for bar in (2, 3, 4) if f"theta_{bar}" != motion.commanded)
-    assert found["condition"] == pytest.approx(abs(np.sin(other - one)), rel=1e-13)
-    assert found["power"] == pytest.approx(found["torque"] * found[f"omega_{drive_bar}"], rel=1e-13)
-    assert found[motion.commanded] == motion.angle
-
-
-def test_power_and_condition_of_a_cylinder_are_those_of_the_definitions() -> None:
-    moving = replace(CYLINDER, loads=())
-    found = function(moving, ["lengths.output"], ["power", "condition", "drive_force", "stroke_speed", "sin_mu"])(0.22)
-    assert found["power"] == pytest.approx(found["drive_force"] * found["stroke_speed"], rel=1e-13)
-    assert found["condition"] == abs(found["sin_mu"])
-    line = LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
-    motion = Motion(stroke=0.35, stroke_speed=0.1, side="left")
-    names = ["theta_2", "condition", "power", "drive_force", "sin_mu"]
-    scene = replace(moving, drive=line, motion=motion)
-    found = function(scene, ["lengths.output"], names)(0.22)
-    assert found["theta_2"] == fourbar.solve(scene).theta_2[0]
-    assert found["power"] == pytest.approx(found["drive_force"] * 0.1, rel=1e-13)
-    lever = 0.3 * 0.12 * abs(np.sin(found["theta_2"] + 0.4 - 2.2)) / 0.35  # of the cylinder about O2, at most 0.3 m
-    assert found["condition"] == pytest.approx(abs(found["sin_mu"]) * lever / 0.3, rel=1e-13)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("bar", "side", "length"), [(2, "left", 0.35), (4, "right", 0.5)])
-def test_a_stroke_commands(library: Library, bar: int, side: str, length: float) -> None:
-    """The strokes before and after the one are none that this cylinder can have."""
+def on_stroke(bar: int, side: str, length: float) -> Scene:
     line = LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(bar, -0.12, 0.4))
-    scene = replace(CYLINDER, drive=line, loads=(), motion=Motion(stroke=length, stroke_speed=0.1, side=side))
-    solution, slopes = fourbar.solve(scene), fourbar.sensitivity(scene)
-    assert solution.status == ["ok"]
-    names, keys = ["drive_force", "alpha_3", "condition"], ["motion.stroke", "drive.to.at.0"]
-    f, stroke, end = function(scene, keys, names), library.array([0.01, length, 3.0]), library.array(-0.12)
-    found = library.jit(f)(stroke, end)
-    jacobian = library.jacrev if library.xp.__name__ == "torch" else library.jacfwd
+    motion = Motion(stroke=length, stroke_speed=0.1, side=side)
+    return replace(LOADED, drive_bar=None, drive=line, loads=(), motion=motion)
+
+
+STROKES = {"stroke of bar 2": on_stroke(2, "left", 0.35), "stroke of bar 4": on_stroke(4, "right", 0.5)}
+SCENES = {
+    **{f"bar {bar}": replace(LOADED, drive_bar=bar, motion=Motion(ANGLES, 8.0, 3.0)) for bar in (2, 3, 4)},
+    **{f"line from {one} to {other}": on_line(one, other) for one, other in ((1, 3), (1, 4), (2, 4))},
+    "theta_3": replace(LOADED, motion=Motion(theta_3=0.6, omega_3=2.0), loads=(), drive_bar=4),
+    "theta_4": replace(LOADED, motion=Motion(theta_4=2.2, omega_4=-1.0, alpha_4=2.0), loads=(), drive_bar=3),
+    **STROKES,
+}
+
+
+@pytest.mark.parametrize("library", ["numpy", pytest.param("jax", marks=pytest.mark.slow), LIBRARIES[1]], indirect=True)
+@pytest.mark.parametrize("name", SCENES)
+def test_every_quantity_is_that_of_solve(library: Library, name: str) -> None:
+    scene = SCENES[name]
+    quantities = [quantity for quantity in EVERY if scene.drive is None or quantity != "torque"]
+    quantities += [] if scene.drive is None else LINE_QUANTITIES[:4]
+    f = function(scene, ["lengths.coupler", "effects.gravity.0", command_key(scene)], quantities)
+    found, solution = library.jit(f)(*map(library.array, (0.25, 9.81, scene.motion.angle))), fourbar.solve(scene)
+    assert set(found) == set(quantities)
+    for quantity in quantities:
+        theirs = of_solution(solution, quantity)
+        gap = np.reshape(found[quantity], theirs.shape) - theirs
+        gap = wrapped(gap) if quantity.startswith("theta") else gap
+        assert np.abs(gap).max() <= ROUNDED * max(1.0, np.abs(theirs).max()), quantity
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STROKES)
+def test_a_stroke_that_the_cylinder_cannot_have_leaves_the_others_their_derivatives(
+    library: Library, name: str
+) -> None:
+    scene, keys, quantities = STROKES[name], ["motion.stroke", "drive.to.at.0"], ["drive_force", "alpha_3", "condition"]
+    slopes, strokes = fourbar.sensitivity(scene), np.array([0.01, scene.motion.angle, 3.0])
+    f, jacobian = function(scene, keys, quantities), jacobian_of(library)
+    found = library.jit(f)(library.array(strokes), library.array(-0.12))
 
     def summed(x: Any) -> Any:
-        return {name: library.xp.nansum(of) for name, of in f(x[0] + stroke, x[1] + end).items()}
+        values = f(x[0] + library.array(strokes), x[1] + library.array(-0.12))
+        return {quantity: library.xp.nansum(value) for quantity, value in values.items()}
 
     by = library.jit(jacobian(summed))(library.array([0.0, 0.0]))
-    for name in names:
-        assert np.isnan(np.asarray(found[name])).tolist() == [True, False, True]
-        assert float(found[name][1]) == pytest.approx(getattr(solution, name)[0], rel=ROUNDED)
-        assert np.asarray(by[name]) == pytest.approx([slopes.of(name, key)[0] for key in keys], rel=ROUNDED)
-    assert np.isnan(f(np.array([0.01, length, 3.0]), -0.12)["alpha_3"]).tolist() == [True, False, True]
-    stated = function(scene, keys[1:], names[:1])
-    assert float(stated(end)["drive_force"]) == pytest.approx(solution.drive_force[0], rel=ROUNDED)
+    for quantity in quantities:
+        assert np.isnan(np.asarray(found[quantity])).tolist() == [True, False, True]
+        exact = [slopes.of(quantity, key)[0] for key in keys]
+        assert np.asarray(by[quantity]) == pytest.approx(exact, rel=ROUNDED)
+
+
+def jacobian_of(library: Library) -> Any:
+    """Forwards in JAX and backwards in PyTorch, which are no derivation of ours."""
+    return library.jacrev if library.xp.__name__ == "torch" else library.jacfwd
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name != "tables"])
 def test_derivatives_are_those_of_sensitivity(library: Library, family: str) -> None:
-    """Forwards in JAX and backwards in PyTorch, which are no derivation of ours."""
     scene = FAMILIES[family](np.random.default_rng([3, list(FAMILIES).index(family)]))
     wanted = fourbar.sensitivity(scene)
     numbers = numbers_of(scene)
-    quantities = ["drive_force" if scene.drive else "torque", "F12", "F43", "theta_4", "alpha_3"]
+    quantities = ["torque", "F12", "F43", "theta_4", "alpha_3"]
+    if scene.drive is not None:
+        quantities[:1] = ["drive_force", "stroke_speed", "drive_condition"]
     f = function(scene, list(numbers), quantities)
     values = library.array(list(numbers.values()))
-    slopes = (library.jacrev if library.xp.__name__ == "torch" else library.jacfwd)(lambda x: f(*x))(values)
+    slopes = jacobian_of(library)(lambda x: f(*x))(values)
     for name in quantities:
         ours = np.asarray(slopes[name])
         assert np.isfinite(ours).all()
@@ -252,7 +211,7 @@ def test_derivatives_keep_their_digits_beside_half_a_turn(library: Library, moti
     scene = replace(LOADED, linkage=uniform(0.3, *lengths), motion=motion, loads=(), effects=(Gravity(),))
     key, wanted = command_key(scene), fourbar.sensitivity(scene)
     f = function(scene, [key], ["torque", "A", "alpha_3"])
-    for transform in {library.jacrev, library.jacrev if library.xp.__name__ == "torch" else library.jacfwd}:
+    for transform in {library.jacrev, jacobian_of(library)}:
         found = transform(f)(library.array(motion.angle))
         for name, slope in found.items():
             exact = wanted.of(name, key)[0]
