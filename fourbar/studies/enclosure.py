@@ -28,8 +28,8 @@ from fourbar.quantities import COUPLE, LINE, NOT_ASSEMBLED, PIN_FORCES
 from fourbar.scene import Scene, command, require_input
 from fourbar.solve import solve
 from fourbar.studies.derivatives import make_differentiable
-from fourbar.studies.keys import is_left_out, list_entries, read_place, replace_numbers
-from fourbar.studies.sloped import Sloped
+from fourbar.studies.keys import read_numbers, replace_numbers
+from fourbar.studies.sloped import Sloped, make_balls
 from fourbar.studies.study import vary
 
 BITS = 128
@@ -147,29 +147,28 @@ class _Search:
         from flint import arb
 
         self.arb, self.scene, self.boxes = arb, scene, 0
-        entries = list_entries(scene)
+        stated = read_numbers(scene)
         self.reach = {tolerance.key: tolerance.reach for tolerance in scene.tolerances}
         for key in self.reach:
-            if key not in entries or is_left_out(scene, entries[key]):
+            if key not in stated:
                 raise InputError(f"tolerances.{key}", self.reach[key], "is no number that the scene states")
-        self.keys = [key for key in entries if key in self.reach]
+        self.keys = [key for key in stated if key in self.reach]
         self.parts, self.distance = _find_interval(scene)
         self.branch = float(command(scene).branch[0])
         _require_assembly(scene, self.parts)
-        start = [(a, b) for low, high in self.parts for a, b in _halve(np.linspace(low, high, FIRST + 1))]
-        self.start = np.array(start)
+        self.start = _split(np.array(self.parts), FIRST)
         self.at_start: tuple[dict[str, Sloped], dict[str, Sloped]] | None = None
 
     def number(self, key: str, value: float, moved: Any) -> Sloped:
         """Return a number of the scene at all boxes: as a ball over its tolerance, or moved by a part of that."""
-        slopes, ball = np.zeros((1 + len(self.keys), 1), dtype=object), self.arb(value)
+        slopes = np.zeros((1 + len(self.keys), 1), dtype=object)
         if key not in self.reach:
-            return Sloped(np.array([ball], dtype=object), slopes)
-        row = 1 + self.keys.index(key)
-        slopes[row] = 1
+            return Sloped(make_balls(value), slopes)
+        row = self.keys.index(key)
+        slopes[1 + row] = 1
         if moved is None:
-            return Sloped(np.array([self.arb(value, self.reach[key])], dtype=object), slopes)
-        return Sloped(np.array([ball + float(part) * self.reach[key] for part in moved[row - 1]], dtype=object), slopes)
+            return Sloped(make_balls(value, self.reach[key]), slopes)
+        return Sloped(make_balls(value) + moved[row].astype(object) * self.reach[key], slopes)
 
     def evaluate(self, theta_2: Balls, moved: Any) -> dict[str, Sloped]:
         """Compute the quantities, the pin forces and the sine of the transmission angle squared, with their slopes.
@@ -177,11 +176,7 @@ class _Search:
         `moved`: None: over the tolerances; else what each number is off by, in parts of its tolerance, (k, n).
         """
         self.boxes += len(theta_2)
-        numbers = {
-            key: self.number(key, read_place(self.scene, entry.place), moved)
-            for key, entry in list_entries(self.scene).items()
-            if not is_left_out(self.scene, entry)
-        }
+        numbers = {key: self.number(key, value, moved) for key, value in read_numbers(self.scene).items()}
         still = {key: number for key, number in numbers.items() if not key.startswith("motion.")}
         scene = replace_numbers(make_differentiable(self.scene), still)
         by_theta = np.zeros((1 + len(self.keys), 1), dtype=object)
@@ -205,9 +200,8 @@ class _Search:
         if boxes is self.start and self.at_start is not None:  # every search begins with them
             return self.at_start
         centre, radius = _centre(boxes)
-        wide = np.array([self.arb(x, r) for x, r in zip(centre, radius, strict=True)], dtype=object)
-        points, off = np.array([self.arb(x) for x in centre], dtype=object), np.zeros((len(self.keys), len(boxes)))
-        bounds = self.evaluate(wide, None), self.evaluate(points, off)
+        undisturbed = np.zeros((len(self.keys), len(boxes)))
+        bounds = self.evaluate(make_balls(centre, radius), None), self.evaluate(make_balls(centre), undisturbed)
         if boxes is self.start:
             self.at_start = bounds
         return bounds
@@ -244,9 +238,9 @@ class _Search:
             top, settled = np.array([bound[0] for bound in bounds]), np.array([bound[1] for bound in bounds])
             if self.keys and (tried := np.flatnonzero(top > max(best, values.max()))).size:
                 slopes = np.broadcast_to(nominal.slopes, (1 + len(self.keys), len(boxes)))[1:, tried]
-                corner = np.array([[sign * math.copysign(1.0, _find_middle(s)) for s in row] for row in slopes])
-                points = np.array([self.arb(x) for x in centre[tried]], dtype=object)
-                values[tried] = np.fmax(values[tried], _bound_below(scale, self.evaluate(points, corner)[name]))
+                middles = np.array([[float(self.arb(slope).mid()) for slope in row] for row in slopes])
+                reached = self.evaluate(make_balls(centre[tried]), sign * np.copysign(1.0, middles))[name]
+                values[tried] = np.fmax(values[tried], _bound_below(scale, reached))
             if values.max() > best:
                 best, theta_2 = float(values.max()), float(centre[int(values.argmax())])
                 size = max(size, abs(best))
@@ -258,9 +252,9 @@ class _Search:
                 pole = math.degrees(float(centre[~np.isfinite(top)][0]))
                 why = "it has a pole there, or within the tolerances, or linkages that do not assemble"
                 raise LimitError(f"{name} has no bound at theta_2 = {pole:.6g} deg: {why}")
-            boxes = np.array([half for box in boxes[~done] for half in _halve(np.linspace(box[0], box[1], 3))])
-        reached, proven = unit * best, unit * max(closed, best)
-        return (reached, proven, theta_2) if sign > 0 else (-proven, -reached, theta_2)
+            boxes = _split(boxes[~done], 2)
+        farthest, proven = unit * best, unit * max(closed, best)
+        return (farthest, proven, theta_2) if sign > 0 else (-proven, -farthest, theta_2)
 
     def _bound(self, scale: Any, over: Sloped, nominal: Sloped, index: int, radius: float) -> tuple[float, bool]:
         """Bound what a box holds from above, inf without a bound; the second is True if halving gains nothing."""
@@ -296,12 +290,10 @@ def _centre(boxes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
     return centre, np.nextafter(np.maximum(boxes[:, 1] - centre, centre - boxes[:, 0]), math.inf)
 
 
-def _find_middle(ball: Any) -> float:
-    return float(ball.mid()) if hasattr(ball, "mid") else float(ball)
-
-
-def _halve(ends: Any) -> list[tuple[float, float]]:
-    return list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
+def _split(boxes: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
+    """Split each box into equal parts."""
+    ends = np.linspace(boxes[:, 0], boxes[:, 1], parts + 1, axis=1)
+    return np.stack([ends[:, :-1], ends[:, 1:]], axis=2).reshape(-1, 2)
 
 
 def require_provable(scene: Scene) -> None:
@@ -368,9 +360,9 @@ def _require_assembly(scene: Scene, parts: tuple[tuple[float, float], ...]) -> N
         return
     corners = np.array(list(itertools.product((-1.0, 1.0), repeat=len(of_lengths))))
     off = np.concatenate([corners, np.random.default_rng(0).uniform(-1.0, 1.0, (TRIED, len(of_lengths)))]).T
-    entries, first = list_entries(scene), scene.linkage.ground_angle
+    stated, first = read_numbers(scene), scene.linkage.ground_angle
     values: dict[str, Any] = {
-        tolerance.key: read_place(scene, entries[tolerance.key].place) + tolerance.reach * part
+        tolerance.key: stated[tolerance.key] + tolerance.reach * part
         for tolerance, part in zip(of_lengths, off, strict=True)
     }
     along = [first + 0.5 * TURN * turn for turn in range(-4, 5)]

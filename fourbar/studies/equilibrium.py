@@ -38,8 +38,8 @@ from fourbar.studies.circuit_curve import (
 )
 from fourbar.studies.derivatives import make_differentiable
 from fourbar.studies.enclosure import PROVABLE
-from fourbar.studies.keys import is_left_out, list_entries, read_place, replace_numbers
-from fourbar.studies.sloped import Sloped
+from fourbar.studies.keys import read_numbers, replace_numbers
+from fourbar.studies.sloped import Sloped, make_balls
 from fourbar.studies.zeros import AT_CHANGE_POINT, Zeros, find_zeros
 
 A_JUMP = 1e-6
@@ -48,8 +48,6 @@ STILL = 1e-3
 """Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit, and theta_4 takes its place."""
 A_RANGE = 3
 """Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
-
-
 HALVINGS = 60
 """Number of halvings of the distance between two samples, enough to reach its last digits."""
 
@@ -177,13 +175,13 @@ def _find_sign_changes(curve: CircuitCurve, points: Array) -> Zeros:
     following = np.concatenate([np.roll(one[row == number], -1) for number in range(len(curve.rows))])
     gap = np.remainder(tau[following] - tau, TURN)
     between = np.flatnonzero((Q * Q[following] < 0.0) & (gap < 2.5 * TURN / SAMPLES) & ~idle & ~idle[following])
-    low, high, start = tau[between], tau[between] + gap[between], Q[between]
-    branch = np.array(curve.rows)[row[between]]
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        before = curve.force(curve.in_rows(middle, branch)) * start > 0.0
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    zeros = curve.in_rows(high, branch)
+    start, branch = Q[between], np.array(curve.rows)[row[between]]
+
+    def has_sign_of_start(tau: Array) -> NDArray[np.bool_]:
+        return curve.force(curve.in_rows(tau, branch)) * start > 0.0
+
+    _, after = _bisect(has_sign_of_start, tau[between], tau[between] + gap[between])
+    zeros = curve.in_rows(after, branch)
     real = np.abs(curve.force(zeros)) <= A_JUMP * size[between]
     for point in curve.singular:  # nothing moves there, so that Q vanishes
         real &= ~(np.abs(np.sin(0.5 * (zeros - point))) < AT_CHANGE_POINT).all(axis=1)
@@ -213,17 +211,15 @@ def _prove_zeros(curve: CircuitCurve, idle: Array) -> Zeros | None:
 
 def _enclose_force(scene: Scene) -> Callable[[Any, Any], Sloped] | None:
     """Make Q of psi and mu in ball arithmetic, with its slopes by both; None if an effect has no form in it."""
-    from flint import arb
-
     acting = tuple(term for term in scene.effects if not term.dry_pins)  # dry friction does no work at rest
     if any(term.key not in PROVABLE or getattr(term, "table", None) for term in (*scene.loads, *acting)):
         return None
     scene = make_differentiable(replace(scene, effects=acting))
     still = np.zeros((2, 1), dtype=object)
     numbers = {
-        key: Sloped(np.array([arb(read_place(scene, entry.place))], dtype=object), still)
-        for key, entry in list_entries(scene).items()
-        if not key.startswith("motion.") and not is_left_out(scene, entry)
+        key: Sloped(make_balls(value), still)
+        for key, value in read_numbers(scene).items()
+        if not key.startswith("motion.")
     }
     exact = replace_numbers(scene, numbers)
     lengths, theta_1 = Loop(*exact.linkage.lengths, 0.0, 0.0), exact.linkage.ground_angle
@@ -341,9 +337,14 @@ def _is_inside(curve: CircuitCurve, point: Array, part: _CircuitRange) -> bool:
 
 def _find_edge(held: Callable[[Array], NDArray[np.bool_]], tau: Array, gap: Array, sense: float) -> Array:
     """Find where a range ends, between a place that is held and the next one, which is not."""
-    low, high = np.zeros(tau.shape), gap
+    inside, _ = _bisect(lambda away: held(tau + sense * away), np.zeros(tau.shape), gap)
+    return np.asarray(np.remainder(tau + sense * inside, TURN))
+
+
+def _bisect(holds: Callable[[Array], NDArray[np.bool_]], low: Array, high: Array) -> tuple[Array, Array]:
+    """Narrow each interval, at whose lower end alone something holds, to the two neighbours between which it ends."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        inside = held(tau + sense * middle)
-        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    return np.asarray(np.remainder(tau + sense * low, TURN))
+        held = holds(middle)
+        low, high = np.where(held, middle, low), np.where(held, high, middle)
+    return low, high

@@ -173,6 +173,15 @@ def read_place(value: Any, place: Place) -> Any:
     return value
 
 
+def read_numbers(scene: Scene) -> dict[str, Any]:
+    """Return the numbers that the scene states, by key: all but what it leaves to a uniform bar."""
+    return {
+        key: read_place(scene, entry.place)
+        for key, entry in list_entries(scene).items()
+        if not is_left_out(scene, entry)
+    }
+
+
 def replace_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
     """Copy the scene with some of its numbers replaced, by key."""
     entries, changed = list_entries(scene), scene

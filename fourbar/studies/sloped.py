@@ -164,6 +164,13 @@ class Sloped(NDArrayOperatorsMixin):
         return _find_by_name(function, args, options)
 
 
+def make_balls(centre: Any, radius: Any = 0.0) -> NDArray[Any]:
+    """Return balls (n,) of centres and radii."""
+    from flint import arb
+
+    return np.atleast_1d(np.frompyfunc(arb, 2, 1)(centre, radius))
+
+
 def _find_by_name(function: Any, args: Sequence[Any], options: Any) -> Any:
     return NotImplemented if function not in FUNCTIONS or options else FUNCTIONS[function](*args)
 

@@ -13,7 +13,7 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solution import Array, find_values, split_parts
 from fourbar.solve import solve
 from fourbar.studies.derivatives import Sensitivity, sensitivity
-from fourbar.studies.keys import LEFT_OUT, command_key, is_left_out, list_entries, read_place, refuse_key
+from fourbar.studies.keys import LEFT_OUT, command_key, list_entries, read_numbers, refuse_key
 from fourbar.studies.study import Study, vary
 from fourbar.writing import describe_extent, list_names, make_data_frame, make_html, write_between
 
@@ -184,17 +184,16 @@ def _make_members(scene: Scene, samples: int, seed: int) -> Study:
         from scipy.stats import norm, qmc
     except ImportError:
         raise DependencyError(f"SciPy is needed for tolerances: {say_install('studies')}") from None
-    entries, numbers = list_entries(scene), dict[str, Any]()
+    entries, stated, numbers = list_entries(scene), read_numbers(scene), dict[str, Any]()
     drawn = qmc.Sobol(len(scene.tolerances), seed=seed).random_base2(max(1, (samples - 1).bit_length()))[:samples]
     for tolerance, column in zip(scene.tolerances, drawn.T, strict=True):
         if tolerance.key not in entries:
             raise refuse_key(tolerance.key, tolerance.width, list(entries))
-        entry = entries[tolerance.key]
-        if is_left_out(scene, entry):
+        if tolerance.key not in stated:
             raise InputError(tolerance.key, tolerance.width, LEFT_OUT)
         inside = np.clip(column, 0.5 / samples, 1.0 - 0.5 / samples)
         change = norm.ppf(inside) if tolerance.sigma else 2.0 * column - 1.0
-        numbers[tolerance.key] = read_place(scene, entry.place) + tolerance.width * change
+        numbers[tolerance.key] = stated[tolerance.key] + tolerance.width * change
     if scene.motion.law is None:
         numbers[command_key(scene)] = command(scene).places
     return vary(scene, numbers)

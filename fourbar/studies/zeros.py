@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fourbar.formulas.position import Loop
 from fourbar.solution import Array
 from fourbar.studies.circuit_curve import closure
-from fourbar.studies.sloped import Sloped
+from fourbar.studies.sloped import Sloped, make_balls
 
 PI = math.pi
 FIRST = 24
@@ -128,11 +128,7 @@ class _Newton:
         from flint import arb
 
         self.arb = arb
-        points = [np.array([arb(x) for x in column], dtype=object) for column in centres.T]
-        boxes = [
-            np.array([arb(x, r) for x, r in zip(*both, strict=True)], dtype=object)
-            for both in zip(centres.T, radii.T, strict=True)
-        ]
+        points, boxes = [*make_balls(centres.T)], [*make_balls(centres.T, radii.T)]
         d, a, b, c = lengths[:4]
         self.points, self.many = points, len(centres)
         self.g, self.F = closure(lengths, *points), function(*points).values

@@ -22,7 +22,7 @@ from fourbar.quantities import LINE_QUANTITIES, STAGE_OF
 from fourbar.scene import Scene
 from fourbar.studies.derivatives import sensitivity
 from fourbar.studies.function import NEVER, function
-from fourbar.studies.keys import command_key, is_left_out, list_entries, read_place, replace_numbers, replace_place
+from fourbar.studies.keys import command_key, list_entries, read_numbers, replace_numbers, replace_place
 from fourbar_lab.tally import Tally, compute_ratio, is_untold, list_components
 from fourbar_validation.engines.balls import STEP_BITS, Values, compute_outputs, make_balls
 from fourbar_validation.engines.description import PINS
@@ -85,12 +85,7 @@ def _close_table(table: Table | None) -> Table | None:
 
 def list_numbers(scene: Scene) -> dict[str, float]:
     """List every number that a scene of one position states, its angle too, by key."""
-    numbers = {
-        key: read_place(scene, entry.place)
-        for key, entry in list_entries(scene).items()
-        if not is_left_out(scene, entry)
-    }
-    return {**numbers, command_key(scene): float(np.asarray(scene.motion.angle))}
+    return {**read_numbers(scene), command_key(scene): float(np.asarray(scene.motion.angle))}
 
 
 def evaluate(scene: Scene, library: str, *, derivatives: bool = False) -> dict[str, Any]:

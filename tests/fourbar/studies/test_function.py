@@ -27,8 +27,9 @@ from fourbar.formulas.arithmetic import namespace
 from fourbar.quantities import LINE_QUANTITIES, STAGE_OF
 from fourbar.scene.motion import Free
 from fourbar.studies.function import NEVER, function
-from fourbar.studies.keys import command_key, is_left_out, list_entries, read_place
+from fourbar.studies.keys import command_key
 from fourbar_lab.families import FAMILIES
+from fourbar_lab.slopes import list_numbers
 
 EPS = 2.0**-52
 ROUNDED = 200.0 * EPS
@@ -96,16 +97,6 @@ LOADED = Scene(
 )
 EVERY = [*(name for name in STAGE_OF if name not in {*NEVER, *LINE_QUANTITIES}), "P", "v_P", "a_P"]
 ANGLES = np.linspace(0.0, 6.0, 13)
-
-
-def numbers_of(scene: Scene) -> dict[str, float]:
-    """Every number that a scene states, its angle too."""
-    found = {
-        key: read_place(scene, entry.place)
-        for key, entry in list_entries(scene).items()
-        if not is_left_out(scene, entry)
-    }
-    return {**found, command_key(scene): float(np.ravel(scene.motion.angle)[0])}
 
 
 def of_solution(solution: Any, name: str) -> Any:
@@ -186,7 +177,7 @@ def jacobian_of(library: Library) -> Any:
 def test_derivatives_are_those_of_sensitivity(library: Library, family: str) -> None:
     scene = FAMILIES[family](np.random.default_rng([3, list(FAMILIES).index(family)]))
     wanted = fourbar.sensitivity(scene)
-    numbers = numbers_of(scene)
+    numbers = list_numbers(scene)
     quantities = ["torque", "F12", "F43", "theta_4", "alpha_3"]
     if scene.drive is not None:
         quantities[:1] = ["drive_force", "stroke_speed", "drive_condition"]
