@@ -191,7 +191,11 @@ def sensitivity(scene: Scene) -> Sensitivity:
         _, decided = Case.of(scene, commanded.bar).half_angle(commanded.angle, None)
         status[decided] = STATUS_NAMES[SINGULAR]  # doubles cannot tell the factors from zero
         regular = np.flatnonzero(~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)]))
-        seeded = _seed(scene, keys)
+        seeded = make_differentiable(scene)
+        for number, (key, entry) in enumerate(keys.items()):
+            if not key.startswith("motion."):  # what is left out carries the slope of its length too
+                sloped = read_place(seeded, entry.place) + make_unit_slope(number, p)
+                seeded = replace_place(seeded, entry.place, sloped)
         for start in range(0, len(regular), AT_ONCE):
             index = regular[start : start + AT_ONCE]
             derived, held = _compute_derivatives(seeded, keys, commanded, index, by.keys(), moving)
@@ -220,24 +224,10 @@ class _Directed(Gravity):
 
 def make_differentiable(scene: Scene) -> Scene:
     """Replace the scene's effects by some that compute their derivatives too."""
-    return replace(
-        scene,
-        effects=tuple(
-            _Directed(effect.magnitude, effect.angle) if isinstance(effect, Gravity) else effect
-            for effect in scene.effects
-        ),
+    effects = (
+        _Directed(effect.magnitude, effect.angle) if isinstance(effect, Gravity) else effect for effect in scene.effects
     )
-
-
-def _seed(scene: Scene, keys: dict[str, SceneNumber]) -> Scene:
-    """Give every number of the scene its own unit slope; what it leaves out carries that of its length too."""
-    scene = make_differentiable(scene)
-    for index, (key, entry) in enumerate(keys.items()):
-        if not key.startswith("motion."):
-            scene = replace_place(
-                scene, entry.place, read_place(scene, entry.place) + make_unit_slope(index, len(keys))
-            )
-    return scene
+    return replace(scene, effects=tuple(effects))
 
 
 def make_unit_slope(index: int, count: int) -> Sloped:
@@ -262,12 +252,8 @@ def _compute_derivatives(
             return number + make_unit_slope(place[key], len(keys))
         return Sloped(number, np.zeros((len(keys), 1)))
 
-    rates = (
-        (stated.speed, stated.acceleration)
-        if scene.motion.law is not None
-        else (scene.motion.speed, scene.motion.acceleration)
-    )
-    numbers = (stated.angle if stated.stroke is None else stated.stroke, *rates)
+    rates = scene.motion if scene.motion.law is None else stated
+    numbers = (stated.angle if stated.stroke is None else stated.stroke, rates.speed, rates.acceleration)
     commanded = {
         name: seeded(f"motion.{name}", number) for name, number in zip(scene.motion.names, numbers, strict=True)
     }

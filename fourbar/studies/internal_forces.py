@@ -18,7 +18,7 @@ from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.formulas.arithmetic import cross, polar
 from fourbar.formulas.motion import State
-from fourbar.linkage import ENDS, PIN_FORCE, PINS, Bar, require_bar, require_numbers
+from fourbar.linkage import ENDS, PIN_FORCE, PINS, require_bar, require_numbers
 from fourbar.scene import Scene
 from fourbar.solution import Array, Solution
 
@@ -189,7 +189,7 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
         recorder = _Recorder(state, scene, bar)
         _record_pins(recorder, solution)
         _record_drive(recorder, scene, solution)
-        gravity = 0.0j
+        gravity, back = 0.0j, np.conj(state.direction(bar))
         uniform = described.inertia is None and described.centre is None
         terms: tuple[Any, ...] = case.terms
         for term in terms:
@@ -197,11 +197,11 @@ def _collect(scene: Scene, solution: Solution, bar: int) -> _Beam:
                 gravity = gravity + term.field
                 continue
             if term.key == "load" and term.bar == bar:
-                recorder.place = _find_load(described, term, state)
+                arm = polar(*term.at)
+                recorder.place = described.to_centre + (arm if term.frame == "bar" else arm * back)
             term.act(recorder, state)
             recorder.place = 0.0j
             term.act_known(recorder, {name: getattr(solution, name) for name in PIN_FORCE.values()})
-        back = np.conj(state.direction(bar))
         a_A = solution.a_A
         assert a_A is not None
         pin_acceleration = (a_A[:, 0] + 1j * a_A[:, 1] if bar == 3 else np.zeros(n)) - gravity
@@ -250,9 +250,3 @@ def _record_drive(recorder: _Recorder, scene: Scene, solution: Solution) -> None
         scene.drive.act(recorder, solution.drive_force)
     elif scene.drive_bar == recorder.bar:
         recorder.moment(recorder.bar, solution.torque)
-
-
-def _find_load(bar: Bar, load: Any, state: State) -> Any:
-    """Find where a load acts, in the bar's axes."""
-    arm = polar(*load.at)
-    return bar.to_centre + (arm if load.frame == "bar" else arm * np.conj(state.direction(load.bar)))
