@@ -105,7 +105,8 @@ class Drawing:
 
     def save(self, path: str | Path) -> None:
         """Write it as SVG, PNG or PDF, by the ending of the path, whole or not at all."""
-        write_bytes(Path(path), self._render(format_of(path)))
+        file_format = format_of(path)
+        write_bytes(Path(path), self._render(file_format))
 
     def _render(self, file_format: str) -> bytes:
         buffer = io.BytesIO()
