@@ -8,7 +8,8 @@ gap by the joint angles and c that of the commanded bar's direction or of the st
 
     J a + (dJ/dt) v = 0,   c a + (dc/dt) v = the commanded acceleration
 
-are solved for the acceleration of the input from MuJoCo's own state at each stage; the motor of its flywheel is given it.
+are solved for the acceleration of the input from MuJoCo's own state at each stage, which the motor of its flywheel is
+given.
 """
 
 import bisect
