@@ -42,8 +42,6 @@ SHOWN_AT = {"change_point": math.radians(40.0), "pinocchio_2729": math.radians(1
 """Positions of figures, rad, where the position that the project's figures choose shows little."""
 SIZE, LOW = (3.6, 2.6), (3.6, 1.4)
 """Sizes of a figure, and of one of a low mechanism, inches."""
-BEYOND_BALLS = ("cylinder", "pin_friction")
-"""Problems with an effect that the ball arithmetic does not take."""
 
 
 def read_problem(name: str) -> dict[str, Any]:
@@ -85,8 +83,8 @@ def write_data(problem: dict[str, Any]) -> list[str]:
     return [f"|{'|'.join(row)}|" for row in rows]
 
 
-def write_question(name: str, problem: dict[str, Any]) -> str:
-    """Write what acts, what is commanded, what is asked and where both answers come from."""
+def write_question(problem: dict[str, Any]) -> str:
+    """Write what acts, what is commanded, and what is asked besides the pin forces."""
     scene, command = problem["scene"], problem["command"]
     parts = []
     if turned := scene["lengths"].get("ground_angle"):
@@ -108,24 +106,8 @@ def write_question(name: str, problem: dict[str, Any]) -> str:
     else:
         ends = [write_number(math.degrees(angle)) for angle in (angles[0], angles[-1])]
         parts.append(f"θ₂ from {ends[0]}° to {ends[1]}° in {len(angles)} positions, {rates}, {branch}.")
-    return f"{' '.join(parts)} **Asked:** {name_asked(problem)}. **Answered by** {name_answers(name, problem)}."
-
-
-def name_asked(problem: dict[str, Any]) -> str:
-    """Name what is asked, with the pin forces as one."""
-    single = [f"`{quantity}`" for quantity in problem["answers"] if quantity not in PIN_FORCES]
-    return f"{', '.join(single)}, {sum(quantity in PIN_FORCES for quantity in problem['answers'])} pin forces"
-
-
-def name_answers(name: str, problem: dict[str, Any]) -> str:
-    """Name the derivations of a problem's answers."""
-    if problem["mechanism"] == "slider-crank":
-        return "free bodies and virtual work"
-    if problem["ask"] == "release":
-        return f"integration, {'elliptic functions' if 'frequency' in problem['answers'] else 'energy'} and free bodies"
-    return (
-        f"formulas{' and' if name in BEYOND_BALLS else ','} free bodies{'' if name in BEYOND_BALLS else ' and balls'}"
-    )
+    asked = [f"`{quantity}`" for quantity in problem["answers"] if quantity not in PIN_FORCES]
+    return f"{' '.join(parts)} **Asked:** {', '.join(asked)}."
 
 
 def read_rows() -> list[dict[str, str]]:
@@ -258,7 +240,7 @@ def text(page: str) -> str:
         else:
             problem = read_problem(name)
             figure = f"![{problem['title']}]({FIGURES.name}/{name}.svg)"
-            lines = [figure, "", *write_data(problem), "", write_question(name, problem)]
+            lines = [figure, "", *write_data(problem), "", write_question(problem)]
         return "\n".join((f"<!-- data {name} -->", "", *lines, "", "<!-- end -->", ""))
 
     return BLOCK.sub(write_block, text)
