@@ -60,7 +60,7 @@ def try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
     failing = rows if isinstance(rows, str) else [row for outcome in rows[0].values() for row in outcome]
     yield "no fault", f"the harness fails without one: {failing}" if failing else None
     chunks = [range(start, min(start + CHUNK, len(entries))) for start in range(0, len(entries), CHUNK)]
-    for chunk, outcomes in zip(chunks, apply_each(try_in_turn, chunks, workers, seconds=None), strict=True):
+    for chunk, outcomes in zip(chunks, apply_each(try_in_turn, chunks, workers), strict=True):
         for number, outcome in zip(chunk, outcomes, strict=True):
             why = explain_survival(entries[number], outcome)
             yield entries[number]["fault"], None if why and "harmless" in entries[number] else why

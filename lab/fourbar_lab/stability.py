@@ -163,7 +163,7 @@ def stability(
     chosen = families or tuple(FAMILIES)
     parts = [range(start, min(start + CHUNK, samples)) for start in range(0, samples, CHUNK)]
     tasks = [(family, part) for family in chosen for part in parts]
-    results = apply_each(partial(_run, seed, bar, library, derivatives), tasks, jobs, seconds=None)
+    results = apply_each(partial(_run, seed, bar, library, derivatives), tasks, jobs)
     tallies = {family: Tally() for family in chosen}
     for (family, _), tally in track(zip(tasks, results, strict=True), "samples", total=len(tasks)):
         tallies[family].add(tally)

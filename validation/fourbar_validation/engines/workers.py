@@ -107,13 +107,13 @@ def _end_with(parent: int) -> None:
 
 
 class Workers:
-    """Workers that carry out tasks: the processes of a Pebble pool."""
+    """Processes of a Pebble pool, which carry out tasks."""
 
     def __init__(
         self, pool: "ProcessPool", function: Callable[[Any], Any], workers: int, seconds: float | None
     ) -> None:
         self._pool, self._function, self._seconds = pool, function, seconds
-        self.in_flight = IN_FLIGHT * workers
+        self._in_flight = IN_FLIGHT * workers
 
     def submit(self, items: Sequence[Any]) -> "Future[list[Any]]":
         """Hand in some items.
@@ -132,9 +132,12 @@ class Workers:
             raise StalledError from None
         return future
 
-    def done(self, tasks: "Collection[Future[Any]]", seconds: float) -> "set[Future[Any]]":
-        """Wait for those that are finished, until there is one; none after some seconds."""
-        return wait(tasks, seconds, FIRST_COMPLETED).done
+    def wait_for(self, tasks: "Collection[Future[Any]]") -> "set[Future[Any]]":
+        """Wait for some that are finished; StalledError where the pool broke, or no worker takes up a task."""
+        while not (done := wait(tasks, STALL, FIRST_COMPLETED).done):
+            if not self._pool.active or not any(task.running() for task in tasks):
+                raise StalledError
+        return done
 
     def result(self, task: "Future[list[Any]]") -> list[Any]:
         """Return or raise what a finished task did; StalledError where it is on nobody's account."""
@@ -143,9 +146,43 @@ class Workers:
         except BrokenProcessPool:  # workers died while they had nothing to do
             raise StalledError from None
 
-    def lost(self, tasks: "Collection[Future[Any]]") -> bool:
-        """Tell whether the pool broke, or none of its workers takes up a task."""
-        return not self._pool.active or not any(task.running() for task in tasks)
+    def attempt(self, item: Any) -> Any:
+        """Do one item by itself: its result, or the exception that it ended with."""
+        for _ in range(ATTEMPTS):
+            task = self.submit([item])
+            self.wait_for([task])
+            try:
+                return self.result(task)[0]
+            except (StalledError, DependencyError):
+                raise
+            except Exception as error:
+                outcome = error
+            if getattr(outcome, "exitcode", None) not in FROM_OUTSIDE:
+                break  # otherwise somebody killed it: that is not the item's doing
+        return outcome
+
+    def over(self, chunks: Iterable[Chunk], instead: Instead) -> Iterator[tuple[int, list[Any]]]:
+        """Keep a bounded number of chunks running; yield each as it is done."""
+        waiting = iter(chunks)
+        running: dict[Any, Chunk] = {}
+        while True:
+            for chunk in islice(waiting, self._in_flight - len(running)):
+                running[self.submit(chunk[1])] = chunk
+            if not running:
+                return
+            for task in self.wait_for(running):
+                number, items = running.pop(task)
+                try:
+                    results = self.result(task)
+                except (StalledError, DependencyError):
+                    raise
+                except Exception as error:  # the worker died or hung, or the function failed; on whose account?
+                    clear = len(items) == 1 and getattr(error, "exitcode", None) not in FROM_OUTSIDE
+                    results = [error if clear else self.attempt(item) for item in items]
+                    for place, (item, outcome) in enumerate(zip(items, results, strict=True)):
+                        if isinstance(outcome, Exception):
+                            results[place] = instead(item, outcome, self.attempt)
+                yield number, results
 
 
 def fail(_: object, error: Exception, __: Attempt) -> NoReturn:
@@ -153,19 +190,12 @@ def fail(_: object, error: Exception, __: Attempt) -> NoReturn:
     raise error
 
 
-def apply_each(
-    function: Callable[[Any], Any],
-    items: Iterable[Any],
-    workers: int = 1,
-    *,
-    seconds: float | None = SECONDS,
-    instead: Instead = fail,
-) -> Iterator[Any]:
-    """Apply the function to each item; results in the order of the items, as soon as those before are there."""
+def apply_each(function: Callable[[Any], Any], items: Iterable[Any], workers: int) -> Iterator[Any]:
+    """Apply the function to each item, however long it takes; results in the order of the items."""
     result: dict[int, list[Any]] = {}
     turn = 0
     chunks = enumerate([item] for item in items)
-    for number, results in apply_over_processes(function, chunks, workers, seconds=seconds, instead=instead):
+    for number, results in apply_over_processes(function, chunks, workers, seconds=None, instead=fail):
         result[number] = results
         while turn in result:
             yield from result.pop(turn)
@@ -173,12 +203,7 @@ def apply_each(
 
 
 def apply_over_processes(
-    function: Callable[[Any], Any],
-    chunks: Iterable[Chunk],
-    workers: int,
-    *,
-    seconds: float | None = SECONDS,
-    instead: Instead = fail,
+    function: Callable[[Any], Any], chunks: Iterable[Chunk], workers: int, *, seconds: float | None, instead: Instead
 ) -> Iterator[tuple[int, list[Any]]]:
     """Apply the function to each item of the chunks, over processes; chunks as they are done.
 
@@ -201,7 +226,7 @@ def apply_over_processes(
         ) as pool:
             try:
                 crew = Workers(pool, function, workers, seconds)
-                for number, results in yield_done(chain(list(unfinished.items()), waiting), crew, instead):
+                for number, results in crew.over(chain(list(unfinished.items()), waiting), instead):
                     yield number, results
                     del unfinished[number]
                     in_vain = 0
@@ -215,46 +240,3 @@ def apply_over_processes(
             except BaseException:
                 pool.stop()  # type: ignore[no-untyped-call]
                 raise
-
-
-def yield_done(chunks: Iterable[Chunk], workers: Workers, instead: Instead) -> Iterator[tuple[int, list[Any]]]:
-    """Keep a bounded number of chunks running; yield each as it is done."""
-
-    def attempt(item: Any) -> Any:
-        for _ in range(ATTEMPTS):
-            task = workers.submit([item])
-            while not workers.done([task], STALL):
-                if workers.lost([task]):
-                    raise StalledError
-            try:
-                return workers.result(task)[0]
-            except (StalledError, DependencyError):
-                raise
-            except Exception as error:
-                outcome = error
-            if getattr(outcome, "exitcode", None) not in FROM_OUTSIDE:
-                break  # otherwise somebody killed it: that is not the item's doing
-        return outcome
-
-    waiting = iter(chunks)
-    running: dict[Any, Chunk] = {}
-    most = workers.in_flight
-    while True:
-        for chunk in islice(waiting, most - len(running)):
-            running[workers.submit(chunk[1])] = chunk
-        if not running:
-            return
-        done = workers.done(running, STALL)
-        if not done and workers.lost(running):
-            raise StalledError
-        for task in done:
-            number, items = running.pop(task)
-            try:
-                results = workers.result(task)
-            except (StalledError, DependencyError):
-                raise
-            except Exception as error:  # the worker died or hung, or the function failed; find out on whose account
-                clear = len(items) == 1 and getattr(error, "exitcode", None) not in FROM_OUTSIDE
-                tried = [(item, error if clear else attempt(item)) for item in items]
-                results = [instead(*job, attempt) if isinstance(job[1], Exception) else job[1] for job in tried]
-            yield number, results
