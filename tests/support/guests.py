@@ -6,6 +6,7 @@ import shlex
 import sys
 from pathlib import Path
 
+from fourbar_validation.engines import guests
 from tests.whole.test_imports import ROOT
 
 PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
@@ -21,6 +22,13 @@ def write_program(folder: Path, name: str, *replacements: tuple[str, str]) -> st
     file = folder / f"{name.replace(' ', '_')}.py"
     file.write_text(text, encoding="utf-8")
     return shlex.join([sys.executable, "-I", "-S", str(file)])
+
+
+def end_guests() -> None:
+    """End the programs that this process started."""
+    for running in guests._RUNNING.values():
+        running.end()
+    guests._RUNNING.clear()
 
 
 def list_processes(mark: str) -> list[int]:

@@ -2,6 +2,7 @@
 
 import sys
 import zipfile
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,13 +12,14 @@ import fourbar
 from fourbar.errors import DependencyError, InputError
 from fourbar.scene import command as list_positions
 from fourbar_validation.compare.rows import AGREES
-from fourbar_validation.engines import environments, guests
+from fourbar_validation.engines import environments
 from fourbar_validation.engines.environments import Entry, make_environment, read_engines, start_engines
 from fourbar_validation.engines.guests import adjust_engines
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.regression.record import describe_run
 from fourbar_validation.run.command import choose_engines
 from fourbar_validation.run.judge import judge
+from tests.support.guests import end_guests
 from tests.support.scenes import crank_rocker
 
 CLASS = """
@@ -31,6 +33,12 @@ class Toy:
         answer.quantities["torque"] = FACTOR * answer.quantities["torque"]
         return answer
 """
+
+
+@pytest.fixture(autouse=True)
+def _ended() -> Iterator[None]:
+    yield
+    end_guests()
 
 
 def write_wheel(folder: Path, version: str, factor: str) -> str:
@@ -66,8 +74,6 @@ def test_two_versions_are_judged_side_by_side(tmp_path: Path, monkeypatch: pytes
     scene = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0))
     failed = {(row.engine, row.quantity) for row in judge("scene", scene, engines).rows if row.verdict != AGREES}
     assert failed == {("toy 1.1", "torque")}
-    for running in guests._RUNNING.values():
-        running.end()
     # an environment that is there is not made again; one that pip cannot make is one line
     monkeypatch.setattr(environments, "run_to_end", None)
     assert made(read_engines([tmp_path])["toy 1.0"], tmp_path / "cache").startswith(str(tmp_path / "cache"))
@@ -97,15 +103,11 @@ def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
     (wanted,) = adjust_engines([guest], 1e-3)
     refused, exact = start_engines([replace(entry, setting="fast"), Entry("free", adapter="free-body")], ENGINES)
     at = list_positions(scene)
-    try:
-        assert guest.start().answer(scene, at).setting == "RK4 96/rev"
-        answer = wanted.start().answer(scene, at)
-        assert answer.evidence["wanted_error"] == 1e-3 and answer.setting != "RK4 96/rev"
-        assert refused.start().answer(scene, at).refusal == "it does not name 'fast' among its settings"
-        assert adjust_engines([exact], 1e-3)[0].start().answer(scene, at).setting == "exact"
-    finally:
-        for running in guests._RUNNING.values():
-            running.end()
+    assert guest.start().answer(scene, at).setting == "RK4 96/rev"
+    answer = wanted.start().answer(scene, at)
+    assert answer.evidence["wanted_error"] == 1e-3 and answer.setting != "RK4 96/rev"
+    assert refused.start().answer(scene, at).refusal == "it does not name 'fast' among its settings"
+    assert adjust_engines([exact], 1e-3)[0].start().answer(scene, at).setting == "exact"
 
 
 @pytest.mark.parametrize(

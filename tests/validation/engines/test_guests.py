@@ -26,7 +26,7 @@ from fourbar_validation.run.command import Request, select_scenes
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.run import RunOptions, run
 from fourbar_validation.scenes.suites import read_scene_files
-from tests.support.guests import list_processes, write_program
+from tests.support.guests import end_guests, list_processes, write_program
 from tests.support.here import Heard, judge_here
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import ROOT
@@ -42,9 +42,7 @@ Verdicts = dict[str, dict[str, tuple[str, str]]]
 @pytest.fixture(autouse=True)
 def _ended() -> Iterator[None]:
     yield
-    for running in guests._RUNNING.values():
-        running.end()
-    guests._RUNNING.clear()
+    end_guests()
 
 
 def judged(scene: fourbar.Scene, *entries: str, seconds: float = 60.0) -> Verdicts:
@@ -156,8 +154,7 @@ def test_whatever_a_program_does_costs_its_own_rows(tmp_path: Path, monkeypatch:
         rows = found[name if name in found else name.replace(" ", "_")]  # of one whose hello fails the file's name
         ((verdict, said),) = [row for quantity, row in rows.items() if quantity == "all"]
         assert verdict == FAILS and said.startswith(reason) and "\n" not in said, (name, rows)
-    for running in guests._RUNNING.values():
-        running.end()
+    end_guests()
     assert not list_processes(f"MARK_OF_TEST={tmp_path}")
 
 
