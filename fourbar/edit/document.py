@@ -11,6 +11,7 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, InlineTable, Item, Table, Whitespace
 
 from fourbar.effects import Load, list_kinds
+from fourbar.effects.load import FRAMES
 from fourbar.errors import InputError
 from fourbar.files.scene_file import THROUGH
 from fourbar.files.scene_text import BRANCHES
@@ -22,7 +23,7 @@ from fourbar.scene.stroke import SIDES
 Path = Sequence[str | int]
 WORDS = {
     **{"branch": [*BRANCHES], "through": [*THROUGH], "side": [*SIDES], "ends": [*SPLINES]},
-    "frame": ["world", "bar"],
+    "frame": [*FRAMES],
 }
 """Entries that are one of a few words."""
 EXAMPLES = {"m": "50 mm", "kg": "0.2 kg", "kg m^2": "2 kg cm^2"}

@@ -17,6 +17,8 @@ from fourbar.linkage import Declared, FourBar, check_numbers, require_bar, requi
 TURN = 2.0 * math.pi
 BEYOND_TURN = 2.0 * PI_LOW
 """2 pi less TURN, rad: what counts after many turns."""
+FRAMES = ("world", "bar")
+"""Axes that a load keeps its angles to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +123,8 @@ class Load(Effect):
     def __post_init__(self) -> None:
         object.__setattr__(self, "bar", require_bar("loads.bar", self.bar))
         expect("loads.frame", self.frame, str)
-        if self.frame not in ("world", "bar"):
-            raise InputError("loads.frame", self.frame, 'must be "world" or "bar"')
+        if self.frame not in FRAMES:
+            raise InputError("loads.frame", self.frame, "must be " + " or ".join(f'"{frame}"' for frame in FRAMES))
         expect("loads.table", self.table, Table, type(None))
         check_numbers(self, "loads")
 

@@ -15,6 +15,7 @@ import numpy as np
 from fourbar import writing
 from fourbar.effects import Effect, Gravity, LinearDrive, Load, Spring, SpringEnd, Springs, Table, list_kinds
 from fourbar.effects.effect import PinRows
+from fourbar.effects.load import FRAMES
 from fourbar.effects.spring import END_POSITION, GAS
 from fourbar.errors import InputError, expect
 from fourbar.files.fields import BARE_KEY, Reader
@@ -248,7 +249,7 @@ def _load(read: Reader, key: str, value: object) -> Load:
     return Load(
         read.whole(f"{key}.bar", entry.get("bar"), 2, 4),
         **read.numbers(key, entry, Load.numbers),
-        frame=read.choice(f"{key}.frame", entry.get("frame", "world"), ("world", "bar")),
+        frame=read.choice(f"{key}.frame", entry.get("frame", FRAMES[0]), FRAMES),
         table=table,
     )
 
