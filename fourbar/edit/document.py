@@ -16,9 +16,8 @@ from fourbar.errors import InputError
 from fourbar.files.scene_file import THROUGH
 from fourbar.files.scene_text import BRANCHES
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, REQUIRED, Bar
-from fourbar.scene.motion import COMMANDS, SPLINES, STROKE_COMMAND, Motion
+from fourbar.scene.motion import COMMANDS, SIDES, SPLINES, STROKE_COMMAND, Motion
 from fourbar.scene.numbers import Point
-from fourbar.scene.stroke import SIDES
 
 Path = Sequence[str | int]
 WORDS = {

@@ -26,8 +26,7 @@ from fourbar.files.scene_text import BRANCHES, write_new_scene
 from fourbar.linkage import BAR_NAMES, POSITIVE
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Scene
-from fourbar.scene.motion import COMMANDS, STROKE_COMMAND, require_steps
-from fourbar.scene.stroke import SIDES
+from fourbar.scene.motion import COMMANDS, SIDES, STROKE_COMMAND, require_steps
 from fourbar.show.units import suit_units, units
 from fourbar.solution import Conversion, Solution
 from fourbar.solve import solve

@@ -30,6 +30,8 @@ COMMANDS = {bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOV
 """Names of the commanded angle, speed and acceleration by bar."""
 STROKE_COMMAND = ("stroke", "stroke_speed", "stroke_acceleration")
 """Names of the commanded stroke, speed and acceleration of a cylinder."""
+SIDES = {"left": 1.0, "right": -1.0}
+"""Signs of the moving end's side of the line from the bar's pivot to the end on the ground, seen towards the latter."""
 DEFAULT_STEPS = 360
 """Number of steps of the default range, which is swept if a motion names no angle."""
 STEPS = (range(1, MOST_STEPS + 1), f"must be a whole number from 1 to {MOST_STEPS}")
@@ -266,7 +268,7 @@ class Motion:
             if stroke is None or stated is not None or law is not None or free is not None:
                 raise InputError("motion.stroke", stroke, "is commanded alone: no angle, law or release besides")
             names, numbers = STROKE_COMMAND, (_require_strokes(stroke), stroke_speed, stroke_acceleration)
-            if side not in ("left", "right"):
+            if side not in SIDES:
                 raise InputError("motion.side", side, 'must be "left" or "right", as a stroke has two angles')
         if law is not None and (stated is not None or free is not None):
             raise InputError("motion.law", law.ends, f"stands alone: it gives {', '.join(names[:2])} and {names[2]}")

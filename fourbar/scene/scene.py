@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 
 from fourbar.effects.effect import Effect
 from fourbar.errors import InputError, LimitError, expect
+from fourbar.formulas.arithmetic import PI_LOW, Number, angle, divisor, exact_difference, namespace, polar, select
+from fourbar.formulas.longer import change_numbers, lengthen, shorten
 from fourbar.formulas.mobility import MARGIN, choose_range, find_limit_angles, follow_smooth_path
 from fourbar.linkage import BAR_NAMES, FourBar, require_bar
 from fourbar.quantities import Array
-from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, STROKE_COMMAND, FromLimit, Motion, Sweep
+from fourbar.scene.motion import COMMANDS, DEFAULT_STEPS, SIDES, STROKE_COMMAND, FromLimit, Motion, Sweep
 from fourbar.scene.numbers import Point, Tolerance
 from fourbar.scene.pictures import Picture
 
 if TYPE_CHECKING:
-    from fourbar.effects import LinearDrive, Load
+    from fourbar.effects import LinearDrive, Load, SpringEnd
 
 
 def load_show(module: str) -> Any:
@@ -69,8 +71,6 @@ class Scene:
         else:
             self._require_linear(self.drive)
         if self.motion.stroke is not None:
-            from fourbar.scene.stroke import find_triangle
-
             object.__setattr__(self, "motion", copy(self.motion))
             object.__setattr__(self.motion, "bar", find_triangle(self.linkage, self.drive).bar)
         many = {"loads": Effect, "effects": Effect, "pictures": Picture, "points": Point, "tolerances": Tolerance}
@@ -231,12 +231,75 @@ def require_input(scene: Scene, what: str) -> None:
         raise LimitError(f"motion.{scene.motion.commanded}: {what} takes a command of theta_2 alone")
 
 
+class Triangle(NamedTuple):
+    """Triangle of a cylinder: pivot of its bar, end on the bar, end on the ground; with the stroke it gives the angle.
+
+    With l from the pivot to the end on the bar, r to the end on the ground, beta the angle between them, s the stroke,
+        s^2 = l^2 + r^2 - 2 l r cos beta,   ds/dbeta = l r sin beta/s = the lever from the pivot to the line.
+    """
+
+    bar: int
+    length: Number
+    """l, m."""
+    reach: Number
+    """r, m."""
+    angle: Number
+    """theta of the bar where both ends are in one direction from the pivot, rad."""
+
+    def turn_bar(self, stroke: Any, speed: Any, acceleration: Any, side: str | None) -> tuple[Any, Any, Any, Any]:
+        """Compute angle, speed and acceleration of the bar, and the condition: the lever over the longer of l and r.
+
+        NaN where the cylinder cannot have the stroke; in libraries other than NumPy the condition alone says so, by 0.
+        All may be arrays, and numbers that carry their derivatives.
+        """
+        assert side is not None
+        length, reach, zero = self.length, self.reach, 0.0 * self.length
+        sign, xp = SIDES[side], namespace(stroke, length, reach)
+        near = exact_difference(stroke, reach, length, zero) * exact_difference(stroke, length, reach, zero)
+        far = exact_difference(length, reach, stroke, zero) * (length + reach + stroke)
+        inside = xp is np or (near > 0.0) & (far > 0.0)
+        near, far, stroke = (divisor(x, inside) for x in (near, far, stroke))
+        with np.errstate(all="ignore"):
+            near, far = xp.sqrt(near), xp.sqrt(far)
+            beta = 2.0 * xp.atan2(near, far)
+            lever = near * far / (2.0 * stroke)
+            longer = 0.5 * (length + reach + abs(length - reach))
+            theta, condition = self.angle + sign * beta, select(inside, lever / longer, 0.0)
+            if speed is None:
+                return theta, None, np.zeros(np.shape(theta)), condition
+            rate = speed / lever
+            growth = speed * speed + stroke * acceleration - length * reach * xp.cos(beta) * rate * rate
+            growth = growth / (lever * stroke)
+        return theta, sign * rate, sign * growth, condition
+
+
+def find_triangle(linkage: FourBar, drive: "LinearDrive | None") -> Triangle:
+    """Return the triangle of a cylinder between the ground and bar 2 or 4; InputError for any other drive."""
+    if drive is None or {drive.start.bar, drive.end.bar} not in ({1, 2}, {1, 4}):
+        drives = "no cylinder" if drive is None else f"one from bar {drive.start.bar} to bar {drive.end.bar}"
+        raise InputError("motion.stroke", drives, "is of a cylinder ([drive]) between the ground and bar 2 or 4")
+    moving, fixed = (drive.end, drive.start) if drive.start.bar == 1 else (drive.start, drive.end)
+    if moving.bar == 2:  # points of the ground are polar about O2
+        reach, towards = abs(fixed.distance), fixed.angle + linkage.ground_angle + _reverse(fixed)
+    else:
+        end = polar(fixed.distance, fixed.angle + linkage.ground_angle)
+        across = end - polar(linkage.ground, linkage.ground_angle)
+        reach, towards = abs(across), angle(across)
+    return Triangle(moving.bar, abs(moving.distance), reach, towards - moving.angle - _reverse(moving))
+
+
+def _reverse(point: "SpringEnd") -> Any:
+    """Return half a turn for a point at a distance that is negative."""
+    forwards = 0.0 * point.distance  # zero of the same kind of number
+    return select(point.distance >= 0.0, forwards, np.pi + forwards + PI_LOW)
+
+
 def default_places(scene: Scene, holding: float | None = None) -> Array:
     """List the angles (of the range that holds one), or strokes, that are swept where a scene names none, (n,)."""
     if scene.motion.stroke is not None:
-        from fourbar.scene.stroke import find_triangle
-
-        first, last = find_triangle(scene.linkage, scene.drive).strokes(np.array([MARGIN, np.pi - MARGIN])).tolist()
+        triangle, half = find_triangle(scene.linkage, scene.drive), 0.5 * np.array([MARGIN, np.pi - MARGIN])
+        twice_mean = 2.0 * np.sqrt(triangle.length * triangle.reach)
+        first, last = np.hypot(triangle.length - triangle.reach, twice_mean * np.sin(half)).tolist()
     else:
         first, last = choose_range(scene.linkage, scene.motion.bar, holding)
     return np.linspace(first, last, DEFAULT_STEPS + 1)
@@ -250,8 +313,6 @@ def turn_bar(scene: Scene, place: Any, speed: Any, acceleration: Any) -> tuple[A
     """
     if scene.motion.stroke is None:
         return place, speed, acceleration, None
-    from fourbar.scene.stroke import find_triangle
-
     return find_triangle(scene.linkage, scene.drive).turn_bar(place, speed, acceleration, scene.motion.side)
 
 
@@ -259,11 +320,12 @@ def command_stroke(scene: Scene, stroke: Array, speed: Any, acceleration: Any) -
     """Command the bar that a cylinder turns, from strokes and their rates; the branch is that of the motion."""
     angle, omega, alpha, condition = turn_bar(scene, stroke, speed, acceleration)
     lost = None
-    if speed is not None:
-        from fourbar.scene.stroke import find_round_off
-
-        command, turned = (stroke, speed, acceleration), (angle, omega, alpha)
-        lost = find_round_off(scene.linkage, scene.drive, scene.motion.side, command, turned)
+    if speed is not None:  # what angle, speed and acceleration leave out as doubles
+        with np.errstate(all="ignore"):
+            longer = find_triangle(*change_numbers((scene.linkage, scene.drive), lengthen))
+            *turned, _ = longer.turn_bar(lengthen(stroke), lengthen(speed), lengthen(acceleration), scene.motion.side)
+            gaps = [shorten(after - before) for before, after in zip((angle, omega, alpha), turned, strict=True)]
+        lost = np.stack(np.broadcast_arrays(*gaps), axis=-1)
     branch = np.full(np.shape(angle), scene.motion.branch, dtype=np.int8)
     return Command(angle, branch, omega, alpha, None, None, scene.motion.bar, condition, stroke, speed, lost)
 
@@ -275,9 +337,12 @@ def command_at(scene: Scene, places: Array, branch: NDArray[np.int8] | None = No
     """
     motion, bar = scene.motion, scene.motion.bar
     if motion.stroke is not None:
-        from fourbar.scene.stroke import find_triangle
-
-        find_triangle(scene.linkage, scene.drive).require(places)
+        triangle = find_triangle(scene.linkage, scene.drive)
+        least, most = abs(triangle.length - triangle.reach), triangle.length + triangle.reach
+        inside = (places >= least) & (places <= most)
+        if not inside.all():
+            stroke = float(places[np.argmin(inside)])
+            raise InputError("motion.stroke", stroke, f"this cylinder can have {least:.6g} to {most:.6g} m")
         commanded = command_stroke(scene, places, motion.speed, motion.acceleration)
     else:
         commanded = Command(
