@@ -204,49 +204,40 @@ def _store_block(
                 array[*part, 0], array[*part, 1] = value.real, value.imag
 
 
-RATES = ("acceleration", "speed", "stroke_speed")
-"""Fields of a command that are one number for all positions or an array."""
-
-
 def _refuse(commanded: Command) -> None:
     """Raise an InputError where a command is none."""
     expect("at", commanded, Command)
     require_bar("at.bar", commanded.bar)
-    labels = dict(zip(("angle", "speed", "acceleration", "branch"), (*COMMANDS[commanded.bar], "branch"), strict=True))
-    labels |= {name: name for name in ("condition", "stroke", "stroke_speed") if getattr(commanded, name) is not None}
-    for name in (name for name in labels if name not in RATES):
-        value = getattr(commanded, name)
-        expect(f"at.{labels[name]}", value, np.ndarray)
-        if value.ndim != 1 or value.shape != commanded.angle.shape or value.dtype.kind not in "iuf":
-            allowed = f"must be numbers, shape (n,), as many of {commanded.commanded} as of branch"
-            raise InputError(f"at.{labels[name]}", value, allowed)
+    angle, speed, acceleration = COMMANDS[commanded.bar]
+    expect(f"at.{angle}", commanded.angle, np.ndarray)
+    expect("at.independent", commanded.independent, Independent, type(None))
+    n = commanded.angle.size
+    arrays: dict[str, Any] = {angle: commanded.angle, "branch": commanded.branch}
+    arrays |= {name: getattr(commanded, name) for name in ("condition", "stroke", "time", "lost")}
+    if commanded.independent is not None:
+        arrays |= {f"independent.{name}": values for name, values in commanded.independent._asdict().items()}
+    for key, value in arrays.items():
+        if value is None and key != "branch":
+            continue
+        expect(f"at.{key}", value, np.ndarray)
+        shape = (n, 3) if key == "lost" else (n,)
+        if value.shape != shape or value.dtype.kind not in "iuf":
+            raise InputError(f"at.{key}", value, f"must be numbers, shape {shape}")
     branch = commanded.branch
-    if not (branch.item() in (1, -1) if branch.size == 1 else (np.abs(branch) == 1).all()):
+    if not (branch.item() in (1, -1) if n == 1 else (np.abs(branch) == 1).all()):
         raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
-    for name in RATES[:1] if commanded.speed is None else (name for name in RATES if name in labels):
-        value, key = getattr(commanded, name), f"at.{labels[name]}"
+    rates: dict[str, Any] = {acceleration: commanded.acceleration}
+    if commanded.speed is not None:
+        rates |= {speed: commanded.speed, "stroke_speed": commanded.stroke_speed}
+    for name, value in rates.items():
         if isinstance(value, np.ndarray):
-            if value.shape not in ((), commanded.angle.shape) or value.dtype.kind not in "iuf":
-                raise InputError(key, value, f"must be numbers, shape () or {commanded.angle.shape}")
-        elif not isinstance(value, float):
-            expect(key, value, float, int, np.integer, np.floating)
-            require(key, value)
+            if value.shape not in ((), (n,)) or value.dtype.kind not in "iuf":
+                raise InputError(f"at.{name}", value, f"must be numbers, shape () or {(n,)}")
+        elif not isinstance(value, float) and not (value is None and name == "stroke_speed"):
+            expect(f"at.{name}", value, float, int, np.integer, np.floating)
+            require(f"at.{name}", value)
     if commanded.remainder is not None:
         require("at.remainder", commanded.remainder)
-    expect("at.time", commanded.time, np.ndarray, type(None))
-    expect("at.independent", commanded.independent, Independent, type(None))
-    n = len(commanded.angle)
-    parts = (
-        {}
-        if commanded.independent is None
-        else {f"independent.{name}": (rows, (n,)) for name, rows in commanded.independent._asdict().items()}
-    )
-    for key, (value, wanted) in (
-        parts | ({} if commanded.lost is None else {"lost": (commanded.lost, (n, 3))})
-    ).items():
-        expect(f"at.{key}", value, np.ndarray)
-        if value.shape != wanted or value.dtype.kind not in "iuf":
-            raise InputError(f"at.{key}", value, f"must be numbers, shape {wanted}")
 
 
 def find_last_stage(scene: Scene) -> str:

@@ -7,13 +7,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fourbar.effects.effect import Actions, Effect
-from fourbar.formulas.arithmetic import is_any, namespace, polar, vector
+from fourbar.formulas.arithmetic import U, is_any, namespace, polar, vector
 from fourbar.formulas.longer import shorten
 from fourbar.formulas.motion import State
 from fourbar.linkage import MOVING_BARS, Declared, check_numbers
-
-U = 2.0**-53
-"""Unit round-off of a double."""
 
 
 @dataclass(frozen=True, slots=True)

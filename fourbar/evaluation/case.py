@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, SolvedFriction, list_bodies
-from fourbar.formulas.arithmetic import angle, is_any, polar, select
+from fourbar.formulas.arithmetic import U, angle, is_any, polar, select
 from fourbar.formulas.longer import change_numbers, lengthen
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import Path, meet_change_points, prepare_path
@@ -33,8 +33,6 @@ BLOCK = 8000
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the cache. Of 8192 an array of complex
 numbers is a little more than the C library hands out again without asking the system for fresh pages, and from 10 000
 on OpenBLAS starts threads for the squares by which `withheld` looks for what is no number."""
-U = 2.0**-53
-"""Unit round-off of a double."""
 UNDECIDED = 32.0 * U
 """A factor of Heron's formula smaller than this times its terms is evaluated in many digits: in doubles it is wrong
 by at most about 12 U times them."""

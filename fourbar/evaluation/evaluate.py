@@ -7,13 +7,14 @@ roundings are a thousandth of those of doubles or less.
 
 import cmath
 from collections.abc import Callable, KeysView, Mapping
+from functools import reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.evaluation.case import NO_POSITIONS, Case, Dynamics, Evaluated
-from fourbar.formulas.arithmetic import angle, is_any, select
+from fourbar.formulas.arithmetic import U, angle, is_any, select
 from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
@@ -40,8 +41,6 @@ from fourbar.scene.numbers import POINT_STAGES
 FORCE, ERROR = STAGES.index("force"), STAGES.index("error")
 WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 """Statuses of positions at which an effect or the drive has no value, and so the forces have none."""
-LAST_ROUNDING = 2.0**-53
-"""Relative: half the distance to the next double, or more; the result itself was rounded by as much."""
 
 
 def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) -> Evaluated:
@@ -196,13 +195,8 @@ def compute_error_bars(
     pairs = zip((*dynamics.pins, dynamics.drive), (*longer_dynamics.pins, longer_dynamics.drive), strict=True)
     *gaps, drive_gap = (np.abs(shorten(after - before)) for before, after in pairs)
     drive_error = compute_bar(drive_gap, np.abs(dynamics.drive))
-    force_error = compute_bar(_find_largest(gaps), _find_largest([np.abs(pin) for pin in dynamics.pins]))
+    force_error = compute_bar(reduce(np.maximum, gaps), reduce(np.maximum, map(np.abs, dynamics.pins)))
     return {case.names.error: drive_error, "force_error": force_error}
-
-
-def _find_largest(sizes: list[Any]) -> Any:
-    """Find the largest of several numbers, or arrays that broadcast, NaN where one is."""
-    return np.maximum(np.maximum(sizes[0], sizes[1]), np.maximum(sizes[2], sizes[3]))
 
 
 def compute_bar(gap: Any, size: Any) -> Any:
@@ -210,7 +204,7 @@ def compute_bar(gap: Any, size: Any) -> Any:
 
     Where there is no longer number, or none in the range of a double, no digit of the value itself is left.
     """
-    width = np.maximum(gap, LAST_ROUNDING * size)
+    width = np.maximum(gap, U * size)  # the value itself was rounded by as much
     return select(np.isfinite(width), width, size)
 
 

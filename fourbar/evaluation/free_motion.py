@@ -10,6 +10,7 @@ import cmath
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -346,7 +347,7 @@ class _Run:
             if self.steps > STEPS:
                 allowed = f"this motion is followed for {STEPS} steps, here to {self.t:.6g} s; make it shorter"
                 raise InputError("motion.free.duration", float(self.times[-1]), allowed)
-            dense, t, new = _Within(solver), solver.t, solver.y
+            dense, t, new = _interpolate(solver), solver.t, solver.y
             rested = bool(self.side and self.side * new[1] < 0.0)
             if rested:
                 t = _find_root(dense, lambda y: float(y[1]), solver.t_old, t)
@@ -402,14 +403,12 @@ def _find_root(dense: Callable[[float], Array], f: Callable[[Array], float], low
     return float(brentq(lambda t: f(dense(t)), low, high, xtol=1e-15, rtol=1e-15))
 
 
-class _Within:
-    """The motion within the last step of the solver, whose three more evaluations are made where one reads it."""
+def _interpolate(solver: Any) -> Callable[[float], Array]:
+    """Return the motion within the last step of the solver, whose three more evaluations wait for the first call."""
+    dense_output = cache(solver.dense_output)
 
-    def __init__(self, solver: Any) -> None:
-        self.solver = solver
-        self.known: Callable[[float], Array] | None = None
+    def motion(t: float) -> Array:
+        state: Array = dense_output()(t)
+        return state
 
-    def __call__(self, t: float) -> Array:
-        if self.known is None:
-            self.known = self.solver.dense_output()
-        return self.known(t)
+    return motion

@@ -12,6 +12,8 @@ PLAIN = (int, np.generic)
 """One truth value or code."""
 NUMPY = (np.ndarray, np.generic)
 DOUBLES = {float, np.float64}
+U = 2.0**-53
+"""Unit round-off of a double."""
 PI_LOW = 1.2246467991473532e-16
 """pi less its double: a constant in longer numbers is no double."""
 _LIBRARY_OF: dict[type, Any] = {float: np, int: np, complex: np, np.ndarray: np}

@@ -5,16 +5,13 @@ from typing import Any
 import numpy as np
 
 from fourbar.formulas.arithmetic import make_like
-from fourbar.formulas.position import HalfAngle, Loop, compute_factors, reorder_lengths
+from fourbar.formulas.position import TOUCHING, HalfAngle, Loop, compute_factors, reorder_lengths
 from fourbar.linkage import FourBar
 
 DIGITS = 120
 """The angle of a limit position near a change point keeps half of them."""
 RESIDUE = 1e-55
 """Relative: what so many digits leave of a factor that is zero at the limit position itself."""
-TOUCHING = 2.0**-53
-"""Bars that miss each other by up to this times the sum of the lengths count as touching: each length
-was itself rounded by up to that, so the linkage meant closes there as well as not."""
 
 
 def half_angle(

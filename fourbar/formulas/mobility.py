@@ -14,17 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import expect
+from fourbar.formulas.arithmetic import U
 from fourbar.formulas.path import prepare_path
-from fourbar.formulas.position import loop
+from fourbar.formulas.position import TOUCHING, loop
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, require_bar
 
 Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
-U = 2.0**-53
-"""Unit round-off of a double."""
-TOUCHING = U
-"""Bars that miss each other by up to this times the sum of the lengths count as touching: each length was
-itself rounded by up to that, so the linkage meant touches as well as not."""
 MARGIN = math.radians(1.0)
 """Angle that `choose_range` leaves out at each end of an interval, because no speeds exist at a limit itself."""
 NARROW = 4.0

@@ -28,6 +28,7 @@ from fourbar.formulas.arithmetic import (
 from fourbar.formulas.motion import Coefficients, State, coefficients, rates, take_sines_of_rates
 from fourbar.formulas.motion import put_parallel_pairs as parallel_motion
 from fourbar.formulas.position import (
+    TOUCHING,
     HalfAngle,
     Loop,
     Position,
@@ -43,8 +44,6 @@ from fourbar.linkage import FourBar
 
 NO_DIGIT_LEFT = 16.0 * 2.0**-53
 """|sin mu| at or below this: the directions of bars 3 and 4 are the same in doubles."""
-TOUCHING = 2.0**-53
-"""Lengths that miss a change point by this times their sum meet it: each was itself rounded by that."""
 ROLES = {2: (2, 3, 4), 3: (3, 2, 4), 4: (4, 3, 2)}
 """The bars that are input, coupler and output of the loop read from a bar; and back."""
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from fourbar.formulas.arithmetic import (
     Number,
+    U,
     exact_difference,
     is_any,
     is_differentiated,
@@ -30,6 +31,9 @@ from fourbar.formulas.arithmetic import (
     vector,
 )
 
+TOUCHING = U
+"""Bars that miss each other, or a change point, by up to this times the sum of the lengths count as touching: each
+length was itself rounded by up to that, so the linkage meant touches as well as not."""
 TINY_TANGENT = 1e-100
 """Added to the size of tan h: with A on O4 bars 3, 4 get the directions to which they tend from theta_2 > theta_1."""
 
