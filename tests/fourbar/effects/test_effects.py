@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import mpmath as mp
 import numpy as np
 import pytest
 
@@ -112,64 +111,6 @@ def test_friction_at_one_pin_in_fifty_digits() -> None:
     assert free.torque is not None and free.F12 is not None and slowed.torque is not None
     expected = free.torque + mu * r * np.hypot(*free.F12.T)
     assert slowed.torque == pytest.approx(expected, abs=LAST_DIGITS * np.abs(expected).max(), rel=0)
-
-
-@pytest.mark.slow
-def test_friction_couples_fulfil_their_equation_with_forces_of_thirteen_equations() -> None:
-    """Nine unknowns by Newton-Euler about the mass centres, written anew, with the friction found here."""
-    pins = {"O2": (0.3, 0.02), "A": (0.25, 0.015), "B": (0.4, 0.01), "O4": (0.2, 0.02)}
-    scene = crank_rocker(effects=(PinFriction.at(**pins),), loads=())
-    s = solve(scene)
-    assert s.friction_residual is not None and s.torque is not None
-    link = scene.linkage
-    for i in range(0, len(s), 10):
-        speed = {1: 0.0, 2: s.omega_2[i], 3: s.omega_3[i], 4: s.omega_4[i]}  # type: ignore[index]
-        A, B = s.A[i], s.B[i]
-        O4 = link.ground * np.array([math.cos(link.ground_angle), math.sin(link.ground_angle)])
-        ends = {2: (np.zeros(2), A), 3: (A, B), 4: (O4, B)}
-        with mp.workdps(50):
-            couples, change = {pin: mp.mpf(0) for pin in pins}, mp.mpf(1)
-            while change > 1e-30:  # each pass leaves a tenth of it or less
-                x = _newton_euler(link, s, i, ends, speed, couples)
-                load = dict(zip(("O2", "A", "B", "O4"), (mp.hypot(x[k], x[k + 1]) for k in (0, 2, 4, 6)), strict=True))
-                before, couples = couples, {pin: mu * r * load[pin] for pin, (mu, r) in pins.items()}
-                change = max(abs(couples[pin] - before[pin]) / couples[pin] for pin in pins)
-            torque = float(x[8])
-        assert s.torque[i] == pytest.approx(torque, abs=1e3 * 2.0**-52 * np.abs(s.torque).max(), rel=0)
-    # what is left of the couples' own equation, of couples up to
-    assert np.nanmax(s.friction_residual) < LAST_DIGITS * 0.3 * 0.02 * np.nanmax(np.hypot(*s.F12.T))  # type: ignore[union-attr]
-
-
-def _newton_euler(link, s, i, ends, speed, couples):  # type: ignore[no-untyped-def]
-    """F12, F32, F43, F14, T2 from m a_G = sum F and I alpha = sum M about G, in mpmath."""
-    rows, right = [], []
-    acts = {
-        2: ((0, 1), (2, 1)),
-        3: ((2, -1), (4, 1)),
-        4: ((4, -1), (6, 1)),
-    }  # (unknown, sign) at each pin
-    places = {2: (0, 1), 3: (0, 1), 4: (1, 0)}
-    pins_of = {2: (("O2", 1), ("A", -1)), 3: (("A", 1), ("B", -1)), 4: (("O4", 1), ("B", 1))}
-    slip = {"O2": speed[2], "A": speed[3] - speed[2], "B": speed[4] - speed[3], "O4": speed[4]}
-    for bar in (2, 3, 4):
-        body = link.bar(bar)
-        G, a, alpha = (getattr(s, f"{name}{bar}")[i] for name in ("G", "a_G", "alpha_"))
-        arms = [ends[bar][place] - G for place in places[bar]]
-        for axis in (0, 1):
-            row = [mp.mpf(0)] * 9
-            for unknown, sign in acts[bar]:
-                row[unknown + axis] = mp.mpf(sign)
-            rows.append(row)
-            right.append(mp.mpf(body.mass) * mp.mpf(a[axis]))
-        row = [mp.mpf(0)] * 9
-        for (unknown, sign), arm in zip(acts[bar], arms, strict=True):
-            row[unknown], row[unknown + 1] = -sign * mp.mpf(arm[1]), sign * mp.mpf(arm[0])
-        if bar == 2:
-            row[8] = mp.mpf(1)
-        rows.append(row)
-        friction = sum(-side * mp.sign(mp.mpf(slip[pin])) * couples[pin] for pin, side in pins_of[bar])
-        right.append(mp.mpf(body.moment_of_inertia) * mp.mpf(alpha) - friction)
-    return mp.lu_solve(mp.matrix(rows), mp.matrix(right))
 
 
 def test_one_cone_has_one_none_or_two_solutions() -> None:

@@ -372,9 +372,11 @@ def test_the_half_angle_in_many_digits_is_rounded_once() -> None:
 
 
 def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle() -> None:
-    """From the ground's direction to the opposite and on, and as near to both as doubles come."""
+    """From the ground's direction to the opposite, as near to both as doubles come, and after many turns."""
     near = 10.0 ** -np.arange(1.0, 17.0)
+    turns = 2.0 * math.pi * np.array([3.0, 800.0, -800.0])[:, None] + [1e-9, 0.7, math.pi + 1e-9]
     psi = np.concatenate([near, -near, math.pi - near, near - math.pi, np.linspace(-7.0, 7.0, 40), [math.pi]])
+    psi = np.append(psi, turns)
     with mp.workdps(200):
         for lengths in [*LINKAGES.tolist(), (0.4, 0.397, 0.003, 0.002)]:
             bars = uniform(*lengths)

@@ -3,13 +3,11 @@
 import cmath
 import math
 
-import mpmath
 import numpy as np
 import pytest
 
 import fourbar
 from fourbar.formulas.arithmetic import dot
-from fourbar.formulas.many_digits import limit_remainder
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import compute_state, find_singular
 
@@ -18,8 +16,6 @@ LENGTHS = (0.3, 0.1, 0.25, 0.22)
 ANGLES = np.linspace(-3.0, 6.0, 41)
 CLOSURE = 8 * EPS
 """Of the sum of the lengths: eight roundings of unit vectors and their sum."""
-DIFFERENCES = 1e-12
-"""Relative: the double results against 50-digit differences, well away from limits."""
 
 
 def linkage(theta_1: float = 0.4) -> fourbar.FourBar:
@@ -35,23 +31,6 @@ def assembled(at: State) -> np.ndarray:
     return (at.at.half.outer >= 0.0) & (at.at.half.inner >= 0.0)
 
 
-def newton(link: fourbar.FourBar, theta_2: mpmath.mpf, start: tuple[float, float]) -> tuple[mpmath.mpf, mpmath.mpf]:
-    """theta_3, theta_4 of the branch nearest to a start, by Newton's iteration on the closure in 50 digits."""
-    d, a, b, c = (mpmath.mpf(length) for length in link.lengths)
-
-    def gap(t3: mpmath.mpf, t4: mpmath.mpf) -> list[mpmath.mpf]:
-        z = (
-            a * mpmath.expj(mpmath.mpc(theta_2))
-            + b * mpmath.expj(mpmath.mpc(t3))
-            - d * mpmath.expj(mpmath.mpc(link.ground_angle))
-            - c * mpmath.expj(mpmath.mpc(t4))
-        )
-        return [z.real, z.imag]
-
-    solution = mpmath.findroot(gap, start)
-    return solution[0], solution[1]
-
-
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, 1.0, -2.5])
 @pytest.mark.parametrize("lengths", [LENGTHS, (0.3, 0.1, 0.3, 0.1), (0.3, 0.1, 0.1, 0.3)])
@@ -64,39 +43,6 @@ def test_the_loop_closes_on_the_requested_branch(lengths: tuple[float, ...], bra
     assert np.max(np.abs(gap)) <= CLOSURE * sum(lengths)
     diagonal = d * cmath.exp(1j * theta_1) - a * e2
     assert np.all(np.sign((np.conj(diagonal) * b * e3).imag) == branch)
-
-
-def test_velocity_and_acceleration_are_differences_of_the_position() -> None:
-    link, omega, alpha = linkage(), 3.0, -7.0
-    moving = compute_state(link, np.array([1.1]), -1, omega, alpha)
-    start = (float(angle(moving, 3)[0]), float(angle(moving, 4)[0]))
-    with mpmath.workdps(50):
-        h = mpmath.mpf("1e-12")
-        at = [newton(link, mpmath.mpf(1.1) + omega * t + alpha * t * t / 2, start) for t in (-h, mpmath.mpf(0), h)]
-        for k, bar in enumerate((3, 4)):
-            speed = (at[2][k] - at[0][k]) / (2 * h)
-            growth = (at[2][k] - 2 * at[1][k] + at[0][k]) / h**2
-            assert abs(moving.omega(bar)[0] / speed - 1) < DIFFERENCES
-            assert abs(moving.alpha(bar)[0] / growth - 1) < DIFFERENCES
-
-
-def test_mirror_image() -> None:
-    """Mirrored at the ground line: angles change sign, and so does the branch."""
-    up, down = compute_state(linkage(0.0), ANGLES, 1), compute_state(linkage(0.0), -ANGLES, -1)
-    for bar in (3, 4):
-        assert np.array_equal(angle(up, bar), -angle(down, bar))
-
-
-@pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.3, 0.1), (0.1, 0.3, 0.3, 0.1)], ids=["parallelogram", "kite"])
-def test_parallel_bars_are_exact_near_the_change_point(lengths: tuple[float, ...]) -> None:
-    d, a, b, c = lengths
-    link = fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c))
-    parallelogram = a == c
-    for delta in (1e-8, 1e-4, 0.5):
-        moving = compute_state(link, np.array([math.pi - delta]), 1 if parallelogram else -1, 2.0)
-        expected = (0.0, 2.0) if parallelogram else (2.0, 0.0)
-        assert (moving.omega(3)[0], moving.omega(4)[0]) == expected
-        assert (moving.alpha(3)[0], moving.alpha(4)[0]) == (0.0, 0.0)
 
 
 def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
@@ -122,28 +68,6 @@ def test_beyond_a_limit_nothing_assembles_however_near(lengths: tuple[float, ...
             for side in (inside, 0.0, -inside)
         ]
         assert status == [["ok"], ["singular"], ["not_assembled"]]
-
-
-@pytest.mark.parametrize("offset", [1e-6, 1e-12, 1e-20])
-def test_an_offset_from_a_limit_keeps_all_its_digits(offset: float) -> None:
-    """Near a limit sin mu grows as the square root of the offset, however small."""
-    link = fourbar.FourBar(0.5, fourbar.Bar(0.4), fourbar.Bar(0.3), fourbar.Bar(0.25), 0.2)
-    with mpmath.workdps(60):
-        D, A, B, C = (mpmath.mpf(x) for x in link.lengths)
-        limit = mpmath.mpf(0.2) + mpmath.acos((A**2 + D**2 - (B + C) ** 2) / (2 * A * D))
-        psi = limit - mpmath.mpf(offset) - mpmath.mpf(0.2)
-        squared = A**2 + D**2 - 2 * A * D * mpmath.cos(psi)
-        cosine = (B**2 + C**2 - squared) / (2 * B * C)
-        sine = float(mpmath.sqrt(1 - cosine**2))
-        theta_2 = float(limit) - offset
-    remainder = limit_remainder(link, float(limit), theta_2, -offset)
-    at = fourbar.scene.Command(np.array([theta_2]), np.array([1], np.int8), 1.0, 0.0, remainder)
-    scene = fourbar.Scene(link, fourbar.Motion(theta_2, 1.0))
-    solution = fourbar.solve(scene, at=at)
-    assert isinstance(remainder, mpmath.mpf)
-    assert abs(solution.sin_mu[0] / sine - 1.0) < 8 * EPS
-    assert solution.status == ["ok"]
-    assert solution.omega_3 is not None and np.isfinite(solution.omega_3).all()
 
 
 STEP = 1e-4
@@ -183,19 +107,6 @@ def test_points_move_as_their_positions_do(point: tuple[float, float], theta_1: 
         assert moving.acceleration(bar, z) == pytest.approx(bend, abs=BY_DIFFERENCES)
 
 
-@pytest.mark.parametrize("branch", [1, -1])
-def test_slip_at_a_pin_is_the_difference_of_its_two_bars(branch: int) -> None:
-    unit, growing = (
-        compute_state(linkage(), ANGLES, branch, 1.0, 0.0),
-        compute_state(linkage(), ANGLES, branch, 0.0, 1.0),
-    )
-    for pin, (i, j) in fourbar.linkage.PINS.items():
-        assert unit.slip(pin) == pytest.approx(unit.omega(j) - unit.omega(i), abs=CLOSURE)
-        assert unit.slip(pin) == pytest.approx(growing.alpha(j) - growing.alpha(i), abs=CLOSURE)
-    with pytest.raises(KeyError, match="C"):
-        unit.slip("C")
-
-
 def test_speeds_given_one_by_one_are_speeds_given_at_once() -> None:
     """Zero at every position, as a number or as an array, is the same motion; the ground does not move."""
     states = []
@@ -207,16 +118,6 @@ def test_speeds_given_one_by_one_are_speeds_given_at_once() -> None:
             assert np.all(other.omega(bar) == states[0].omega(bar))
             assert np.all(other.alpha(bar) == states[0].alpha(bar))
             assert np.array_equal(other.acceleration(bar, 0.1 + 0.2j), states[0].acceleration(bar, 0.1 + 0.2j))
-
-
-def test_the_cosine_at_B_is_that_of_the_two_bars() -> None:
-    for lengths, branch in ((LENGTHS, 1), (LENGTHS, -1), ((0.3, 0.1, 0.3, 0.1), 1), ((0.1, 0.3, 0.3, 0.1), -1)):
-        d, a, b, c = lengths
-        moving = compute_state(fourbar.FourBar(d, fourbar.Bar(a), fourbar.Bar(b), fourbar.Bar(c), 0.4), ANGLES, branch)
-        ok = assembled(moving)
-        expected = np.cos(angle(moving, 4) - angle(moving, 3))
-        assert dot(moving.at.u3, moving.at.u4)[ok] == pytest.approx(expected[ok], abs=64 * EPS)
-        assert moving.at.sin_mu[ok] == pytest.approx(np.sin(angle(moving, 4) - angle(moving, 3))[ok], abs=1e-13)
 
 
 def test_singular_positions_have_no_speed_and_their_neighbours_keep_theirs() -> None:
@@ -241,26 +142,6 @@ def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths: tup
     assert (moving.at.sin_mu > 0.0).all() and (moving.at.sin_mu < 8.0 * EPS).all()
     assert find_singular(moving.at).all() and np.isnan(moving.omega(3)).all()
     assert not find_singular(compute_state(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).at).any()
-
-
-def test_branches_may_differ_from_position_to_position() -> None:
-    branches = np.where(np.arange(41) % 3 == 0, -1, 1).astype(np.int8)
-    mixed = compute_state(linkage(), ANGLES, branches, 2.0, 1.0)
-    for branch in (1, -1):
-        alone = compute_state(linkage(), ANGLES, branch, 2.0, 1.0)
-        which = branches == branch
-        for bar in (3, 4):
-            assert np.array_equal(mixed.direction(bar)[which], alone.direction(bar)[which])
-            assert np.array_equal(mixed.omega(bar)[which], alone.omega(bar)[which])
-            assert np.array_equal(mixed.alpha(bar)[which], alone.alpha(bar)[which])
-
-
-@pytest.mark.parametrize("centre", [(0.3, 0.0), (0.3, 1.0), (0.3, -2.5), (0.0, 0.0)])
-def test_a_mass_centre_in_the_frame_of_its_bar(centre: tuple[float, float]) -> None:
-    place = fourbar.Bar(0.2, 1.0, 0.1, centre).to_centre
-    assert place == pytest.approx(cmath.rect(*centre), abs=EPS)
-    assert place.imag == 0.0 or centre[1] != 0.0
-    assert type(place) is complex
 
 
 @pytest.mark.parametrize(
@@ -288,15 +169,6 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
         assert np.array_equal(moving.alpha(bar), np.full(3, growths[k]))
     # between the bars: the angle of input and ground
     assert np.abs(moving.at.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - theta_1)), rel=8 * EPS, abs=2 * EPS)
-
-
-def test_a_kite_whose_A_lies_on_O4_has_no_speed_there_and_no_warning() -> None:
-    """a = d, b = c: at theta_2 = theta_1 bars 3 and 4 lie on each other and turn freely."""
-    link = fourbar.uniform(0.3, 0.3, 0.2, 0.2)
-    for branch in (1, -1):
-        moving = compute_state(link, np.array([0.0, 0.5]), branch, 2.0, 3.0)
-        for value in (moving.omega(3), moving.omega(4), moving.alpha(3), moving.alpha(4)):
-            assert np.isfinite(value).tolist() == [False, True]
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])

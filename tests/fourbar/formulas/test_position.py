@@ -123,11 +123,6 @@ def two_readings() -> tuple[State, State]:
     return by_2, State(lengths, 0.0, by_2.theta_2, at, k, 1.0, rates(k, 1.0, 0.0))
 
 
-def test_a_loop_read_backwards_keeps_the_half_angle_that_it_was_closed_with() -> None:
-    _, by_4 = two_readings()
-    assert np.allclose(by_4.at.half.ss + by_4.at.half.kk, 1.0, rtol=0.0, atol=FEW_ROUNDINGS)
-
-
 def test_grounds_at_several_angles_are_those_of_each() -> None:
     bars, theta_2 = uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0])
     lengths, theta_1 = loop(*bars.lengths), np.array([[0.0], [0.4], [1.0]])

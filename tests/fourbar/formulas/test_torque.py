@@ -3,7 +3,6 @@
 import mpmath as mp
 import numpy as np
 import pytest
-from flint import arb, ctx
 from scipy.optimize import brentq
 
 import fourbar
@@ -14,12 +13,12 @@ from fourbar.formulas.mobility import follow_smooth_path, limit_positions
 from fourbar.formulas.motion import State, rates
 from fourbar.formulas.path import compute_state as state_of
 from fourbar.formulas.path import find_smooth_branch, meet_change_points, prepare_path
-from fourbar.formulas.position import half_angle, loop
+from fourbar.formulas.position import loop
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
-from fourbar.scene import Command, command
+from fourbar.scene import Command
 from fourbar.solve import solve
 from fourbar_validation.cost.formulas import solve_thirteen_equations
-from fourbar_validation.engines.balls import BITS, collect_inputs, compute_outputs
+from tests.support.balls import answer_in_balls
 
 EPS = 2.0**-52
 K = 200.0
@@ -84,18 +83,6 @@ def test_torque_and_pin_forces_agree_with_the_thirteen_equations(drive: int) -> 
     assert compared > 1000
 
 
-def exactly(scene: fourbar.Scene, at: Command) -> dict[str, arb] | None:
-    """Balls at the one position of a command, its remainder included; None where the loop does not close."""
-    before, ctx.prec = ctx.prec, BITS
-    try:
-        x = {name: arb(value) for name, value in collect_inputs(scene, float(at.theta_2[0])).items()}
-        if at.remainder is not None:
-            x["theta_2"] += arb(mp.nstr(at.remainder, 100))
-        return compute_outputs(scene, int(at.branch[0]), x)
-    finally:
-        ctx.prec = before
-
-
 @pytest.mark.parametrize("offset", [1e-2, 1e-8, 1e-14, 1e-30])
 def test_they_keep_their_digits_at_a_stated_distance_from_a_limit(offset: float) -> None:
     """theta_2 = limit + offset: it assembles on one side of the limit, with the torque of the free bodies in balls."""
@@ -108,14 +95,12 @@ def test_they_keep_their_digits_at_a_stated_distance_from_a_limit(offset: float)
             for side in (offset, -offset):
                 motion = fourbar.Motion(fourbar.FromLimit(number, side), 1.3, 0.7, branch=branch)
                 scene = fourbar.Scene(linkage, motion, drive, terms[:3], terms[3:5])
-                at = command(scene)
-                s, exact = solve(scene, "force", at=at), exactly(scene, at)
+                s, exact = solve(scene, "force"), answer_in_balls(scene).get("torque", [np.nan])[0]
                 assert s.torque is not None and s.drive_condition is not None
                 assembled.append(bool(s.assembled[0]))
-                assert assembled[-1] == (exact is not None)
-                if exact is not None:
-                    wrong = abs(float((exact["torque"] - float(s.torque[0])).mid()))
-                    assert wrong <= K * EPS * abs(s.torque[0]) / s.drive_condition[0]
+                assert assembled[-1] == np.isfinite(exact)
+                if assembled[-1]:
+                    assert abs(exact - s.torque[0]) <= K * EPS * abs(s.torque[0]) / s.drive_condition[0]
             assert any(assembled) and (offset > 1e-3 or not all(assembled))
 
 
@@ -198,10 +183,6 @@ def test_statics_of_motiongenesis() -> None:
         assert abs(np.degrees(ours) - theirs) <= 0.5e-8
 
 
-CIRCLES = mp.mpf(10) ** -45
-"""What 50 digits leave of the loop."""
-PATH = 64.0 * EPS
-"""Roundings of a coefficient, divided by the sine squared and by e^2 over the lengths squared, both above 0.05 here."""
 READ_BACKWARDS = 16.0 * EPS
 """Times 1/h4^2, of J/h4^2: theta_4 is rounded by some EPS, theta_2 follows it by 1/h4 and h4 by 1/h4 once more."""
 SHAPES = {
@@ -221,58 +202,6 @@ def of(lengths: tuple[float, ...]) -> fourbar.FourBar:
     d, *moving, theta_1 = lengths
     bars = (fourbar.Bar(x, 2.0 + x, 0.01, (0.4 * x, phase)) for x, phase in zip(moving, (0.5, -0.7, 2.0), strict=True))
     return fourbar.FourBar(d, *bars, ground_angle=theta_1)
-
-
-def angles_in_fifty_digits(
-    linkage: fourbar.FourBar, theta_2: mp.mpf, near: tuple[float, float]
-) -> tuple[mp.mpf, mp.mpf]:
-    """theta_3, theta_4 by Newton on the loop from an assembly near it."""
-    d, a, b, c = (mp.mpf(length) for length in linkage.lengths)
-
-    theta_1 = mp.mpf(linkage.ground_angle)
-
-    def gap(theta_3: mp.mpf, theta_4: mp.mpf) -> tuple[mp.mpf, mp.mpf]:
-        return (
-            a * mp.cos(theta_2) + b * mp.cos(theta_3) - c * mp.cos(theta_4) - d * mp.cos(theta_1),
-            a * mp.sin(theta_2) + b * mp.sin(theta_3) - c * mp.sin(theta_4) - d * mp.sin(theta_1),
-        )
-
-    theta_3, theta_4 = mp.findroot(gap, near, tol=CIRCLES**2)
-    return theta_3, theta_4
-
-
-@pytest.mark.parametrize("lengths", SHAPES.values(), ids=SHAPES.keys())
-@pytest.mark.parametrize("branch", [1, -1])
-def test_coefficients_are_the_derivatives_of_the_loop(lengths: tuple[float, ...], branch: int) -> None:
-    linkage = of(lengths)
-    d, a, b, c = linkage.lengths
-    for psi in (0.7, 2.5, 4.6):
-        theta_2 = linkage.ground_angle + psi
-        e = abs(a * np.exp(1j * psi) - d)
-        if not abs(b - c) + 0.01 < e < b + c - 0.01:
-            continue
-        ours = state_of(linkage, np.array([theta_2]), branch)
-        unit, k = {3: ours.at.u3[0], 4: ours.at.u4[0]}, ours.k
-        near = tuple(float(np.angle(unit[bar])) for bar in (3, 4))
-        assert np.sign(np.sin(near[1] - near[0])) == branch
-        with mp.workdps(50):
-            at = mp.mpf(theta_2)
-            exact = angles_in_fifty_digits(linkage, at, near)
-            # central differences, 15 digits at least: the step is 1e-15 and 1e-13 of a number with 45
-            one, two = mp.mpf(10) ** -15, mp.mpf(10) ** -13
-            ends = [angles_in_fifty_digits(linkage, at + step, near) for step in (one, -one, two, -two)]
-            first = [(ends[0][i] - ends[1][i]) / (2 * one) for i in (0, 1)]
-            second = [(ends[2][i] - 2 * exact[i] + ends[3][i]) / two**2 for i in (0, 1)]
-            size = 1.0 + max(abs(float(x)) for x in (*first, *second))
-            worth = PATH * size / float(abs(mp.sin(exact[1] - exact[0]))) ** 2 * (d + a + b + c) ** 2 / e**2
-            for bar, i in ((3, 0), (4, 1)):
-                assert abs(mp.mpc(mp.cos(exact[i]), mp.sin(exact[i])) - complex(unit[bar])) <= worth
-                assert abs(first[i] - float(k[bar - 2][0])) <= worth
-                assert abs(second[i] - float((k.dh3, k.dh4)[i][0])) <= worth
-            assert abs((1 - first[0]) - float(k.h23[0])) <= worth
-            assert abs((first[1] - first[0]) - float(k.h43[0])) <= worth
-            assert abs(mp.sin(exact[1] - exact[0]) - float(ours.at.sin_mu[0])) <= worth
-        assert k.h2 == 1.0 and k.dh2 == 0.0 and abs(ours.at.u2[0] - np.exp(1j * theta_2)) <= 4 * EPS
 
 
 def J_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
@@ -412,22 +341,6 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
     assert meet_change_points(wide) == wide
     products = 0.47**2 - 0.4**2, 0.2**2 - 0.03**2
     assert wide[4:] == pytest.approx(products)
-
-
-def test_half_angles_keep_their_digits_after_many_turns() -> None:
-    """sin^2 h, cos^2 h and their product near the zeros, and the factors of Heron's formula."""
-    shape = loop(0.3, 0.1, 0.25, 0.22)
-    for turns in (0, 3, 800, -800):
-        psi = 2.0 * np.pi * turns + np.array([1e-9, 0.7, np.pi + 1e-9])
-        found = half_angle(shape, psi)
-        with mp.workdps(50):
-            d, a, b, c = (mp.mpf(x) for x in shape[:4])
-            for i, x in enumerate(psi.tolist()):
-                s, k = mp.sin(mp.mpf(x) / 2), mp.cos(mp.mpf(x) / 2)
-                e2 = (d - a) ** 2 + 4 * a * d * s * s
-                exact = (s * s, k * k, s * k, (b + c) ** 2 - e2, e2 - (b - c) ** 2)
-                for ours, theirs in zip(found, exact, strict=True):
-                    assert abs(mp.mpf(float(ours[i])) / theirs - 1) <= 8 * EPS
 
 
 def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_bar_3() -> None:

@@ -1,0 +1,25 @@
+"""Every output of the thirteen equations in 320-bit balls, which share nothing with the formulas."""
+
+import numpy as np
+from flint import arb, ctx
+
+import fourbar
+from fourbar.scene import Command, Scene
+from fourbar_validation.engines.balls import compute_outputs, make_balls
+
+
+def answer_in_balls(scene: Scene, at: Command | None = None) -> dict[str, np.ndarray]:
+    """Compute each output at each position, rounded once: (n,), vectors (n, 2), NaN where it has no value."""
+    at = fourbar.command(scene) if at is None else at
+    rows, precision = [], ctx.prec
+    try:
+        for angle, branch in zip(at.angle.tolist(), at.branch.tolist(), strict=True):
+            inputs = make_balls(scene, angle)
+            inputs[at.commanded] += arb(0 if at.remainder is None else at.remainder)
+            outputs = compute_outputs(scene, branch, inputs) or {}
+            rows.append({name: float(ball.mid()) for name, ball in outputs.items()})
+    finally:
+        ctx.prec = precision
+    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in set().union(*rows)}
+    ends = [name.removesuffix("_x") for name in columns if name.endswith("_x")]
+    return columns | {name: np.stack([columns[f"{name}_x"], columns[f"{name}_y"]], axis=-1) for name in ends}
