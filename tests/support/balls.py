@@ -13,8 +13,9 @@ def answer_in_balls(scene: Scene, at: Command | None = None) -> dict[str, np.nda
     at = fourbar.command(scene) if at is None else at
     rows, precision = [], ctx.prec
     try:
-        for angle, branch in zip(at.angle.tolist(), at.branch.tolist(), strict=True):
-            inputs = make_balls(scene, angle)
+        places = at.angle if at.stroke is None else at.stroke
+        for place, branch in zip(places.tolist(), at.branch.tolist(), strict=True):
+            inputs = make_balls(scene, place)
             inputs[at.commanded] += arb(0 if at.remainder is None else at.remainder)
             outputs = compute_outputs(scene, branch, inputs) or {}
             rows.append({name: float(ball.mid()) for name, ball in outputs.items()})

@@ -135,22 +135,6 @@ def test_the_constants_of_the_loop_vanish_at_change_points_alone() -> None:
     assert min(zeros) > 300
 
 
-@pytest.mark.parametrize(
-    ("lengths", "vanish"),
-    [
-        ((0.3, 0.1, 0.3, 0.1), (True, True)),
-        ((0.1, 0.3, 0.3, 0.1), (True, True)),
-        ((0.3, 0.3, 0.1, 0.1), (False, True)),
-        ((3.0, 1.0, 2.0, 2.0), (True, False)),
-        ((2.0, 1.0, 4.0, 3.0), (False, True)),
-        ((0.3, 0.1, 0.25, 0.22), (False, False)),
-    ],
-)
-def test_which_constants_vanish(lengths: tuple[float, ...], vanish: tuple[bool, bool]) -> None:
-    found = loop(*lengths)
-    assert (found.E1 == 0.0, found.E2 == 0.0) == vanish
-
-
 def test_pairs_stay_parallel_on_one_side_of_the_change_points_alone() -> None:
     psi = np.array([-2.0, -1e-9, 1e-9, 2.0, math.pi + 1e-9])
     ahead, back = [False, False, True, True, False], [True, True, False, False, True]

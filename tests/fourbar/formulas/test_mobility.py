@@ -205,8 +205,8 @@ def test_positions_that_a_motion_connects_have_one_circuit_and_those_that_do_not
     crank_rocker, rocker = uniform(3, 1, 2.5, 2.2), uniform(3, 2.5, 1, 2.2)
     assert find_circuit(crank_rocker, np.array([0.1, 3.0, 3.0]), np.array([1, 1, -1])).tolist() == [0, 0, 1]
     start, stop = choose_range(rocker)
-    found = find_circuit(rocker, np.array([start, stop, -start, 3.0]), np.array([1, -1, 1, 1]))
-    assert found.tolist() == [0, 0, 1, -1]
+    beside = np.array([start, stop, -start, 3.0, 0.0])  # 3.0 beyond stretched bars 3 and 4, 0.0 beyond folded ones
+    assert find_circuit(rocker, beside, np.array([1, -1, 1, 1, 1])).tolist() == [0, 0, 1, -1, -1]
 
 
 def exact_psi(bars: FourBar, bar: int, stretched: bool) -> mp.mpf:
@@ -327,7 +327,8 @@ def test_time_ratio_is_the_time_of_both_strokes() -> None:
 
 
 @pytest.mark.parametrize(
-    "lengths", [(2, 1, 2, 1), (1, 1, 2, 2), (2, 1, 1, 2), (2, 1, 4, 3), (1, 2, 4, 3), (2, 4, 3, 1), (1, 1, 1, 1)]
+    "lengths",
+    [(2, 1, 2, 1), (1, 1, 2, 2), (2, 1, 1, 2), (2, 1, 4, 3), (1, 2, 4, 3), (2, 4, 3, 1), (1, 1, 1, 1), (3, 1, 2, 2)],
 )
 @pytest.mark.parametrize("backwards", [False, True])
 def test_the_smooth_path_has_no_corner(lengths: tuple[float, ...], backwards: bool) -> None:
@@ -361,14 +362,10 @@ def test_a_sweep_on_a_change_point_is_before_it() -> None:
     assert follow_smooth_path(bars, np.array([-1.0, 0.0, -1.0]), 1).tolist() == [1, 1, 1]  # touched, then back
     assert follow_smooth_path(bars, np.array([-1.0, 0.0, 1.0]), -1).tolist() == [-1, -1, 1]
     assert follow_smooth_path(bars, np.array([1.0, 1.0, 1.0]), -1).tolist() == [-1, -1, -1]
-    assert follow_smooth_path(bars, np.array([1.0]), 1).dtype == np.int8
-    assert (follow_smooth_path(uniform(3, 1, 2.5, 2.2), quarter, -1) == -1).all()
-
-
-def test_a_position_on_a_change_point_belongs_to_the_side_it_is_reached_from() -> None:
-    bars = uniform(2, 1, 2, 1)
     assert follow_smooth_path(bars, np.array([-1.0, 0.5, 0.0, 0.5]), 1).tolist() == [1, -1, -1, -1]
     assert follow_smooth_path(bars, np.array([0.5, -1.0, 0.0, -1.0]), 1).tolist() == [1, -1, -1, -1]
+    assert follow_smooth_path(bars, np.array([1.0]), 1).dtype == np.int8
+    assert (follow_smooth_path(uniform(3, 1, 2.5, 2.2), quarter, -1) == -1).all()
 
 
 def test_a_single_precision_angle_next_to_a_change_point_is_next_to_it() -> None:

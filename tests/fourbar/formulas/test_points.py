@@ -138,18 +138,6 @@ def test_point_coefficients_are_derivatives() -> None:
                 assert error <= roundings * EPS * size ** (n + 1) / sine ** (2 * n)
 
 
-def test_a_motion_law_follows_from_the_coefficients() -> None:
-    drawn = random_positions(13, 1, 0.5)[0]
-    k, points = drawn.moving().k, point_coefficients(*drawn, 3, 0.1 + 0.4j)
-    omega_2, alpha_2 = -7.0, 31.0
-    moving = drawn.moving(omega_2, alpha_2)
-    assert moving.omega(4) == pytest.approx(k.h4 * omega_2, rel=8 * EPS)
-    expected = k.dh3 * omega_2**2 + k.h3 * alpha_2
-    assert moving.alpha(3) == pytest.approx(expected, rel=64 * EPS)
-    law = points.second * omega_2**2 + points.first * alpha_2
-    assert moving.acceleration(3, 0.1 + 0.4j) == pytest.approx(law, abs=1e3 * EPS * omega_2**2)
-
-
 def determinant(*centres: Centre) -> tuple[float, float]:
     """Determinant of three homogeneous points and the product of their magnitudes."""
     rows = np.array([[float(x[0]) for x in centre] for centre in centres])

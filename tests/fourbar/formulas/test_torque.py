@@ -9,12 +9,12 @@ import fourbar
 from fourbar.effects.effect import Actions, list_bodies
 from fourbar.evaluation.case import compute_state
 from fourbar.evaluation.free_motion import integrate
-from fourbar.formulas.mobility import follow_smooth_path, limit_positions
+from fourbar.formulas.mobility import limit_positions
 from fourbar.formulas.motion import State, rates
 from fourbar.formulas.path import compute_state as state_of
-from fourbar.formulas.path import find_smooth_branch, meet_change_points, prepare_path
+from fourbar.formulas.path import meet_change_points, prepare_path
 from fourbar.formulas.position import loop
-from fourbar.formulas.torque import driving_torque, half_slope, inertia
+from fourbar.formulas.torque import half_slope, inertia
 from fourbar.scene import Command
 from fourbar.solve import solve
 from fourbar_validation.cost.formulas import solve_thirteen_equations
@@ -250,18 +250,6 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(lengths: tuple[float, 
     assert not ok.any()
 
 
-def test_bars_whose_inertia_about_the_pin_is_one() -> None:
-    """A crank with I = 1 kg m^2, without mass: J = 1 and J' = 0 whatever the position."""
-    linkage = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.0, 1.0), fourbar.Bar(0.25), fourbar.Bar(0.22))
-    state = state_of(linkage, np.linspace(0.0, 6.0, 5), 1)
-    assert np.array_equal(np.broadcast_to(J_of(linkage, state), 5), np.ones(5)) and not slope_of(linkage, state).any()
-    rocker = fourbar.FourBar(0.3, fourbar.Bar(0.1), fourbar.Bar(0.25), fourbar.Bar(0.22, 0.0, 1.0))
-    k = state_of(rocker, np.linspace(0.0, 6.0, 5), 1).k
-    state = state_of(rocker, np.linspace(0.0, 6.0, 5), 1)
-    assert np.array_equal(J_of(rocker, state), k.h4**2)
-    assert np.array_equal(slope_of(rocker, state), 2.0 * (k.h4 * k.dh4))
-
-
 @pytest.mark.parametrize("drive", [2, 3, 4])
 def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive: int) -> None:
     """What depends on O4, on theta_2 and on rest next to motion, in one sweep."""
@@ -286,18 +274,6 @@ def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive
     assert Actions(state, list_bodies(linkage)).work() == (0.0, 0.0)
 
 
-def test_a_free_linkage_needs_no_torque() -> None:
-    """Of the thirteen equations at the acceleration with which it begins to move."""
-    linkage = of(SHAPES["crank-rocker"])
-    angles, gravity = np.linspace(0.2, 5.5, 5), (fourbar.Gravity(),)
-    alpha = np.array([free_acceleration(linkage, float(q), 3.0, 1, gravity) for q in angles])
-    at = Command(angles, np.ones(5, np.int8), 3.0, alpha)
-    scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 3.0), effects=gravity)
-    theirs, state = solve_thirteen_equations(scene, at), compute_state(scene, at)
-    size = np.hypot(*theirs["F32"].T) * max(linkage.lengths) + np.abs(J_of(linkage, state) * alpha)
-    assert np.all(np.abs(theirs["torque"]) <= 1e-13 * size)
-
-
 def test_positions_that_do_not_close_and_limits_are_quiet() -> None:
     linkage = of((0.3, 0.25, 0.1, 0.22, 0.4))
     limit = limit_positions(linkage)[0].theta_2
@@ -309,25 +285,6 @@ def test_positions_that_do_not_close_and_limits_are_quiet() -> None:
         s = solve(fourbar.Scene(linkage, motion, effects=effects))
         assert s.status == ["singular"] and s.sin_mu[0] == 0.0 and np.isfinite(s.theta_3).all()
         assert np.isnan(s.omega_3).all() and np.isnan(s.torque).all()
-
-
-@pytest.mark.parametrize(
-    "lengths", [(2, 1, 2, 1), (1, 1, 2, 2), (2, 1, 1, 2), (2, 1, 4, 3), (3, 1, 2, 2), (1, 1, 1, 1)]
-)
-def test_followed_through_change_points_it_is_the_smooth_path(lengths: tuple[float, ...]) -> None:
-    """The sign that a free motion follows is that of the sweep, and no bar jumps: it turns as its coefficient says."""
-    linkage = of((*lengths, 0.4))
-    q = 0.4 + np.linspace(0.1, 12.0, 4001)
-    branch = follow_smooth_path(linkage, q, 1)
-    assert (branch == -1).any()
-    found = find_smooth_branch(loop(*map(float, lengths)), q - 0.4, float(branch[0]))
-    assert np.array_equal(found, branch)
-    state, step = state_of(linkage, q, found), q[1] - q[0]
-    for u, h, dh in ((state.at.u3, state.k.h3, state.k.dh3), (state.at.u4, state.k.h4, state.k.dh4)):
-        turned = np.angle(u[1:] / u[:-1])
-        bent = np.maximum(np.abs(dh[1:]), np.abs(dh[:-1]))
-        middle = 0.5 * (h[1:] + h[:-1])
-        assert np.all(np.abs(turned - middle * step) <= bent * step**2 + 1e-12)
 
 
 def test_what_touches_is_up_to_the_rounding_of_the_lengths() -> None:
@@ -353,20 +310,6 @@ def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_
         for u in (state.at.u2, state.at.u3, state.at.u4):
             assert np.all(np.abs(np.abs(u[closed]) - 1.0) <= 2 * EPS)
         assert np.all(np.abs(k.h43 - (k.h4 - k.h3))[:20] <= 64 * EPS * (np.abs(k.h3) + np.abs(k.h4))[:20])
-
-
-@pytest.mark.parametrize("drive", [2, 3, 4])
-def test_a_drive_shares_the_power_of_the_input(drive: int) -> None:
-    """T_k omega_k is one power, whichever bar is driven."""
-    linkage, terms, at = random_case(np.random.default_rng(7))
-    at = some_of(at, solve(fourbar.Scene(linkage), "position", at=at).condition > 0.2)
-    s, two = (
-        solve(fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), bar, terms[:3], terms[3:]), "force", at=at)
-        for bar in (drive, 2)
-    )
-    rate = getattr(s, f"omega_{drive}")
-    assert len(s) > 5 and s.torque * rate == pytest.approx(two.torque * at.omega_2, rel=1e-13)
-    assert driving_torque(compute_state(fourbar.Scene(linkage), at).k.h2, 3.0, 1.0) == 2.0
 
 
 def test_a_single_pendulum() -> None:
