@@ -32,7 +32,8 @@ def test_one_window_of_iftomm_a02() -> None:
 def test_needs_no_driving_torque() -> None:
     terms = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001))
     m = integrate(HANGING, terms, 0.3, 2.0, -1, np.linspace(0.0, 2.0, 41))
-    s = solve(fourbar.Scene(HANGING, effects=terms), "force", at=m.command)
+    # told to move so, not released: of a released motion the torque is zero whatever it is
+    s = solve(fourbar.Scene(HANGING, effects=terms), "force", at=m.command._replace(independent=None))
     assert s.torque is not None
     assert np.abs(s.torque).max() < 1e-12 * 9.81 * 1.1  # of all the weights at one metre
 
