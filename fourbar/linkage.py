@@ -238,9 +238,8 @@ def uniform(
     >>> uniform("6 in", "2 in", "5 in", "4 in").ground
     0.1524
     """
-    bars: list[Bar] = []
     density = require("per_metre", per_metre, "kg/m", AT_LEAST_ZERO)
-    for key, length in (("input", input), ("coupler", coupler), ("output", output)):
-        checked = require(f"lengths.{key}", length, "m", POSITIVE)
-        bars.append(Bar(checked, mass=density * checked))
-    return FourBar(require("lengths.ground", ground, "m", POSITIVE), bars[0], bars[1], bars[2])
+    named = zip(BAR_NAMES.values(), (ground, input, coupler, output), strict=True)
+    d, *moving = (require(f"lengths.{name}", length, "m", POSITIVE) for name, length in named)
+    two, three, four = (Bar(length, mass=density * length) for length in moving)
+    return FourBar(d, two, three, four)

@@ -187,7 +187,10 @@ class Springs(Effect):
         """Add the tension at `start` along the unit vector to `end`, and its opposite at `end`."""
         for spring in self.springs:
             across = spring.end.place(state) - spring.start.place(state)
-            actions.pull(spring.start, spring.end, _divide_by_distance(spring, across) * across)
+            by_distance = spring.stiffness
+            if is_any(spring.slack != 0.0):  # NaN at a distance of 0, where the status says so
+                by_distance = by_distance + spring.slack / namespace(across).abs(across)
+            actions.pull(spring.start, spring.end, by_distance * across)
 
     def status(self, state: State, branch: NDArray[np.int8] | None) -> NDArray[np.uint8] | None:
         """Return NO_DIRECTION where the two points of a spring with slack coincide."""
@@ -200,10 +203,3 @@ class Springs(Effect):
             here = (namespace(across).abs(across) <= COINCIDE * away) & (spring.slack != 0.0)
             codes = select(here, NO_DIRECTION, OK if codes is None else codes)
         return codes
-
-
-def _divide_by_distance(spring: Spring, across: Any) -> Any:
-    """Compute tension over distance, N/m; NaN at a distance of 0, where the status says so."""
-    if not is_any(spring.slack != 0.0):
-        return spring.stiffness
-    return spring.stiffness + spring.slack / namespace(across).abs(across)

@@ -6,6 +6,8 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import (
@@ -160,45 +162,19 @@ def test_ranges_and_circuits_agree_with_a_scan(bars: FourBar) -> None:
     assert turns_fully(bars) == bool((margin[sure] >= 0.0).all())
 
     # positions as a graph: neighbours on a branch, both branches next to a gap or across a change point
-    node = {(i, s): (i, s) for i in range(GRID) for s in (1, -1) if margin[i] >= 0.0}
-
-    def root(x: tuple[int, int]) -> tuple[int, int]:
-        while node[x] != x:
-            node[x] = node[node[x]]
-            x = node[x]
-        return x
-
-    crossing = {0, GRID // 2} if change_points(bars) else set()
-    for i, s in list(node):
-        behind = ((i - 1) % GRID, s)
-        if behind in node:
-            node[root((i, s))] = root(behind)
-        at_gap = behind not in node or ((i + 1) % GRID, s) not in node
-        touches = i in crossing and min(abs(closes(bars, theta_2[i : i + 1] - math.pi / GRID))) < 1e-12
-        if at_gap or touches:
-            node[root((i, 1))] = root((i, -1))
-    assert len({root(x) for x in node}) == len(circuits(bars))
-    places = np.array(sorted(node))
-    numbers = find_circuit(bars, theta_2[places[:, 0]], places[:, 1].astype(np.int8))
-    for x, number in zip(places[:: GRID // 50], numbers[:: GRID // 50], strict=True):
-        same = root(tuple(x.tolist())) == root(tuple(places[0].tolist()))
-        assert same == (number == numbers[0])
-
-
-def test_circuits_of_grashof_linkages_by_the_angle_that_never_closes() -> None:
-    # at the ends of the bar opposite the shortest the angles never reach 0 or pi: their sign is the circuit's
-    seen = set()
-    for bars in random_linkages(2, 200):
-        found = classify(bars)
-        if found.surplus <= 0.0:
-            continue
-        seen.add(found.barker)
-        theta_2 = np.concatenate([np.linspace(*ends, 41)[1:-1] for ends in find_intervals(bars)])
-        for branch in (1, -1):
-            sin_mu = compute_state(bars, theta_2, branch).at.sin_mu
-            sine = np.sin(theta_2 - bars.ground_angle) if found.shortest in (3, 4) else sin_mu
-            assert ((sine > 0.0) == (find_circuit(bars, theta_2, branch) == 0)).all()
-    assert seen == {1, 2, 3, 4}
+    place, ahead, closed = np.arange(GRID), np.roll(np.arange(GRID), -1), margin >= 0.0
+    joined = closed & closed[ahead]
+    meets = closed & ~(joined & np.roll(closed, 1))
+    if change_points(bars):
+        touches = np.abs(closes(bars, theta_2 - math.pi / GRID)) < 1e-12
+        meets |= closed & touches & np.isin(place, (0, GRID // 2))
+    starts = np.concatenate([place[joined], GRID + place[joined], place[meets]])
+    ends = np.concatenate([ahead[joined], GRID + ahead[joined], GRID + place[meets]])
+    graph = coo_array((np.ones(starts.size), (starts, ends)), shape=(2 * GRID, 2 * GRID))
+    component = connected_components(graph, directed=False)[1][np.tile(closed, 2)]
+    number = find_circuit(bars, np.tile(theta_2, 2), np.repeat(np.array([1, -1], np.int8), GRID))[np.tile(closed, 2)]
+    for partition in (component, number, zip(component, number, strict=True)):
+        assert len(set(partition)) == len(circuits(bars))
 
 
 def test_positions_that_a_motion_connects_have_one_circuit_and_those_that_do_not_assemble_none() -> None:
