@@ -105,15 +105,6 @@ def test_a_flywheel_is_inertia_of_the_bar(bar: int, name: str) -> None:
         assert np.abs(one - other).max() <= LAST_DIGITS * np.abs(other).max(), quantity
 
 
-def test_friction_at_one_pin_in_fifty_digits() -> None:
-    """The crank alone carries the friction at O2: T = T0 + mu r |F12| sign(omega_2), and F12 does not change."""
-    bare, mu, r = crank_rocker(), 0.3, 0.02
-    free, slowed = solve(bare), solve(replace(bare, effects=(*bare.effects, PinFriction.at(O2=(mu, r)))))
-    assert free.torque is not None and free.F12 is not None and slowed.torque is not None
-    expected = free.torque + mu * r * np.hypot(*free.F12.T)
-    assert slowed.torque == pytest.approx(expected, abs=LAST_DIGITS * np.abs(expected).max(), rel=0)
-
-
 def test_one_cone_has_one_none_or_two_solutions() -> None:
     """x = k |F + C x| on a line: F = 1, C = c: x = k (1 + c x), x = k |1 - c x| ...
 

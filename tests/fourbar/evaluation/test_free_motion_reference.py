@@ -48,24 +48,14 @@ def four_lengths(rng: np.random.Generator, grashof: bool) -> list[float]:
             return [float(v) for v in x]
 
 
-def with_shortest(place: int) -> Callable[[np.random.Generator], list[float]]:
-    """Grashof linkages by the place of the shortest bar among ground, input, coupler, output."""
+def with_extreme(place: int, grashof: bool) -> Callable[[np.random.Generator], list[float]]:
+    """Linkages by the place among ground, input, coupler, output of the shortest bar (Grashof) or of the longest."""
 
     def lengths(rng: np.random.Generator) -> list[float]:
-        shortest, *others = four_lengths(rng, grashof=True)
+        others = four_lengths(rng, grashof)
+        extreme = others.pop(0 if grashof else -1)
         rng.shuffle(others)
-        return [*others[:place], shortest, *others[place:]]
-
-    return lengths
-
-
-def with_longest(place: int) -> Callable[[np.random.Generator], list[float]]:
-    """Triple rockers, by the place of the longest bar."""
-
-    def lengths(rng: np.random.Generator) -> list[float]:
-        *others, longest = four_lengths(rng, grashof=False)
-        rng.shuffle(others)
-        return [*others[:place], longest, *others[place:]]
+        return [*others[:place], extreme, *others[place:]]
 
     return lengths
 
@@ -87,14 +77,14 @@ def parallelogram(rng: np.random.Generator) -> list[float]:
 
 
 KINDS: dict[str, Callable[[np.random.Generator], list[float]]] = {
-    "double-crank": with_shortest(0),
-    "crank-rocker": with_shortest(1),
-    "double-rocker": with_shortest(2),
-    "rocker-crank": with_shortest(3),
-    "triple rocker, longest ground": with_longest(0),
-    "triple rocker, longest input": with_longest(1),
-    "triple rocker, longest coupler": with_longest(2),
-    "triple rocker, longest output": with_longest(3),
+    "double-crank": with_extreme(0, grashof=True),
+    "crank-rocker": with_extreme(1, grashof=True),
+    "double-rocker": with_extreme(2, grashof=True),
+    "rocker-crank": with_extreme(3, grashof=True),
+    "triple rocker, longest ground": with_extreme(0, grashof=False),
+    "triple rocker, longest input": with_extreme(1, grashof=False),
+    "triple rocker, longest coupler": with_extreme(2, grashof=False),
+    "triple rocker, longest output": with_extreme(3, grashof=False),
     "change point": at_change_point,
     "parallelogram": parallelogram,
 }
