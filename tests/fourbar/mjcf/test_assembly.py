@@ -23,6 +23,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Array
 from fourbar_validation.scenes.suites import list_model_files
 from tests.support.scenes import crank_rocker
+from tests.validation.run.shipped.test_shipped import rows_of
 
 STEPS = 20
 NUMBER = r"-?[\d.]+(?:e-?\d+)?"
@@ -278,56 +279,42 @@ def test_drake_loads_the_sdf_and_moves_as_released() -> None:
     assert abs(missed[1]) < 1e-2 and missed[1] / missed[0] == pytest.approx(0.5, rel=FIRST_ORDER)
 
 
-def test_sdf_closes_its_loop_and_keeps_masses() -> None:
-    scene = released()
-    root = ET.fromstring(write_sdf(scene))
-    pose = {link.get("name"): [float(x) for x in str(link.findtext("pose")).split()] for link in root.iter("link")}
-    joints = {joint.get("name"): joint for joint in root.iter("joint")}
-    assert set(joints) == {"ground_on_world", "O2", "A", "O4", "B"}
-    ends = []
-    for name, bar in (("coupler", scene.linkage.coupler), ("output", scene.linkage.output)):
-        x, y, *_, turn = pose[name]
-        ends.append(complex(x, y) + cmath.rect(bar.length, turn))
-    assert abs(ends[0] - ends[1]) < 1e-15 * 8
-    assert float(str(joints["B"].findtext("pose")).split()[0]) == scene.linkage.coupler.length
-    assert float(str(joints["O2"].findtext("axis/dynamics/damping"))) == 0.05
-    assert [float(str(x.text)) for x in root.iter("mass")][1:] == [scene.linkage.bar(bar).mass for bar in (2, 3, 4)]
+@pytest.mark.parametrize(
+    ("engine", "effects"),
+    [
+        ("sdf", (fourbar.Gravity(), fourbar.Viscous.at(O2=0.05, B=0.02), fourbar.Friction.at(A=0.1))),
+        ("usd", (fourbar.Gravity(), fourbar.Flywheel(0.02, 2))),
+    ],
+)
+def test_a_file_holds_the_linkage_its_pins_and_what_acts(engine: str, effects: tuple[Any, ...]) -> None:
+    """As a run judges it, which reads the text and asks free bodies."""
+    rows = rows_of(crank_rocker(effects=effects), engine)
+    assert len(rows) > 5 and all(row.compared and not row.failed for row in rows)
 
 
-def test_sdf_refuses_what_it_cannot_hold() -> None:
-    with pytest.raises(LimitError, match=r"^loads \(here on bar 4\) have no counterpart in SDF for gazebo"):
-        write_sdf(crank_rocker(loads=(fourbar.Load(4, moment=1.0),)))
-    with pytest.raises(LimitError, match="torsion"):
-        write_sdf(released(effects=(Torsion.at(O2=(1.0, 0.0, 0.0)),)), "drake")
-    with pytest.raises(LimitError, match="pin B"):
-        write_sdf(released(effects=(fourbar.Viscous.at(B=1.0),)), "drake")
+def test_the_pin_at_B_alone_closes_the_loop_from_outside() -> None:
+    sdf, usd = write_sdf(released()), write_usd(released(effects=()))
+    assert re.findall(r'joint name="(\w+)"', sdf) == ["ground_on_world", "O2", "A", "O4", "B"]
+    assert re.findall(r'Joint "(\w+)"', usd) == ["O2", "A", "O4", "B"]
+    assert re.findall(r"Articulation = (\w+)", usd) == ["false", "false", "false", "true"]
 
 
-def points(text: str, name: str) -> list[complex]:
-    """The points of that name in a USD file, in the order in which they stand there."""
-    found = re.findall(rf"{name} = \((\S+), (\S+), 0\)", text)
-    return [complex(float(x), float(y)) for x, y in found]
+LOADED, AT_B = crank_rocker(loads=(fourbar.Load(4, moment=1.0),)), (fourbar.Viscous.at(B=1.0),)
 
 
-def test_usd_closes_its_loop_keeps_masses_and_refuses_what_it_cannot_hold() -> None:
-    scene = released(effects=(fourbar.Gravity(),))
-    text, linkage = write_usd(scene), scene.linkage
-    turns = [2.0 * cmath.phase(complex(float(w), float(z)))
-             for w, z in re.findall(r"xformOp:orient = \((\S+), 0, 0, (\S+)\)", text)]  # fmt: skip
-    places = points(text, "xformOp:translate")
-    ends = [places[bar - 2] + cmath.rect(linkage.bar(bar).length, turns[bar - 2]) for bar in (2, 3, 4)]
-    assert abs(ends[0] - places[1]) < 8e-15 and abs(ends[1] - ends[2]) < 8e-15
-    fixed = [2.0 * cmath.phase(complex(float(w), float(z)))
-             for w, z in re.findall(r"localRot0 = \((\S+), 0, 0, (\S+)\)", text)]  # fmt: skip
-    between = [turns[0], turns[1] - turns[0], turns[2], turns[1] - turns[2]]
-    assert all(abs(one - other) < 8e-15 for one, other in zip(fixed, between, strict=True))
-    assert points(text, "localPos0")[1::2] == [linkage.input.length, linkage.output.length]
-    assert points(text, "localPos1") == [0.0, 0.0, 0.0, linkage.coupler.length]
-    assert re.findall(r'Joint "(\w+)"', text) == ["O2", "A", "O4", "B"] and text.count("Articulation = true") == 1
-    assert [float(x) for x in re.findall(r"physics:mass = (\S+)", text)] == [linkage.bar(n).mass for n in (2, 3, 4)]
-    for wrong in (crank_rocker(loads=(fourbar.Load(4, moment=1.0),)), released()):
-        with pytest.raises(LimitError, match="no counterpart in USD"):
-            write_usd(wrong)
+@pytest.mark.parametrize(
+    ("write", "scene", "words"),
+    [
+        (write_sdf, LOADED, r"^loads \(here on bar 4\) have no counterpart in SDF for gazebo"),
+        (partial(write_sdf, reader="drake"), released(effects=(Torsion.at(O2=(1.0, 0.0, 0.0)),)), "torsion"),
+        (partial(write_sdf, reader="drake"), released(effects=AT_B), "pin B"),
+        (write_usd, LOADED, "no counterpart in USD"),
+        (write_usd, released(effects=AT_B), "no counterpart in USD"),
+    ],
+)
+def test_what_a_file_cannot_hold_is_refused(write: Any, scene: Scene, words: str) -> None:
+    with pytest.raises(LimitError, match=words):
+        write(scene)
 
 
 @pytest.mark.parametrize("write", [write_sdf, partial(write_sdf, reader="drake"), write_usd])
