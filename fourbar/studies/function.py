@@ -92,39 +92,37 @@ def function(scene: Scene, keys: Sequence[str], quantities: Sequence[str] = ("to
         if alone:  # arrays of one entry, because Python's numbers raise on division by 0
             numbers = _check_given(keys, [np.atleast_1d(value) for value in numbers.values.values()], shape)
         with np.errstate(all="ignore"):
-            changed, q, holds = _replace_given(scene, entries, numbers)
-            results = _evaluate(changed, _command_given(changed, q, stated, numbers), holds, numbers, wanted)
+            changed, commanded, holds = _replace_given(scene, entries, numbers, stated)
+            results = _evaluate(changed, commanded, holds, numbers, wanted)
         return {name: value[0] for name, value in results.items()} if alone else results
 
     return solve_for
 
 
-def _replace_given(scene: Scene, entries: Mapping[str, SceneNumber], given: Given) -> tuple[Scene, Any, Any]:
-    """Replace the numbers of the scene that are given; return what is commanded too, if it is, and where all hold.
+def _replace_given(
+    scene: Scene, entries: Mapping[str, SceneNumber], given: Given, stated: Command | None
+) -> tuple[Scene, tuple[Any, Any, Any], Any]:
+    """Replace the numbers of the scene that are given; return its commanded place, speed, acceleration too.
 
-    A number that a scene would refuse is replaced by the scene's own: what is finite has finite derivatives.
+    The last of the results is where all numbers hold: one that a scene would refuse is replaced by the scene's own, for
+    what is finite has finite derivatives. `stated`: the command of a scene whose place is not given.
     """
     numbers: dict[str, Any] = {}
     holds: Any = True
     for key, value in given.values.items():
         entry = entries.get(key)
         inside = given.xp.isfinite(value) if entry is None else entry.holds(value)
-        stated = None if entry is None else read_place(scene, entry.place)
-        holds, numbers[key] = holds & inside, given.xp.where(inside, value, 1.0 if stated is None else stated)
+        default = None if entry is None else read_place(scene, entry.place)
+        holds, numbers[key] = holds & inside, given.xp.where(inside, value, 1.0 if default is None else default)
     q = numbers.pop(command_key(scene), None)
-    return replace_numbers(scene, numbers), q, holds
-
-
-def _command_given(scene: Scene, q: Any, stated: Command | None, given: Given) -> tuple[Any, Any, Any]:
-    """Return the commanded place (q if it is given), speed and acceleration of a scene whose numbers are replaced."""
-    motion, zero = scene.motion, given.zero
-    speed, acceleration = motion.speed, motion.acceleration
+    changed = replace_numbers(scene, numbers)
+    speed, acceleration = changed.motion.speed, changed.motion.acceleration
     if stated is not None:
         places = stated.angle if stated.stroke is None else stated.stroke
-        q = make_like(places if places.size > 1 else places.reshape(()), zero)
-        if motion.law is not None:
-            speed, acceleration = (make_like(x, zero) for x in (stated.speed, stated.acceleration))
-    return q + zero, speed, acceleration
+        q = make_like(places if places.size > 1 else places.reshape(()), given.zero)
+        if scene.motion.law is not None:
+            speed, acceleration = (make_like(x, given.zero) for x in (stated.speed, stated.acceleration))
+    return changed, (q + given.zero, speed, acceleration), holds
 
 
 def _expect_names(**lists: Sequence[str]) -> None:
