@@ -43,7 +43,7 @@ PIECEWISE = (np.sign, np.copysign, np.floor, np.rint, np.frexp, np.isnan, np.isf
 class Undecided:
     """A comparison of balls that some of them leave open, (n,).
 
-    What selects by it takes both sides there, `anywhere` says that it may hold; it is no truth value.
+    What selects by it takes both sides there, `any` says that it may hold; it is no truth value.
     """
 
     __array_ufunc__ = None
@@ -114,11 +114,8 @@ class Sloped(NDArrayOperatorsMixin):
         """Return the complex conjugate of values and slopes."""
         return Sloped(conjugate(self.values), conjugate(self.slopes))
 
-    def differs(self, other: Any) -> Any:
-        """Mark where the value or a derivative is not that of the other, (n,)."""
-        return self._compared(other, np.not_equal)
-
     def _compared(self, other: Any, function: Any) -> Any:
+        """Mark where the value and the derivatives are those of the other, or where one of them is not, (n,)."""
         gap = self - other
         same = np.asarray(gap.values == 0.0) & np.asarray(gap.slopes == 0.0).all(axis=0)
         unlike = np.asarray(gap.values != 0.0) if self.values.dtype == object else ~same
@@ -216,7 +213,7 @@ FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: _choose_where,
     np.angle: lambda z: np.arctan2(z.imag, z.real),
     np.searchsorted: lambda points, x, side: np.searchsorted(points, x.values, side),
-    np.any: lambda x: bool(x.differs(0.0).any()),
+    np.any: lambda x: bool((x != 0.0).any()),
     np.shape: lambda x: x.shape,
     np.ndim: lambda x: 1,
 }
