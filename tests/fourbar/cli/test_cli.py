@@ -28,6 +28,7 @@ from tests.support.scenes import crank_rocker, thesis
 
 ROOT = Path(__file__).parents[3]
 MODELS = ROOT / "models"
+STROKE = MODELS / "capabilities" / "stroke_input.toml"
 CONTRACT = (
     "schema", "title", "status", "branch", "theta_2", "theta_3", "theta_4", "omega_2", "omega_3", "omega_4", "alpha_2",
     "alpha_3", "alpha_4", "A", "B", "G2", "G3", "G4", "a_A", "a_B", "a_G2", "a_G3", "a_G4", "F12", "F32", "F43", "F14",
@@ -119,12 +120,16 @@ def test_a_free_motion_has_time_and_no_drive(tmp_path: Path, run: Fourbar) -> No
 
 
 @pytest.mark.parametrize("ending", ["csv", "json", "txt"])
-def test_the_name_of_a_file_asks_for_its_form(ending: str, tmp_path: Path, run: Fourbar) -> None:
+def test_a_file_holds_what_would_be_printed_and_its_name_asks_for_the_form(
+    ending: str, tmp_path: Path, run: Fourbar
+) -> None:
     scene, named, asked = tmp_path / "scene.toml", tmp_path / f"named.{ending}", tmp_path / "asked"
     save(crank_rocker(), scene)
     form = () if ending == "txt" else (f"--{ending}",)
-    assert run("analyze", scene, "-o", named)[0] == 0 == run("analyze", scene, *form, "-o", asked)[0]
-    assert named.read_bytes() == asked.read_bytes()
+    printed = run("analyze", scene, *form)[1]
+    for options in ((named,), (asked, *form)):
+        assert run("analyze", scene, "-o", *options) == (HOLDS, "", "")
+        assert options[0].read_text() == printed
     if ending == "json":
         assert run("classify", 4, 2, 3, 3, "-o", named)[0] == 0 == run("classify", 4, 2, 3, 3, "--json", "-o", asked)[0]
         assert named.read_bytes() == asked.read_bytes()
@@ -221,6 +226,7 @@ def test_every_thins_the_table_and_keeps_its_last_position(run: Fourbar) -> None
         (("analyze", MODELS / "crank_rocker.toml", "--pressure", "210 bar"), "needs a cylinder"),
         (("analyze", MODELS / "gallery" / "excavator_bucket.toml", "--pressure", 210), 'did you mean "210 bar"?'),
         (("plot", MODELS / "crank_rocker.toml", "-o", "a.svg", "--position", "12"), 'did you mean "12 deg"?'),
+        (("plot", STROKE, "-o", "a.svg", "--position", "350"), 'did you mean "350 mm"?'),
         (("new", "--lengths", 3, 1, 2, 2), "name the new file once"),
     ],
 )
@@ -271,15 +277,6 @@ def test_the_digits_of_the_torque() -> None:
         digits = int(cell)
         assert error <= abs(torque) * 10.0**-digits or digits == 0
         assert digits == tables.MOST_DIGITS or error > abs(torque) * 10.0 ** -(digits + 1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("form", [(), ("--json",), ("--csv",)])
-def test_out_holds_what_would_be_printed(form: tuple[str, ...], tmp_path: Path, run: Fourbar) -> None:
-    printed = run("analyze", MODELS / "crank_rocker.toml", *form)[1]
-    code, out, err = run("analyze", MODELS / "crank_rocker.toml", *form, "-o", tmp_path / "out")
-    assert (code, out, err) == (HOLDS, "", "")
-    assert (tmp_path / "out").read_text() == printed
 
 
 CLASSES = [
@@ -371,18 +368,6 @@ def test_mjcf_of_a_scene_and_of_bare_lengths(tmp_path: Path, run: Fourbar) -> No
     assert (tmp_path / "b.xml").read_text() == write_mjcf_for(scene)
     assert run("mjcf", MODELS / "thesis.toml", "--drive", "motor", "-o", tmp_path / "c.xml")[0] == HOLDS
     assert (tmp_path / "c.xml").read_text() == write_mjcf_for(load(MODELS / "thesis.toml"), drive="motor")
-
-
-def test_a_bare_position_on_a_stroke_may_be_millimetres_and_no_angle(tmp_path: Path, run: Fourbar) -> None:
-    path = tmp_path / "cylinder.toml"
-    text = (MODELS / "crank_rocker.toml").read_text(encoding="utf-8")
-    motion = '[motion]\nstroke = "0.35 m"\nside = "left"\n'
-    ends = 'from = { bar = 1, at = ["0.4 m", "180 deg"] }\nto = { bar = 2, at = ["0.1 m", "0 deg"] }\n'
-    head, _, rest = text.partition("[motion]")
-    path.write_text(f"{head}{motion}[drive]\n{ends}", encoding="utf-8")
-    assert rest and run("analyze", path)[0] == HOLDS
-    code, _, err = run("plot", path, "-o", tmp_path / "a.svg", "--position", "350")
-    assert code == BAD_INPUT and 'did you mean "350 mm"?' in err
 
 
 def test_the_command_that_new_names_can_be_copied(tmp_path: Path, run: Fourbar) -> None:

@@ -1,14 +1,13 @@
 """What acts is drawn: a symbol for everything a scene file can name, where and in the direction it acts."""
 
 import cmath
-import json
 import math
-import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import fourbar
 from fourbar.effects import Load, list_kinds
@@ -17,8 +16,17 @@ from fourbar.files import loads
 from fourbar.scene import Scene
 from fourbar.show import animate
 from fourbar.show.animate import collect_page_data
+from fourbar.show.plot import symbols
+from fourbar.show.plot.figures import draw_figure
+from fourbar.show.plot.film import _make_stage
+from fourbar.show.plot.labels import Labels
+from fourbar.show.plot.linkage import draw_mechanism, scale_of
+from fourbar.show.plot.style import apply_style
 from fourbar.show.plot.symbols import list_acting
+from fourbar.show.plot.view import make_view
 from fourbar.show.summary import locate_between
+from tests.fourbar.show.plot.test_plot import clashes, composed
+from tests.fourbar.show.test_animate import embedded
 from tests.support.scenes import crank_rocker
 
 TURNING = Load(3, (2.0, 0.5), (0.03, 1.0), frame="bar")
@@ -45,11 +53,6 @@ def test_everything_that_acts_has_a_symbol(everything: Scene) -> None:
 
 def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> None:
     """A load's arrow begins at its point and points along it; a spring joins its two points."""
-    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
-    from matplotlib.figure import Figure
-
-    from fourbar.show.plot import symbols
-
     solution = fourbar.solve(everything)
     axes = Figure().subplots()
     for index in (5, 30):
@@ -73,13 +76,6 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything: Scene) -> Non
 
 def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(everything: Scene) -> None:
     """Rings stay within a crank of a twelfth of the coupler; a plate goes from pin to point to pin."""
-    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
-    from matplotlib.figure import Figure
-
-    from fourbar.show.plot.labels import Labels
-    from fourbar.show.plot.linkage import draw_mechanism, scale_of
-    from fourbar.show.plot.view import make_view
-
     lengths = {"input": 0.02, "coupler": 0.25, "output": 0.22}
     short = replace(
         everything.linkage, **{k: replace(getattr(everything.linkage, k), length=v) for k, v in lengths.items()}
@@ -99,22 +95,13 @@ def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(ev
     plates = [patch.get_xy() for patch in axes.patches if patch.get_linestyle() in (":", "dotted")]
     at = {name: factor * getattr(shown.here, name)[0] for name in ("A", "B", "G3", "G4")}
     assert any(np.allclose(corners, [at["A"], factor * shown.here.points["P"][0], at["B"]]) for corners in plates)
-    assert any(
-        np.allclose(corners[[0, 2]], [at["A"], at["B"]])
-        and np.allclose(
-            corners[1],
-            at["G3"]
-            + factor * 0.03 * np.array([math.cos(1.0 + shown.here.theta_3[0]), math.sin(1.0 + shown.here.theta_3[0])]),
-        )
-        for corners in plates
-    )
+    angle = 1.0 + shown.here.theta_3[0]
+    load = at["G3"] + factor * 0.03 * np.array([math.cos(angle), math.sin(angle)])
+    assert any(np.allclose(corners, [at["A"], load, at["B"]]) for corners in plates)
 
 
 def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
-    text = animate.write_page(everything)
-    match = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
-    assert match is not None
-    data = json.loads(match[1])
+    data = embedded(animate.write_page(everything))
     assert [one["kind"] for one in data["acting"]] == [symbol.kind for symbol in list_acting(everything)]
     factors = next(one["factor"] for one in data["acting"] if one["name"] == "load 2")
     assert np.allclose(factors, TABLED.table.at(np.array(data["theta_2"])), rtol=1e-15)  # type: ignore[union-attr]
@@ -123,9 +110,6 @@ def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
 @pytest.mark.slow
 def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     """Path, speed and mark in the plot, place and columns in the page."""
-    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
-    from fourbar.show.plot.figures import draw_figure
-
     scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
     found = locate_between(scene, fourbar.solve(scene))
     solution = found.solution
@@ -142,9 +126,6 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
 
 @pytest.mark.slow
 def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything: Scene) -> None:
-    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
-    from tests.fourbar.show.plot.test_plot import clashes, composed
-
     pins = fourbar.Viscous((("O2", 0.01), ("A", 0.01))), fourbar.Friction((("O2", 0.05), ("A", 0.05)))
     loads = (*everything.loads, Load(2, moment=0.1), Load(2, (15.0, 0.0)))
     kept = [effect for effect in everything.effects if effect.key not in ("viscous", "friction")]
@@ -156,11 +137,6 @@ def test_no_text_covers_another_where_much_acts_and_numbers_are_long(everything:
 
 @pytest.mark.slow
 def test_a_film_names_and_moves_what_the_plot_does(everything: Scene) -> None:
-    pytest.importorskip("matplotlib", reason="drawing needs matplotlib: pip install matplotlib")
-    from fourbar.show.plot.film import _make_stage
-    from fourbar.show.plot.style import apply_style
-    from fourbar.show.plot.view import make_view
-
     scene = replace(everything, points=(fourbar.Point("P", 3, (0.15, 0.7)),))
     with apply_style():
         figure, move = _make_stage(make_view(scene), moving=True)
