@@ -276,11 +276,6 @@ def test_a_place_by_coordinates_is_the_polar_one_and_is_written_back_as_it_was_r
         assert words.replace("y' = None: ", "") in str(caught.value) and key in str(caught.value)
 
 
-def test_a_force_has_no_coordinates() -> None:
-    with pytest.raises(InputError, match="must be a pair like"):
-        loads(LENGTHS + '[[loads]]\nbar = 4\nforce = { x = "1 N", y = "2 N" }\n')
-
-
 def test_every_letter_of_a_title_reads_back() -> None:
     title = "".join(map(chr, range(0x180))) + "\u2028\ufeff\U0001f980"
     assert loads(dump(replace(load(MODELS[0]), title=title))).title == title

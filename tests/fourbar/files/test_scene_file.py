@@ -105,6 +105,7 @@ MISTAKES = [
     ("load that does nothing", 'force = ["3 N", "40 deg"]\nat = ["5 cm", "0 deg"]\n', "", ["loads[0]", "force"]),
     ("arm without a force", 'force = ["3 N", "40 deg"]', 'moment = "1 N m"', ["loads[0].at", "needs a force"]),
     ("force without an angle", '["3 N", "40 deg"]', '"3 N"', ["loads[0].force", "pair"]),
+    ("force by coordinates", '["3 N", "40 deg"]', '{ x = "1 N", y = "2 N" }', ["loads[0].force", "a pair like"]),
     ("force with three parts", '["3 N", "40 deg"]', '["3 N", "40 deg", "1 m"]', ["loads[0].force", "pair"]),
     ("loads as a table", "[[loads]]", "[loads]", ["loads", "[[loads]]"]),
     ("frame misspelt", "bar = 4", 'bar = 4\nframe = "body"', ["loads[0].frame", '"world" or "bar"']),
@@ -132,6 +133,9 @@ MISTAKES = [
     ("endless value", '"open"', '"' + "x" * 50000 + '"', ["motion.branch"]),
     ("code for a unit", '"0.1 m"', '"1 __import__(\'os\').system(\'true\')"', ["lengths.input"]),
     ("tower of powers", '"0.1 m"', '"1 m**9**9**9**9"', ["lengths.input"]),
+    ("another language", GOOD, "<mujoco/>", ["TOML", "line 1, column 1 = '<mujoco/>'"]),
+    ("open heading", GOOD, 'title = "a"\n\n[lengths\nground = "1 m"\n', ["line 3, column 9 = '[lengths'"]),
+    ("open text", GOOD, 'title = "a"\nsource = """b', ["line 2, column 14", "Unterminated"]),
     ("a date", '"good"', "2024-02-31", ["TOML"]),
 ]  # fmt: skip
 
@@ -204,15 +208,6 @@ def test_what_is_not_text(data: bytes, tmp_path: Path, capsys: pytest.CaptureFix
     refused(["analyze", str(tmp_path / "scene.toml")], ["UTF-8"], tmp_path, capsys)
 
 
-def test_not_toml(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "scene.toml").write_text("<mujoco/>")
-    refused(["analyze", str(tmp_path / "scene.toml")], ["TOML", "line 1, column 1 = '<mujoco/>'"], tmp_path, capsys)
-    (tmp_path / "scene.toml").write_text('title = "a"\n\n[lengths\nground = "1 m"\n')
-    refused(["analyze", str(tmp_path / "scene.toml")], ["line 3, column 9 = '[lengths'"], tmp_path, capsys)
-    (tmp_path / "scene.toml").write_text('title = "a"\nsource = """b')
-    refused(["analyze", str(tmp_path / "scene.toml")], ["line 2, column 14", "Unterminated"], tmp_path, capsys)
-
-
 def rocker(theta_2: str) -> str:
     """A linkage whose input does not turn fully: it closes for theta_2 between 22.3 and 71.7 deg."""
     text = GOOD.replace('"0.1 m"', '"0.24 m"').replace('"0.25 m"', '"0.1 m"')
@@ -244,6 +239,7 @@ def test_some_positions_do_not_assemble(tmp_path: Path, capsys: pytest.CaptureFi
         (["mjcf", "--lengths", "9", "0.1", "0.25", "0.2"], ["never close"]),
         (["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "1 Hz"], ["--omega", "1 Hz"]),
         (["mjcf", "--lengths", "0.3", "0.1", "0.25", "0.2", "--omega", "inf"], ["--omega", "inf"]),
+        *((["classify", *lengths.split()], []) for lengths in ("x", "1 1 1", "1 1 1 0", "1 1 1 1s")),
         (["analyse"], ["analyse"]),
         (["analyze"], ["SCENE"]),
         (["analyze", "x.toml", "--xml"], ["--xml"]),
@@ -253,12 +249,6 @@ def test_bad_arguments(
     arguments: list[str], words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     refused(arguments, words, tmp_path, capsys)
-
-
-@pytest.mark.parametrize("arguments", [["x"], ["1", "1", "1"], ["1", "1", "1", "0"], ["1", "1", "1", "1 s"]])
-def test_bad_lengths_for_classify(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert status(["classify", *arguments]) == BAD_INPUT
-    assert capsys.readouterr().err.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -140,13 +140,6 @@ def test_the_policy_of_the_page_allows_its_own_script_and_nothing_else() -> None
     assert f"'sha256-{digest}'" in policy
 
 
-def test_a_picture_is_embedded_where_it_is_one(tmp_path: Path) -> None:
-    good = tmp_path / "bar.png"
-    good.write_bytes(PNG)
-    data = embedded(animate.write_page(crank_rocker(), {"coupler": good}))
-    assert data["pictures"] == {"3": "data:image/png;base64," + base64.b64encode(PNG).decode()}
-
-
 @pytest.mark.parametrize(
     ("bar", "content", "message"),
     [
@@ -234,15 +227,3 @@ def test_a_film_of_a_free_motion_runs_forward_and_as_long_as_it_does(
     animate.write(RELEASED, tmp_path / "a.gif")
     with Image.open(tmp_path / "a.gif") as film:
         assert film.n_frames == 9
-
-
-def test_a_film_of_a_rocker_goes_there_and_back() -> None:
-    shown = make_view(thesis())
-    order = choose_frames(shown, 40)
-    theta_2 = shown.sweep.theta_2[order]
-    assert shown.sweep.assembled[order].all()
-    assert len(order) == pytest.approx(40, abs=2)
-    assert theta_2[0] == theta_2.min()
-    assert 0 < int(np.argmax(theta_2)) < len(order) - 1
-    turning = make_view(crank_rocker())
-    assert np.all(np.diff(choose_frames(turning, 30)) == 2)

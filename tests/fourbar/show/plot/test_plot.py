@@ -544,12 +544,17 @@ def test_every_figure_takes_every_command(label: str, figure: str) -> None:
     assert not clashes(composed(commanding(COMMANDS[label]), figure))
 
 
-@pytest.mark.parametrize("label", COMMANDS)
-def test_a_film_goes_along_what_is_commanded_and_back(label: str) -> None:
-    shown = make_view(commanding(COMMANDS[label]))
-    order, last = choose_frames(shown, 21), len(shown.sweep) - 1
-    assert order[0] == 0 and max(order) == last and order.index(last) == 9 and order[-1] > 0
-    assert (np.diff(shown.sweep.at.places) > 0.0).all()
+@pytest.mark.parametrize("scene", (thesis(), *map(commanding, COMMANDS.values())), ids=("thesis", *COMMANDS))
+def test_a_film_of_what_swings_goes_there_and_back(scene: fourbar.Scene) -> None:
+    shown = make_view(scene)
+    order, closes = choose_frames(shown, 40), np.flatnonzero(shown.sweep.assembled)
+    assert (np.diff(shown.sweep.at.places) > 0.0).all() and shown.sweep.assembled[order].all()
+    assert len(order) == 38 and (order[0], order[19]) == (closes[0], closes[-1]) and order[-1] > order[0]
+    assert (np.diff(order[:20]) > 0).all() and (np.diff(order[19:]) < 0).all()
+
+
+def test_a_film_of_what_turns_goes_round() -> None:
+    assert np.all(np.diff(choose_frames(make_view(CRANK_ROCKER), 30)) == 2)
 
 
 def test_one_position_of_another_command_stands_in_its_range() -> None:
