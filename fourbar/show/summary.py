@@ -135,15 +135,15 @@ def locate_bending(scene: Scene, between: Between) -> dict[int, BarBending]:
     def find(solution: Solution) -> dict[str, Bending]:
         return {str(bar): internal_forces(scene, solution, bar, np.zeros(1)).largest for bar in MOVING_BARS}
 
+    def list_moments(solution: Solution) -> dict[str, Array]:
+        return {bar: np.abs(bending.moment) for bar, bending in find(solution).items()}
+
     growing, searched = {str(bar) for bar in MOVING_BARS}, [(solution, find(solution))]
     if _has_between(scene, solution):
-
-        def list_moments(solution: Solution) -> dict[str, Array]:
-            largest = searched[0][1] if solution is searched[0][0] else find(solution)
-            return {bar: np.abs(bending.moment) for bar, bending in largest.items()}
-
         places, branch, growing = _find_largest(scene, solution, list_moments, BENDING_PEAKS, BENDING_ROUNDS)
-        searched += [(peaks := _solve_at(scene, places, branch), find(peaks))] if len(places) else []
+        if len(places):
+            peaks = _solve_at(scene, places, branch)
+            searched.append((peaks, find(peaks)))
     bending = dict[int, BarBending]()
     for bar in MOVING_BARS:
         grows = str(bar) in growing
