@@ -172,12 +172,11 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
     assert summarize(right, fourbar.solve(right)).strokes == pytest.approx((0.16, 0.34), abs=1e-6)
 
 
-@pytest.mark.parametrize(("pressure", "pascal"), [("210 bar", 210e5), ("2.5 MPa", 2.5e6), ("3000 psi", 3000.0 * PSI)])
-def test_the_command_line_states_the_bore(pressure: str, pascal: float, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_states_the_bore(capsys: pytest.CaptureFixture[str]) -> None:
     path = Path(__file__).parents[3] / "models" / "gallery" / "excavator_bucket.toml"
-    assert status(["analyze", str(path), "--pressure", pressure]) == 0
+    assert status(["analyze", str(path), "--pressure", "3000 psi"]) == 0
     force = np.nanmax(fourbar.solve(fourbar.load(path)).drive_force)
-    bore = 1e3 * math.sqrt(4.0 * force / (math.pi * pascal))
+    bore = 1e3 * math.sqrt(4.0 * force / (math.pi * 3000.0 * PSI))
     assert f"  bore     at least {bore:.4g} mm to push" in capsys.readouterr().out
 
 

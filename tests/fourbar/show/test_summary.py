@@ -59,10 +59,10 @@ def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(steps: int
     d, a, b, c = WIPER.linkage.lengths
     stretched, folded = (math.acos((r * r + d * d - c * c) / (2.0 * r * d)) for r in (b + a, b - a))
     scene = swept(WIPER, steps)
-    found = locate_between(scene, fourbar.solve(scene))
-    assert [pin for _, pin in found.reversals] == ["O4", "O4"]
-    assert np.abs(np.subtract([angle for angle, _ in found.reversals], [stretched, folded + math.pi])).max() < LOCATED
-    located = list_sizes(found.solution)
+    between = locate_between(scene, fourbar.solve(scene))
+    assert [pin for _, pin in between.reversals] == ["O4", "O4"]
+    assert np.abs(np.subtract([angle for angle, _ in between.reversals], [stretched, folded + math.pi])).max() < LOCATED
+    located = list_sizes(between.solution)
     for name in ("F12", "F32", "F43", "F14"):  # each is largest on one side of the first jump
         most = max(_beside(scene, stretched, step)[name] for step in (-1, 1))
         assert located[name].max() == pytest.approx(most, rel=PEAK)
@@ -77,13 +77,13 @@ def _beside(scene: fourbar.Scene, theta_2: float, step: int) -> dict[str, float]
 
 def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
     coarse = swept(crank_rocker(), 24)
-    found = locate_between(coarse, fourbar.solve(coarse))
-    assert not found.growing and not found.reversals
+    between = locate_between(coarse, fourbar.solve(coarse))
+    assert not between.growing and not between.reversals
     fine = list_sizes(fourbar.solve(replace(coarse, motion=coarse.motion.replace(angle=FINE))))
-    for name, size in list_sizes(found.solution).items():
+    for name, size in list_sizes(between.solution).items():
         assert size.max() == pytest.approx(fine[name].max(), rel=PEAK), name
-    own = np.isin(found.solution.theta_2, fourbar.solve(coarse).theta_2)
-    assert own.sum() == 25 and np.all(np.diff(found.solution.theta_2) > 0.0)
+    own = np.isin(between.solution.theta_2, fourbar.solve(coarse).theta_2)
+    assert own.sum() == 25 and np.all(np.diff(between.solution.theta_2) > 0.0)
 
 
 def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:
@@ -99,19 +99,19 @@ def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:
 def test_towards_a_pole_no_largest_value_is_made_up() -> None:
     scene = swept(thesis(), 360)
     solution = fourbar.solve(scene)
-    found = locate_between(scene, solution)
-    assert "torque" in found.growing
-    assert np.nanmax(np.abs(found.solution.torque)) == np.nanmax(np.abs(solution.torque))
+    between = locate_between(scene, solution)
+    assert "torque" in between.growing
+    assert np.nanmax(np.abs(between.solution.torque)) == np.nanmax(np.abs(solution.torque))
 
 
 def test_a_motion_law_is_looked_at_between_its_instants_and_a_list_of_angles_is_not() -> None:
     law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest")
     scene = crank_rocker(motion=fourbar.Motion(law=law), effects=(fourbar.Friction.at(O2=0.05),))
-    found = locate_between(scene, fourbar.solve(scene))
+    between = locate_between(scene, fourbar.solve(scene))
     fine = list_sizes(fourbar.solve(replace(scene, motion=fourbar.Motion(law=replace(law, steps=20000)))))
-    assert [pin for _, pin in found.reversals] == ["O2"]
-    assert np.max(list_sizes(found.solution)["power"]) == pytest.approx(fine["power"].max(), rel=PEAK)
-    assert np.all(np.diff(found.solution.time) > 0.0)
+    assert [pin for _, pin in between.reversals] == ["O2"]
+    assert np.max(list_sizes(between.solution)["power"]) == pytest.approx(fine["power"].max(), rel=PEAK)
+    assert np.all(np.diff(between.solution.time) > 0.0)
     listed = crank_rocker(motion=fourbar.Motion(np.linspace(0.0, 6.0, 9), 10.0))
     assert locate_between(listed, solution := fourbar.solve(listed)).solution is solution
 
@@ -123,14 +123,14 @@ def test_the_largest_force_of_a_stroke_is_that_of_fine_steps() -> None:
         motion = fourbar.Motion(stroke=fourbar.Sweep(0.33, 0.17, steps), stroke_speed=-0.2, side="left")
         return crank_rocker(motion=motion, drive=drive, effects=(fourbar.Friction((("A", 0.01),)),))
 
-    found = locate_between(of(20), fourbar.solve(of(20)))
-    assert found.solution.at.stroke is not None and (np.diff(found.solution.at.stroke) < 0.0).all()
+    between = locate_between(of(20), fourbar.solve(of(20)))
+    assert between.solution.at.stroke is not None and (np.diff(between.solution.at.stroke) < 0.0).all()
     fine = fourbar.solve(of(20000))
     for name, size in list_sizes(fine).items():
-        assert list_sizes(found.solution)[name].max() == pytest.approx(size.max(), rel=PEAK), name
+        assert list_sizes(between.solution)[name].max() == pytest.approx(size.max(), rel=PEAK), name
     slips = np.flatnonzero(np.diff(np.sign(fine.omega_3 - fine.omega_2)))
-    assert [pin for _, pin in found.reversals] == ["A"] * len(slips)
-    for (place, _), i in zip(found.reversals, slips, strict=True):
+    assert [pin for _, pin in between.reversals] == ["A"] * len(slips)
+    for (place, _), i in zip(between.reversals, slips, strict=True):
         assert fine.at.stroke[i + 1] <= place <= fine.at.stroke[i]
 
 

@@ -111,8 +111,7 @@ def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
 def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     """Path, speed and mark in the plot, place and columns in the page."""
     scene = crank_rocker(points=(fourbar.Point("P", 3, (0.15, 0.7)),))
-    found = locate_between(scene, fourbar.solve(scene))
-    solution = found.solution
+    solution = locate_between(scene, fourbar.solve(scene)).solution
     panels = draw_figure(scene, "points", units=fourbar.units("m m/s m/s^2")).figure.subfigs[0].axes
     path = next(line for line in panels[0].lines if line.get_label() == "path of P")
     assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {line.get_label() for line in panels[0].lines}
