@@ -191,7 +191,7 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units:
     """Compute what the [tolerances] do to the results, and which dimension does most."""
     from fourbar.show import tolerances as shown
     from fourbar.show.plot import draw_tolerances, format_of
-    from fourbar.show.tables import show_running, write_table
+    from fourbar.show.tables import show_running
     from fourbar.studies.spread import SAMPLES, tolerances
 
     _refuse_units_of_json(as_json, units)
@@ -203,14 +203,7 @@ def tolerance(scene: Path, samples: int | None, seed: int, as_json: bool, units:
         raise _assembles_nowhere(scene, stated)
     if out is not None:
         draw_tolerances(spreads, out, units)
-    if as_json:
-        given.print_to(shown.write_json(spreads), None)
-    else:
-        conversion = {**DEGREES, **units}
-        given.print_to(
-            write_table(stated.title, shown.write_heading(spreads, conversion), shown.make_table(spreads, conversion)),
-            None,
-        )
+    given.print_to(shown.write_json(spreads) if as_json else shown.write_text(spreads, {**DEGREES, **units}), None)
 
 
 def _refuse_units_of_json(as_json: bool, units: Conversion) -> None:

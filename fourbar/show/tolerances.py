@@ -4,20 +4,17 @@ import math
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fourbar.errors import DependencyError, InputError
 from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS
 from fourbar.scene import Scene
-from fourbar.show.tables import make_plain_table, show_running
+from fourbar.show.tables import make_plain_table, show_running, write_table
 from fourbar.solution import DEGREES, Array, Conversion, find_unit_in
 from fourbar.studies.spread import BAND, PARTED, Spread, Tolerances, tolerances
 from fourbar.writing import write_object
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 PAGE_SAMPLES = 2048
 """Samples behind the bands of a page: seconds, and a percentile to a fiftieth of the deviation."""
@@ -39,19 +36,30 @@ def find_part_unit(part: str) -> str:
     return unit
 
 
-def write_heading(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
-    """Write the lines above the table."""
+def write_text(spreads: Tolerances, units: Conversion = DEGREES) -> str:
+    """Write one row for each quantity, below what was tried and what the variance of each is due to."""
     lines = [
         *describe_counts(spreads, units),
         "each quantity at the position where its first-order worst case (worst) is largest; sigma is the standard",
         "deviation of the samples; the variance there is due to",
     ]
+    rows, (angle_unit, of_angle) = [], find_unit_in("rad", units)
     for part in list_shown_parts(spreads):
-        if (worst := find_worst_position(spreads.spreads[part])) is not None and (
-            most := _name_largest(spreads, spreads.spreads[part], worst)
-        ):
+        spread = spreads.spreads[part]
+        if not np.isfinite(spread.worst).any():
+            continue
+        worst = int(np.nanargmax(spread.worst))
+        if most := _name_largest(spreads, spread, worst):
             lines.append(f"  {part}: {most}")
-    return lines
+        columns = (spread.nominal, spread.deviation, spread.low, spread.high, spread.least, spread.greatest)
+        unit, factor = find_unit_in(find_part_unit(part), units)
+        numbers = [f"{factor * column[worst]:.6g}" for column in columns]
+        numbers[1] = f"{factor * spread.deviation[worst]:.3g}"
+        angle = f"{of_angle * spreads.theta_2[worst]:.6g}"
+        rows.append([part, unit, angle, *numbers, f"{factor * spread.worst[worst]:.3g}"])
+    heads = ("", "\nunit", f"theta_2\n{angle_unit}", "\nnominal", "\nsigma", f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %")
+    table = make_plain_table((*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0)
+    return write_table(spreads.scene.title, lines, table)
 
 
 def describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
@@ -87,29 +95,6 @@ def describe_parted(spreads: Tolerances, part: str, units: Conversion = DEGREES)
         f"{part}: the samples spread by more than {100.0 * PARTED:g} % more or less than first order says at "
         f"{rows.size} of {len(spreads.theta_2)} positions (theta_2 = {places} {unit}): trust the samples there"
     )
-
-
-def find_worst_position(spread: Spread) -> int | None:
-    """Return the index of the largest first-order worst case; None where no position has one."""
-    return int(np.nanargmax(spread.worst)) if np.isfinite(spread.worst).any() else None
-
-
-def make_table(spreads: Tolerances, units: Conversion = DEGREES) -> "Table":
-    """Make one row for each quantity."""
-    angle_unit, of_angle = find_unit_in("rad", units)
-    heads = ("", "\nunit", f"theta_2\n{angle_unit}", "\nnominal", "\nsigma", f"\n{BAND[0]:g} %", f"\n{BAND[1]:g} %")
-    rows = []
-    for part in list_shown_parts(spreads):
-        spread = spreads.spreads[part]
-        if (worst := find_worst_position(spread)) is None:
-            continue
-        columns = (spread.nominal, spread.deviation, spread.low, spread.high, spread.least, spread.greatest)
-        unit, factor = find_unit_in(find_part_unit(part), units)
-        numbers = [f"{factor * column[worst]:.6g}" for column in columns]
-        numbers[1] = f"{factor * spread.deviation[worst]:.3g}"
-        angle = f"{of_angle * spreads.theta_2[worst]:.6g}"
-        rows.append([part, unit, angle, *numbers, f"{factor * spread.worst[worst]:.3g}"])
-    return make_plain_table((*heads, "\nleast", "\ngreatest", "worst\n+-"), rows, left=("",), gap=0)
 
 
 def _name_largest(spreads: Tolerances, spread: Spread, worst: int) -> str:
