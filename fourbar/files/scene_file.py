@@ -169,7 +169,7 @@ def _read_motion(read: Reader, value: object) -> Motion:
     numbers = [name for names in COMMANDS.values() for name in names]
     entry = read.table("motion", value, (*numbers, *STROKE_COMMAND, "side", "branch", "through", "free", "law"))
     stated = [name for name in numbers if name in entry]
-    given: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         "branch": BRANCHES[read.choice("motion.branch", entry.get("branch", "open"), BRANCHES)],
         "through": read.choice("motion.through", entry.get("through", "sign"), THROUGH),
     }
@@ -177,7 +177,7 @@ def _read_motion(read: Reader, value: object) -> Motion:
         for name in (*stated, *(name for name in ("free", "law") if name in entry)):
             raise read.refuse(f"motion.{name}", entry[name], f"{of_stroke[0]} commands a cylinder, and nothing else is")
         (place, speed, acceleration), unit = STROKE_COMMAND, "m"
-        given["side"] = read.choice("motion.side", entry.get("side"), ("left", "right"))
+        arguments["side"] = read.choice("motion.side", entry.get("side"), ("left", "right"))
     else:
         bar = int(stated[0][-1]) if stated else 2
         for name in stated:
@@ -186,17 +186,19 @@ def _read_motion(read: Reader, value: object) -> Motion:
                 raise read.refuse(f"motion.{name}", entry[name], allowed)
         (place, speed, acceleration), unit = COMMANDS[bar], "rad"
     if place in entry or of_stroke:
-        given[place] = _read_places(read, f"motion.{place}", entry.get(place), unit)
+        arguments[place] = _read_places(read, f"motion.{place}", entry.get(place), unit)
     if speed in entry:
-        given[speed] = read.quantity(f"motion.{speed}", entry[speed], f"{unit}/s")
-    given[acceleration] = read.quantity(f"motion.{acceleration}", entry.get(acceleration), f"{unit}/s^2", default=0.0)
+        arguments[speed] = read.quantity(f"motion.{speed}", entry[speed], f"{unit}/s")
+    arguments[acceleration] = read.quantity(
+        f"motion.{acceleration}", entry.get(acceleration), f"{unit}/s^2", default=0.0
+    )
     if "free" in entry:
         released = read.table("motion.free", entry["free"], ("duration", "steps"))
         duration = read.quantity("motion.free.duration", released.get("duration"), "s", POSITIVE)
-        given["free"] = Free(duration, read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS))
+        arguments["free"] = Free(duration, read.whole("motion.free.steps", released.get("steps"), 1, MOST_STEPS))
     if "law" in entry:
-        given["law"] = _read_law(read, entry["law"])
-    return Motion(**given)
+        arguments["law"] = _read_law(read, entry["law"])
+    return Motion(**arguments)
 
 
 def _read_law(read: Reader, value: object) -> Law:

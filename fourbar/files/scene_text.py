@@ -111,19 +111,19 @@ def _write_bar(bar: Bar) -> dict[str, Any]:
 
 
 def _write_motion(motion: Motion) -> dict[str, Any]:
-    law, free, wanted = motion.law, motion.free, motion.angle
+    law, free, stated = motion.law, motion.free, motion.angle
     theta, omega, alpha = motion.names
     unit = "rad" if motion.stroke is None else "m"
-    angles: Any = wanted
-    if isinstance(wanted, Sweep):
-        ends = {"from": write_quantity(wanted.start, unit), "to": write_quantity(wanted.stop, unit)}
-        angles = {**ends, "steps": wanted.steps}
-    elif isinstance(wanted, FromLimit):
-        angles = {"limit": wanted.limit, "offset": write_quantity(wanted.offset, "rad")}
-    elif isinstance(wanted, np.ndarray):
-        angles = [write_quantity(angle, unit) for angle in wanted.tolist()]
-    elif wanted is not None:
-        angles = write_quantity(wanted, unit)
+    angles: Any = None
+    if isinstance(stated, Sweep):
+        ends = {"from": write_quantity(stated.start, unit), "to": write_quantity(stated.stop, unit)}
+        angles = {**ends, "steps": stated.steps}
+    elif isinstance(stated, FromLimit):
+        angles = {"limit": stated.limit, "offset": write_quantity(stated.offset, "rad")}
+    elif isinstance(stated, np.ndarray):
+        angles = [write_quantity(angle, unit) for angle in stated.tolist()]
+    elif stated is not None:
+        angles = write_quantity(stated, unit)
     entry = {
         theta: angles,
         omega: None if motion.speed is None else write_quantity(motion.speed, f"{unit}/s"),

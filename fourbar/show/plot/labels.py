@@ -82,8 +82,8 @@ class Labels:
         taken: list[tuple[Axes, Box]] = [(axes, text.get_window_extent(renderer).extents) for axes, text in texts]
         samples: dict[int, list[np.ndarray]] = {}
         for axes, points, width in self.lines:
-            own = _sample_line(axes.transData.transform(points), per_point)
-            samples.setdefault(id(axes), []).append(np.column_stack([own, np.full(len(own), width)]))
+            dots = _sample_line(axes.transData.transform(points), per_point)
+            samples.setdefault(id(axes), []).append(np.column_stack([dots, np.full(len(dots), width)]))
         for label in self.wanted:
             axes = label.axes
             text = axes.text(*label.at, label.text, color=label.colour, size=label.size, ha="center", va="center")
