@@ -136,7 +136,7 @@ class Actions:
         k = self.state.k
         parts = [self.moments[bar] * h for bar, h in ((3, k.h3), (4, k.h4)) if bar in self.moments]
         if 3 in self.forces:
-            parts.append(cross(-self.state.lengths.a * k.h2 * self.forces[3], self.state.at.u2))
+            parts.append(cross(-self.state.lengths.a * k.h2 * self.forces[3], self.state.position.u2))
         others = sum(parts[1:], parts[0]) if parts else 0.0
         total = others + self.moments[2] * k.h2 if 2 in self.moments else others
         for pin, couple in self.couples.items():
@@ -151,7 +151,7 @@ class Actions:
         for force, point, beyond, moment in self.on_coupler:
             total = total + moment
             if force is not None:
-                arm = (point - self.state.lengths.b) * self.state.at.u3
+                arm = (point - self.state.lengths.b) * self.state.position.u3
                 total = total + cross(-force, arm if beyond is None else arm + beyond)
         return total
 

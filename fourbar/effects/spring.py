@@ -58,7 +58,7 @@ class SpringEnd(NamedTuple):
 
     def of(self, state: State) -> Any:
         """Return the vector in the bar's frame, m, as a number of the library of a state."""
-        return self.in_bar if namespace(state.at.u2) is np else polar(self.distance, self.angle)
+        return self.in_bar if namespace(state.position.u2) is np else polar(self.distance, self.angle)
 
     def from_pin(self, pin: str, state: State) -> tuple[Any, Any]:
         """Return the vector from one of the bar's pins in the bar's frame, complex, m, and the square of its length."""

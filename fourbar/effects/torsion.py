@@ -100,7 +100,7 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     u2, u3, u4 = (state.direction(role) for role in ROLES[bar])
     theta_3, theta_4 = np.angle(u3) + turned, np.angle(u4)
     theta_1 = theta_1 + turned
-    phi = np.angle(state.at.diagonal if bar == 2 else d * np.exp(1j * theta_1) - a * u2)
+    phi = np.angle(state.position.diagonal if bar == 2 else d * np.exp(1j * theta_1) - a * u2)
     line = np.where(a < d, theta_1, theta_2 + math.pi)
     phi = line + wrap_angle(phi - line)
 

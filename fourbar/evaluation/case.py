@@ -104,9 +104,9 @@ class Case(NamedTuple):
         """Return the names of the drive's quantities."""
         return COUPLE if self.drive is None else LINE
 
-    def sines(self, at: Position) -> dict[int, Any]:
+    def sines(self, position: Position) -> dict[int, Any]:
         """Compute the sines of the angles between two moving bars, keyed by the third one's number."""
-        return {bar: self.path.drive_sine(at, bar) for bar in MOVING_BARS}
+        return {bar: self.path.drive_sine(position, bar) for bar in MOVING_BARS}
 
     def drive_speed(self, state: State) -> Any:
         """Compute the speed at which the drive works: of the driven bar, rad/s, or of the stroke, m/s."""
@@ -115,22 +115,24 @@ class Case(NamedTuple):
     def drive_condition(self, state: State) -> Any:
         """Compute the drive's leverage as a part of the most it could have, in [0, 1]."""
         if self.drive is None:
-            return abs(self.path.drive_sine(state.at, self.drive_bar))
-        lever, most = self.drive.leverage(state, self.sines(state.at))
+            return abs(self.path.drive_sine(state.position, self.drive_bar))
+        lever, most = self.drive.leverage(state, self.sines(state.position))
         return abs(lever) / most
 
-    def state(self, q: Any, at: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True) -> State:
+    def state(
+        self, q: Any, position: Position, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
+    ) -> State:
         """Compute positions and, if more is wanted, motion.
 
         `at`: in the order in which the path reads the loop.
         """
-        k, path, sine = NO_MOTION, self.path, at.sin_mu
+        k, path, sine = NO_MOTION, self.path, position.sin_mu
         if moving:
-            at, k = path.motion(at, branch)
+            position, k = path.motion(position, branch)
         else:
-            at, speed, acceleration = path.in_order(at), 0.0, 0.0
-        state = State(self.lengths, self.linkage.ground_angle, q, at, k, speed, rates(k, speed, acceleration))
-        return state if path.bar == 2 else state._replace(theta_2=angle(at.u2), bar=path.bar, q=q, sine=sine)
+            position, speed, acceleration = path.in_order(position), 0.0, 0.0
+        state = State(self.lengths, self.linkage.ground_angle, q, position, k, speed, rates(k, speed, acceleration))
+        return state if path.bar == 2 else state._replace(theta_2=angle(position.u2), bar=path.bar, q=q, sine=sine)
 
     def assemble(
         self, q: Any, half: HalfAngle, branch: Any, speed: Any, acceleration: Any, *, moving: bool = True
@@ -185,23 +187,23 @@ class Case(NamedTuple):
 
         `sine`: of theta_3 - theta_2 if the moment about pin B is wanted, otherwise None.
         """
-        a, at, k, square = self.lengths.a, state.at, state.k, state.speed * state.speed
-        wrenches, mass_at_A = inertia_wrenches(a, self.bodies, at, state.moving)
-        inertial = others = half_slope(a, self.bodies, at, k) * square
+        a, position, k, square = self.lengths.a, state.position, state.k, state.speed * state.speed
+        wrenches, mass_at_A = inertia_wrenches(a, self.bodies, position, state.moving)
+        inertial = others = half_slope(a, self.bodies, position, k) * square
         if is_any(acceleration != 0.0):
-            of_input, of_others = inertia(a, self.bodies, at, k)
+            of_input, of_others = inertia(a, self.bodies, position, k)
             others = others + of_others * acceleration
             inertial = others + of_input * acceleration
         if self.path.bar != 2:  # bar 2 has inertia of its own
             others = others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
-        about_B = 0.0 if sine is None else coupler_about_B(self.lengths, self.bodies[1], at, state.moving, sine)
+        about_B = 0.0 if sine is None else coupler_about_B(self.lengths, self.bodies[1], position, state.moving, sine)
         return _Inertia(inertial, others, wrenches, mass_at_A, about_B)
 
     def dynamics(self, state: State, acceleration: Any, side: Any = 0) -> Dynamics:
         """Compute pin forces and the drive under everything that acts; for the parameters see `Actions`."""
         actions = Actions(state, self.bodies, side).add(self.terms)
         driven = (self.drive_bar,) if self.drive is None else self.drive.apart
-        sines = {bar: self.path.drive_sine(state.at, bar) for bar in driven}
+        sines = {bar: self.path.drive_sine(state.position, bar) for bar in driven}
         inertia = self._compute_inertia(state, acceleration, sines.get(4))
         unit = None if self.drive is None else self.drive.per_newton(actions)
         gain = state.k[self.drive_bar - 2] if unit is None else unit.work()[0]
@@ -283,13 +285,13 @@ class _FreeBodies(NamedTuple):
 
     def _solve_from_two_moments(self, left_out: int, actions: Actions, inertia: _Inertia) -> PinForces:
         """Solve from the moments of the two bars other than the one left out."""
-        lengths, at, moment = self.state.lengths, self.state.at, 0.0
+        lengths, position, moment = self.state.lengths, self.state.position, 0.0
         if left_out == 4:
             moment = -(actions.about_B() + inertia.about_B)
         elif left_out == 2 and is_any(lengths.d < lengths.a):
             moment = (actions.work()[1] - inertia.of_others) / self.state.k.h2  # virtual work of bars 3 and 4
         wrenches = actions.wrenches(inertia.wrenches)
-        pins = pin_forces(lengths, at, left_out, self.sines[left_out], wrenches, inertia.mass_at_A, moment)
+        pins = pin_forces(lengths, position, left_out, self.sines[left_out], wrenches, inertia.mass_at_A, moment)
         return actions.at_pins(pins)
 
 

@@ -61,11 +61,11 @@ def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) ->
     of_angles = command.bar == 2 and len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
     if of_angles and free is None and command.remainder is None and not case.path.may_stay_parallel:
         return _evaluate_angles(case, half, branch, names)
-    at = case.path.position(q, half, branch)
-    codes = _compute_codes(at.sin_mu, half, command) if free is None else np.zeros(q.shape, dtype=np.uint8)
+    position = case.path.position(q, half, branch)
+    codes = _compute_codes(position.sin_mu, half, command) if free is None else np.zeros(q.shape, dtype=np.uint8)
     if is_any(codes):  # velocities are 0/0
-        at = at._replace(root=np.where(codes == SINGULAR, np.nan, at.root))
-    state = case.state(q, at, branch, speed, acceleration, moving=wanted > 0)
+        position = position._replace(root=np.where(codes == SINGULAR, np.nan, position.root))
+    state = case.state(q, position, branch, speed, acceleration, moving=wanted > 0)
     if free is not None:
         state = state._replace(theta_2=command.angle)
     values = list_kinematics(case, state if free is None else state._replace(bar=2), names)
@@ -82,7 +82,7 @@ def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) ->
         if free is not None:
             forces |= {name: np.zeros(codes.shape) for name in (*case.names, "power")}
         values |= {name: value for name, value in forces.items() if name in names}
-    return codes, values, state.at
+    return codes, values, state.position
 
 
 def _compute_codes(sine: Any, half: HalfAngle, command: Command | None, unit: float = 1.0) -> Any:
@@ -148,7 +148,7 @@ def _list_forces(
     without: list[Any] = [status for term in case.terms if (status := term.status(state, branch)) is not None]
     if dynamics.status is not None:
         without.append(dynamics.status)
-    if case.drive is not None and (status := case.drive.status(state, case.sines(state.at))) is not None:
+    if case.drive is not None and (status := case.drive.status(state, case.sines(state.position))) is not None:
         without.append(status)
     if without:
         codes = np.where(codes == OK, np.max(without, axis=0), codes).astype(np.uint8)
@@ -256,10 +256,10 @@ def make_no_value(quantity: Any) -> complex:
 
 SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
     "theta_2": lambda state: state.theta_2,
-    "theta_3": lambda state: state.q if state.bar == 3 else angle(state.at.u3),
-    "theta_4": lambda state: state.q if state.bar == 4 else angle(state.at.u4),
-    "sin_mu": lambda state: state.at.sin_mu,
-    "condition": lambda state: abs(state.at.sin_mu if state.bar == 2 else state.sine),
+    "theta_3": lambda state: state.q if state.bar == 3 else angle(state.position.u3),
+    "theta_4": lambda state: state.q if state.bar == 4 else angle(state.position.u4),
+    "sin_mu": lambda state: state.position.sin_mu,
+    "condition": lambda state: abs(state.position.sin_mu if state.bar == 2 else state.sine),
     "omega_2": lambda state: state.moving.omega_2,
     "omega_3": lambda state: state.moving.omega_3,
     "omega_4": lambda state: state.moving.omega_4,

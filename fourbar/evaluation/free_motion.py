@@ -144,7 +144,7 @@ class _Reading:
         psi = q - self.path.theta_1 - (math.pi if self.bar == 4 else 0.0)
         return float(find_smooth_branch(self.path.lengths, psi, self.sign))
 
-    def at(self, q: float) -> tuple[Position, Coefficients]:
+    def evaluate(self, q: float) -> tuple[Position, Coefficients]:
         """Compute the position and its coefficients by q; what is wanted again is kept."""
         if self.last is None or self.last[0] != (q, self.sign):
             self.last = (q, self.sign), self._at(q)
@@ -159,13 +159,13 @@ class _Reading:
             return self._by(q, half, branch)
 
     def _by(self, q: float, half: HalfAngle, branch: float) -> tuple[Position, Coefficients]:
-        at, k = self.path.motion(self.path.position(q, half, branch), branch)
-        return (_make_plain(at), _make_plain(k)) if self.path.may_stay_parallel else (at, k)
+        position, k = self.path.motion(self.path.position(q, half, branch), branch)
+        return (_make_plain(position), _make_plain(k)) if self.path.may_stay_parallel else (position, k)
 
 
-def _compute_sines(at: Position) -> dict[int, float]:
+def _compute_sines(position: Position) -> dict[int, float]:
     """Compute the sines between two bars by the number of the third, at whose limits they are zero."""
-    return {bar: float(drive_sine(at, bar)) for bar in MOVING_BARS}
+    return {bar: float(drive_sine(position, bar)) for bar in MOVING_BARS}
 
 
 def integrate(
@@ -227,16 +227,16 @@ class _Run:
         # at a change point the branch just after the start decides the sign of the path
         ahead = theta + math.copysign(1e-8, omega)
         for near in (theta, ahead, 2.0 * theta - ahead):
-            sine = _compute_sines(self.reading.at(near)[0])[bar]
+            sine = _compute_sines(self.reading.evaluate(near)[0])[bar]
             if sine != 0.0 and math.isfinite(sine):
                 self.reading.sign = branch * math.copysign(1.0, sine)
                 break
-        at, k = self.reading.at(theta)
-        if not np.isfinite(at.u3):
+        position, k = self.reading.evaluate(theta)
+        if not np.isfinite(position.u3):
             raise InputError(f"motion.theta_{bar}", theta, "the linkage does not assemble there")
-        self.theta = {2: float(np.angle(at.u2)), 4: float(np.angle(at.u4)), bar: theta}
+        self.theta = {2: float(np.angle(position.u2)), 4: float(np.angle(position.u4)), bar: theta}
         self.y = np.array([theta, omega, 0.0])
-        if not float(self._compute_inertia(at, k)) > 0.0:
+        if not float(self._compute_inertia(position, k)) > 0.0:
             raise FourBarError("nothing that moves has inertia: the free motion is undetermined")
         self._change_over()
         self.side = 0.0  # sense of motion if dry friction depends on it
@@ -250,19 +250,19 @@ class _Run:
         self.drift = self.largest = 0.0
         self.rows: list[tuple[float, ...]] = []
 
-    def _compute_inertia(self, at: Position, k: Coefficients) -> Any:
-        return sum(inertia(self.lengths.a, self.bodies, at, k))
+    def _compute_inertia(self, position: Position, k: Coefficients) -> Any:
+        return sum(inertia(self.lengths.a, self.bodies, position, k))
 
     def _compute_kinetic_energy(self) -> float:
         return 0.5 * float(self._compute_inertia(*self._at())) * float(self.y[1]) ** 2
 
     def _at(self) -> tuple[Position, Coefficients]:
-        return self.reading.at(float(self.y[0]))
+        return self.reading.evaluate(float(self.y[0]))
 
-    def _compute_generalised_force(self, q: float, at: Position, k: Coefficients, rate: float) -> float:
+    def _compute_generalised_force(self, q: float, position: Position, k: Coefficients, rate: float) -> float:
         """Compute Q under everything that acts, at a speed that is not zero where friction has to have a sense."""
-        theta_2 = q if self.reading.bar == 2 else cmath.phase(at.u2)
-        state = State(self.lengths, self.linkage.ground_angle, theta_2, at, k, rate, rates(k, rate, 0.0))
+        theta_2 = q if self.reading.bar == 2 else cmath.phase(position.u2)
+        state = State(self.lengths, self.linkage.ground_angle, theta_2, position, k, rate, rates(k, rate, 0.0))
         return float(Actions(state, self.bodies).add(self.terms).work()[0])
 
     def _try_both_senses(self) -> list[float]:
@@ -271,31 +271,31 @@ class _Run:
 
     def _compute_rates(self, _: float, y: Array) -> list[float]:
         q, rate = float(y[0]), float(y[1])
-        at, k = self.reading.at(q)
+        position, k = self.reading.evaluate(q)
         # friction keeps its sense beyond a standstill, at which the step is then cut
         moving = self.side * max(self.side * rate, VANISHING) if self.side else rate
-        Q = self._compute_generalised_force(q, at, k, moving)
-        slope = half_slope(self.lengths.a, self.bodies, at, k)
+        Q = self._compute_generalised_force(q, position, k, moving)
+        slope = half_slope(self.lengths.a, self.bodies, position, k)
         # NumPy's division raises no error where the inertia vanishes
-        return [rate, float(np.float64(Q - slope * rate * rate) / self._compute_inertia(at, k)), Q * rate]
+        return [rate, float(np.float64(Q - slope * rate * rate) / self._compute_inertia(position, k)), Q * rate]
 
     def _change_over(self) -> bool:
         """Take the other angle where it is further from its limit; keeps position, velocity and work."""
-        at, k = self._at()
-        sines, bar = _compute_sines(at), 6 - self.reading.bar
+        position, k = self._at()
+        sines, bar = _compute_sines(position), 6 - self.reading.bar
         if self.reading.bar == 3:  # only at the start
             bar = max((2, 4), key=lambda number: abs(sines[number]))
         elif abs(sines[self.reading.bar]) >= CHANGE_OVER * abs(sines[bar]):
             return False
         q, reading = self.theta[bar], self.readings[bar]
-        reading.sign *= math.copysign(1.0, _compute_sines(reading.at(q)[0])[bar] * sines[bar])
+        reading.sign *= math.copysign(1.0, _compute_sines(reading.evaluate(q)[0])[bar] * sines[bar])
         rate = float(self.y[1] * (k.h2 if bar == 2 else k.h4)) if self.y[1] else 0.0
         self.reading, self.y = reading, np.array([q, rate, self.y[2]])
         return True
 
-    def _turn(self, at: Position) -> None:
+    def _turn(self, position: Position) -> None:
         """Bring theta_2 and theta_4 up to date, continuous from one step to the next."""
-        for bar, u in ((2, at.u2), (4, at.u4)):
+        for bar, u in ((2, position.u2), (4, position.u4)):
             now = cmath.phase(u)
             self.theta[bar] = now + 2.0 * math.pi * round((self.theta[bar] - now) / (2.0 * math.pi))
 
@@ -374,20 +374,20 @@ class _Run:
 
     def _compute_sine(self, y: Array) -> float:
         """Compute sin(theta_4 - theta_3), or that of the bar that was released: zero at its limits."""
-        return _compute_sines(self.reading.at(float(y[0]))[0])[self.bar]
+        return _compute_sines(self.reading.evaluate(float(y[0]))[0])[self.bar]
 
     def _make_row(self, y: Array) -> tuple[float, ...]:
         """Return theta_2, omega_2, alpha_2, branch and what belongs to the independent angle, of one instant."""
         q, rate = float(y[0]), float(y[1])
-        at, k = self.reading.at(q)
-        now = cmath.phase(at.u2)
+        position, k = self.reading.evaluate(q)
+        now = cmath.phase(position.u2)
         theta_2 = now + 2.0 * math.pi * round((self.theta[2] - now) / (2.0 * math.pi))
         if self.reading.bar == 2:
             theta_2 = q
         still = self.dry and rate == 0.0 and not self.side
         growth = 0.0 if still else self._compute_rates(0.0, y)[1]
         moving = rates(k, rate, growth)
-        sine = _compute_sines(at)[2]
+        sine = _compute_sines(position)[2]
         branch = math.copysign(1.0, sine) if sine else float(self.branch)
         side = (self.side or self.holding) if self.dry and rate == 0.0 else 0.0
         independent = (float(self.reading.bar), q, rate, growth, self.reading.branch(q), side)

@@ -32,7 +32,7 @@ class Coefficients(NamedTuple):
     dh4: Number
 
 
-def coefficients(lengths: Loop, at: Position) -> Coefficients:
+def coefficients(lengths: Loop, position: Position) -> Coefficients:
     """Compute the coefficients by theta_2 from the triangle A, B, O4: side e turns by t, the angle at B opens by 2 g.
 
         h3 = n - g,   h4 = n + g,   n = t + (x/e^2) g = 1/2 + w,
@@ -45,14 +45,14 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     >>> from math import radians
     >>> from fourbar.formulas.position import close_loop, direction, half_angle, loop
     >>> lengths, theta_2 = loop(100, 40, 120, 80), radians(40)  # mm; Norton, examples 6-7 and 7-1
-    >>> at = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)
-    >>> found = rates(coefficients(lengths, at), 25.0, 15.0)
+    >>> position = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)
+    >>> found = rates(coefficients(lengths, position), 25.0, 15.0)
     >>> f"{found.omega_4:.3f} {found.alpha_4:.3f}"
     '6.998 470.134'
     """
     d, a, b, c, E1, E2 = lengths
-    ss, kk, sk, outer, inner = at.half
-    ad, per_e2, per_root = a * d, 1.0 / at.e2, 0.5 / at.root
+    ss, kk, sk, outer, inner = position.half
+    ad, per_e2, per_root = a * d, 1.0 / position.e2, 0.5 / position.root
     x, y = (b - c) * (b + c), (d - a) * (d + a)
     S, grown = (4.0 * ad) * sk, (2.0 * ad) * ss
     g = S * per_root
@@ -61,9 +61,9 @@ def coefficients(lengths: Loop, at: Position) -> Coefficients:
     n, rest = (grown + a * (a - d)) * per_e2 + leaning, (grown + d * (d - a)) * per_e2 - leaning
     w = (xg - 0.5 * y) * per_e2
     if is_any(may_turn_fast(lengths)):
-        fast = find_fast_turns(lengths, at)
+        fast = find_fast_turns(lengths, position)
         heron = E2 * (d + a) * (d + a) * outer + E1 * (b - c) * (b - c) * (2.0 * grown)
-        w = select(fast, -heron * per_root / divisor(x * S + y * at.root, fast), w)
+        w = select(fast, -heron * per_root / divisor(x * S + y * position.root, fast), w)
         n, rest = select(fast, 0.5 + w, n), select(fast, 0.5 - w, rest)
     dg = ((2.0 * ad * E2) * kk / inner - (2.0 * ad * E1) * ss / outer) * per_root
     dn = (x * dg - S * w) * per_e2
@@ -75,14 +75,14 @@ def may_turn_fast(lengths: Loop) -> Number:
     return lengths.d + lengths.a > FAST * abs(lengths.d - lengths.a)
 
 
-def find_fast_turns(lengths: Loop, at: Position) -> Number:
+def find_fast_turns(lengths: Loop, position: Position) -> Number:
     """Mark where t and x g/e^2 are large and cancel: |d^2 - a^2| > FAST e^2, and x S, y root have the same sign."""
     d, a, b, c, _, _ = lengths
     y = (d - a) * (d + a)
-    return (abs(y) > FAST * at.e2) & ((y * at.root) * ((b - c) * at.half.sk) > 0.0)
+    return (abs(y) > FAST * position.e2) & ((y * position.root) * ((b - c) * position.half.sk) > 0.0)
 
 
-def take_sines_of_rates(lengths: Loop, at: Position, k: Coefficients) -> Position:
+def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> Position:
     """Take u3 and u4 from the instant centres where the side turns fast, so that small sines keep their digits.
 
     d sin(theta_4 - theta_1) = b sin(theta_4 - theta_3) (1 - h3),
@@ -90,12 +90,14 @@ def take_sines_of_rates(lengths: Loop, at: Position, k: Coefficients) -> Positio
     """
     d, _, b, c, _, _ = lengths
     if not is_any(may_turn_fast(lengths)):
-        return at
-    fast, scale = find_fast_turns(lengths, at), at.sin_mu / d
-    u3, u4 = at.u3 * conjugate(at.u1), at.u4 * conjugate(at.u1)
-    u3 = select(fast, vector(u3.real, c * scale * (k.h23 - k.h43)) * at.u1, at.u3)
-    u4 = select(fast, vector(u4.real, b * scale * k.h23) * at.u1, at.u4)
-    return Position(at.u1, at.u2, u3, u4, at.sin_mu, at.diagonal, at.e2, at.root, at.half)
+        return position
+    fast, scale = find_fast_turns(lengths, position), position.sin_mu / d
+    u3, u4 = position.u3 * conjugate(position.u1), position.u4 * conjugate(position.u1)
+    u3 = select(fast, vector(u3.real, c * scale * (k.h23 - k.h43)) * position.u1, position.u3)
+    u4 = select(fast, vector(u4.real, b * scale * k.h23) * position.u1, position.u4)
+    return Position(
+        position.u1, position.u2, u3, u4, position.sin_mu, position.diagonal, position.e2, position.root, position.half
+    )
 
 
 def put_parallel_pairs(k: Coefficients, first: Number, second: Number) -> Coefficients:
@@ -156,7 +158,7 @@ class State(NamedTuple):
     lengths: Loop
     theta_1: Number
     theta_2: Number
-    at: Position
+    position: Position
     k: Coefficients
     speed: Number
     """q' of the independent angle, rad/s."""
@@ -170,7 +172,7 @@ class State(NamedTuple):
 
     def direction(self, bar: int) -> Number:
         """Return e^{i theta} of bar 1 (from O2 to O4), 2, 3 or 4."""
-        return self.at[bar - 1]
+        return self.position[bar - 1]
 
     def coefficient(self, bar: int) -> Number:
         """Return h of bar 1, 2, 3 or 4."""
@@ -187,8 +189,8 @@ class State(NamedTuple):
     def foot(self, bar: int) -> Number:
         """Return the first pin of a bar, complex, m: O2 of bars 1 and 2, A of bar 3, O4 of bar 4."""
         if bar == 3:
-            return self.lengths.a * self.at.u2
-        return self.lengths.d * self.at.u1 if bar == 4 else 0.0
+            return self.lengths.a * self.position.u2
+        return self.lengths.d * self.position.u1 if bar == 4 else 0.0
 
     def frame(self, bar: int) -> Frame:
         """Return the frame of bar 1, 2, 3 or 4. Its pin is at rest at O2 and O4; the coupler's pin moves with bar 2."""

@@ -79,10 +79,10 @@ class Path(NamedTuple):
             u2 = -u2
         if along and is_any(turned := self.theta_1 != 0.0):  # many linkages, some on level ground
             u2 = select(turned, direction(q), u2)
-        at = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
+        position = close_loop(self.lengths, self.u1, u2, half, branch, self.unit)
         if self.may_stay_parallel:
-            at = parallel_position(at, *find_parallel_pairs(self.lengths, half, branch))
-        return at
+            position = parallel_position(position, *find_parallel_pairs(self.lengths, half, branch))
+        return position
 
     def angles(self, half: HalfAngle, branch: Number) -> tuple[Number, Number, Number]:
         """Compute theta_3, theta_4 and the root alone: arguments of what `close_loop` divides by lengths, in (-pi, pi].
@@ -102,41 +102,41 @@ class Path(NamedTuple):
             theta_3, theta_4 = np.pi - theta_3, np.pi - theta_4
         return theta_3, theta_4, root
 
-    def motion(self, at: Position, branch: Number) -> tuple[Position, Coefficients]:
+    def motion(self, position: Position, branch: Number) -> tuple[Position, Coefficients]:
         """Compute positions and kinematic coefficients by q with the bars in their usual order, from `position`."""
-        k = coefficients(self.lengths, at)
-        at = take_sines_of_rates(self.lengths, at, k)
+        k = coefficients(self.lengths, position)
+        position = take_sines_of_rates(self.lengths, position, k)
         if self.may_stay_parallel:
-            first, second = find_parallel_pairs(self.lengths, at.half, branch)
-            regular = ~namespace(at.root).isnan(at.root)
+            first, second = find_parallel_pairs(self.lengths, position.half, branch)
+            regular = ~namespace(position.root).isnan(position.root)
             k = parallel_motion(k, first & regular, second & regular)
-        return (at, k) if self.bar == 2 else (self.in_order(at), read_from(self.bar, k))
+        return (position, k) if self.bar == 2 else (self.in_order(position), read_from(self.bar, k))
 
-    def in_order(self, at: Position) -> Position:
+    def in_order(self, position: Position) -> Position:
         """Put the bars in their usual order; the triangle stays that of the reading."""
         if self.bar == 2:
-            return at
+            return position
         d, _, b, c, _, _ = self.lengths
         if self.bar == 3:
-            u1, u2, u3, u4, a = at.u1, at.u3, at.u2, at.u4, b
+            u1, u2, u3, u4, a = position.u1, position.u3, position.u2, position.u4, b
         else:
-            u1, u2, u3, u4, a = -at.u1, at.u4, -at.u3, at.u2, c
+            u1, u2, u3, u4, a = -position.u1, position.u4, -position.u3, position.u2, c
         diagonal = (d * self.unit) * u1 - (a * self.unit) * u2
         # the root is NaN where speeds are 0/0; the sine still has its value
-        closed = at._replace(root=at.sin_mu * (2.0 * self.lengths.b * self.lengths.c))
-        return Position(u1, u2, u3, u4, self.drive_sine(closed, 2), diagonal, at.e2, at.root, at.half)
+        closed = position._replace(root=position.sin_mu * (2.0 * self.lengths.b * self.lengths.c))
+        return Position(u1, u2, u3, u4, self.drive_sine(closed, 2), diagonal, position.e2, position.root, position.half)
 
-    def drive_sine(self, at: Position, drive_bar: int) -> Number:
+    def drive_sine(self, position: Position, drive_bar: int) -> Number:
         """Compute the sine between the two bars that are not driven; `motion` or `on_curve` made the positions."""
-        if at.half is None:
-            return drive_sine(at, drive_bar)
+        if position.half is None:
+            return drive_sine(position, drive_bar)
         role = ROLES[self.bar][drive_bar - 2]
         if role == 2:
-            return at.sin_mu if self.bar == 2 else at.root * (0.5 / (self.lengths.b * self.lengths.c))
-        sine = drive_sine_of_triangle(self.lengths, at, role)
+            return position.sin_mu if self.bar == 2 else position.root * (0.5 / (self.lengths.b * self.lengths.c))
+        sine = drive_sine_of_triangle(self.lengths, position, role)
         if self.may_stay_parallel:  # all bars make one angle, whose sine is exact
-            first, second = find_parallel_pairs(self.lengths, at.half, sign(at.root))
-            with_first, with_second = (0.0, 2.0 * at.half.sk) if role == 3 else (-2.0 * at.half.sk, 0.0)
+            first, second = find_parallel_pairs(self.lengths, position.half, sign(position.root))
+            with_first, with_second = (0.0, 2.0 * position.half.sk) if role == 3 else (-2.0 * position.half.sk, 0.0)
             sine = select(first, with_first, select(second, with_second, sine))
         return -sine if self.bar + drive_bar == 7 else sine  # the two bars have changed places
 
@@ -159,9 +159,9 @@ def meet_change_points(lengths: Loop) -> Loop:
     return lengths._replace(E1=0.0 if met[0] else E1, E2=0.0 if met[1] else E2)
 
 
-def find_singular(at: Position) -> Number:
+def find_singular(position: Position) -> Number:
     """Mark positions where velocities are 0/0 because bars 3 and 4 lie in one line."""
-    return np.abs(at.sin_mu) <= NO_DIGIT_LEFT
+    return np.abs(position.sin_mu) <= NO_DIGIT_LEFT
 
 
 def compute_state(
@@ -174,19 +174,21 @@ def compute_state(
     with np.errstate(all="ignore"):
         lengths = loop(*linkage.lengths)
         reading = prepare_path(lengths, linkage.ground_angle)
-        at = reading.position(theta_2, reading.half_angle(theta_2), branch)
-        at, k = reading.motion(at._replace(root=np.where(find_singular(at), np.nan, at.root)), branch)
-        return State(lengths, linkage.ground_angle, theta_2, at, k, omega_2, rates(k, omega_2, alpha_2))
+        position = reading.position(theta_2, reading.half_angle(theta_2), branch)
+        position, k = reading.motion(
+            position._replace(root=np.where(find_singular(position), np.nan, position.root)), branch
+        )
+        return State(lengths, linkage.ground_angle, theta_2, position, k, omega_2, rates(k, omega_2, alpha_2))
 
 
-def drive_sine(at: Position, drive_bar: int) -> Number:
+def drive_sine(position: Position, drive_bar: int) -> Number:
     """Compute sin(theta_4 - theta_3), sin(theta_4 - theta_2), sin(theta_3 - theta_2) for the drive on bar 2, 3, 4."""
     if drive_bar == 2:
-        return at.sin_mu
-    return sine(at.u2, at.u4 if drive_bar == 3 else at.u3)
+        return position.sin_mu
+    return sine(position.u2, position.u4 if drive_bar == 3 else position.u3)
 
 
-def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Number:
+def drive_sine_of_triangle(lengths: Loop, position: Position, drive_bar: int) -> Number:
     """Compute the drive's sine from the triangle A, B, O4: nearly equal directions of a short ground lose digits.
 
         sin(theta_4 - theta_2) = ((d cos psi - a) root + d sin psi (e^2 - b^2 + c^2))/(2 c e^2),
@@ -195,13 +197,13 @@ def drive_sine_of_triangle(lengths: Loop, at: Position, drive_bar: int) -> Numbe
     `lengths`: of the loop that the position was closed with.
     """
     if drive_bar == 2:
-        return at.sin_mu
+        return position.sin_mu
     d, a, b, c, _, _ = lengths
-    ss, _, sk, _, inner = at.half
-    along = ((d - a) - 2.0 * d * ss) * at.root
+    ss, _, sk, _, inner = position.half
+    along = ((d - a) - 2.0 * d * ss) * position.root
     if drive_bar == 3:
-        return (along + 2.0 * d * sk * (inner - 2.0 * c * (b - c))) / (2.0 * c * at.e2)
-    return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (2.0 * b * at.e2)
+        return (along + 2.0 * d * sk * (inner - 2.0 * c * (b - c))) / (2.0 * c * position.e2)
+    return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (2.0 * b * position.e2)
 
 
 def find_smooth_branch(lengths: Loop, psi: Number, sign: Number) -> Number:

@@ -61,7 +61,7 @@ def about_first_pin(body: Body) -> Number:
     return body.I + body.m * body.z.real * body.z.real + body.m * body.z.imag * body.z.imag
 
 
-def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> tuple[Wrenches, Number]:
+def inertia_wrenches(a: Number, bodies: Bodies, position: Position, moving: Rates) -> tuple[Wrenches, Number]:
     """Compute d'Alembert's -m a_G on each bar, and -(I + m r^2) alpha - m r_G x a_pin about its first pin.
 
     The force -m a_A of the coupler's mass at pin A is no part of R3; it is returned apart, in the frame of bar 2:
@@ -72,25 +72,25 @@ def inertia_wrenches(a: Number, bodies: Bodies, at: Position, moving: Rates) -> 
     two, three, four = bodies
     w2, w3, w4, alpha_2, alpha_3, alpha_4 = moving
     of_2 = vector(w2 * w2, -alpha_2)
-    turned = of_2 * at.u2
-    to_G = (three.m * three.z) * at.u3  # m (G - A)
+    turned = of_2 * position.u2
+    to_G = (three.m * three.z) * position.u3  # m (G - A)
     return Wrenches(
         (two.m * two.z) * turned,
         vector(w3 * w3, -alpha_3) * to_G,
-        vector(w4 * w4, -alpha_4) * ((four.m * four.z) * at.u4),
+        vector(w4 * w4, -alpha_4) * ((four.m * four.z) * position.u4),
         -about_first_pin(two) * alpha_2,
         cross(to_G, a * turned) - about_first_pin(three) * alpha_3,
         -about_first_pin(four) * alpha_4,
     ), (three.m * a) * of_2
 
 
-def coupler_about_B(lengths: Loop, three: Body, at: Position, moving: Rates, sine: Number) -> Number:
+def coupler_about_B(lengths: Loop, three: Body, position: Position, moving: Rates, sine: Number) -> Number:
     """Compute d'Alembert's moment -I alpha_3 - m (G - B) x a_G of the coupler about B, small where G lies near B.
 
     `sine`: of theta_3 - theta_2.
     """
     w2, w3, _, alpha_2, alpha_3, _ = moving
-    x, y, cosine = three.z.real - lengths.b, three.z.imag, dot(at.u2, at.u3)
+    x, y, cosine = three.z.real - lengths.b, three.z.imag, dot(position.u2, position.u3)
     of_A = lengths.a * (w2 * w2 * (x * sine + y * cosine) + alpha_2 * (x * cosine - y * sine))
     of_G = w3 * w3 * (lengths.b * y) + alpha_3 * (x * three.z.real + y * y)
     return -three.m * (of_A + of_G) - three.I * alpha_3
@@ -102,7 +102,13 @@ def solve_between(M_u: Number, M_v: Number, u: Number, v: Number, sine: Number) 
 
 
 def pin_forces(
-    lengths: Loop, at: Position, drive_bar: int, sine: Number, w: Wrenches, mass_at_A: Number, moment_of_F32: Number
+    lengths: Loop,
+    position: Position,
+    drive_bar: int,
+    sine: Number,
+    w: Wrenches,
+    mass_at_A: Number,
+    moment_of_F32: Number,
 ) -> PinForces:
     """Compute the four pin forces; inf or NaN where the two bars that are not driven lie in one line.
 
@@ -125,10 +131,10 @@ def pin_forces(
     >>> s, deg = compute_state(uniform(19, 5, 15, 10), pi / 3, 1, 25.0, -40.0), pi / 180
     >>> G3, P = polar(9, 45 * deg), polar(80, 330 * deg)  # a force on the coupler
     >>> bars = Body(0.004, 0.4, polar(3, 30 * deg)), Body(0.020, 1.5, G3), Body(0.015, 0.8, 5 + 0j)
-    >>> w, mass_at_A = inertia_wrenches(5, bars, s.at, s.moving)
-    >>> moment = cross((G3 + polar(3, 100 * deg)) * s.at.u3, P)
+    >>> w, mass_at_A = inertia_wrenches(5, bars, s.position, s.moving)
+    >>> moment = cross((G3 + polar(3, 100 * deg)) * s.position.u3, P)
     >>> w = w._replace(R3=w.R3 + P, M3=w.M3 + moment, M4=w.M4 + 120)  # and a couple on the output
-    >>> f"{pin_forces(s.lengths, s.at, 2, s.at.sin_mu, w, mass_at_A, 0.0).F12:.2f}"
+    >>> f"{pin_forces(s.lengths, s.position, 2, s.position.sin_mu, w, mass_at_A, 0.0).F12:.2f}"
     '-117.65-107.84j'
     """
     d, a, b, c, _, _ = lengths
@@ -136,18 +142,20 @@ def pin_forces(
     of_3 = M3 - C
     along, across = mass_at_A.real, mass_at_A.imag  # bar 2; separate, because a sum of both loses digits
     if drive_bar == 4:
-        F32 = solve_between(-M2 / a, moment_of_F32 / b, at.u2, at.u3, sine)
-        F43 = solve_between(-of_3 / b, -M2 / a - cross(at.u2, R3) - across, at.u3, at.u2, -sine)
+        F32 = solve_between(-M2 / a, moment_of_F32 / b, position.u2, position.u3, sine)
+        F43 = solve_between(-of_3 / b, -M2 / a - cross(position.u2, R3) - across, position.u3, position.u2, -sine)
     elif drive_bar == 3:
         of_4 = M4 + C
-        F43 = solve_between(-M2 / a - cross(at.u2, R3) - across, of_4 / c, at.u2, at.u4, sine)
-        F32 = solve_between(-M2 / a - across, of_4 / c + cross(at.u4, R3), at.u2, at.u4, sine)
-        F32 = (dot(at.u2, F32) + along - 1j * (M2 / a)) * at.u2  # the moment on bar 2 gives the component across it
+        F43 = solve_between(-M2 / a - cross(position.u2, R3) - across, of_4 / c, position.u2, position.u4, sine)
+        F32 = solve_between(-M2 / a - across, of_4 / c + cross(position.u4, R3), position.u2, position.u4, sine)
+        F32 = (
+            dot(position.u2, F32) + along - 1j * (M2 / a)
+        ) * position.u2  # the moment on bar 2 gives the component across it
     else:
         k = 1.0 / (c * sine)
-        F43 = (of_3 * k * (1.0 / b)) * at.diagonal - ((M3 + M4) * k) * at.u3
-        F32 = R3 + F43 + mass_at_A * at.u2
+        F43 = (of_3 * k * (1.0 / b)) * position.diagonal - ((M3 + M4) * k) * position.u3
+        F32 = R3 + F43 + mass_at_A * position.u2
         short = d < a
         if is_any(short):  # the bars turn together; the sum loses the small component across bar 2
-            F32 = F32 + select(short, moment_of_F32 / a - cross(at.u2, F32), 0.0) * 1j * at.u2
+            F32 = F32 + select(short, moment_of_F32 / a - cross(position.u2, F32), 0.0) * 1j * position.u2
     return PinForces(-1.0 * (R2 + F32), F32, F43, F43 - R4)  # NumPy negates complex numbers slowly

@@ -74,14 +74,14 @@ def instant_centres(linkage: FourBar, theta_2: Array, branch: Number) -> dict[tu
     Source: R. L. Norton, Design of Machinery, ch. 6.
     """
     here = _compute_state(linkage, theta_2, branch)
-    at, one = here.at, np.ones_like(here.theta_2)
-    O4, A, B = linkage.ground * at.u1 + 0.0 * at.u2, here.foot(3), here.point(4, linkage.output.length)
+    position, one = here.position, np.ones_like(here.theta_2)
+    O4, A, B = linkage.ground * position.u1 + 0.0 * position.u2, here.foot(3), here.point(4, linkage.output.length)
     centres = {
         bars: Centre(p.real, p.imag, one) for bars, p in {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}.items()
     }
-    I13, I24 = cross(O4, at.u4) * at.u2, cross(A, at.u3) * at.u1
-    centres[1, 3] = Centre(I13.real, I13.imag, sine(at.u2, at.u4))
-    centres[2, 4] = Centre(I24.real, I24.imag, sine(at.u1, at.u3))
+    I13, I24 = cross(O4, position.u4) * position.u2, cross(A, position.u3) * position.u1
+    centres[1, 3] = Centre(I13.real, I13.imag, sine(position.u2, position.u4))
+    centres[2, 4] = Centre(I24.real, I24.imag, sine(position.u1, position.u3))
     return centres
 
 

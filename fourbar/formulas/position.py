@@ -159,8 +159,8 @@ def close_loop(lengths: Loop, u1: Number, u2: Number, half: HalfAngle, branch: N
     unit : of the lengths, m; the diagonal is found in m.
 
     >>> lengths, theta_2 = loop(100, 40, 120, 80), np.radians(40)  # mm; Norton, example 4-1
-    >>> at = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)
-    >>> [f"{np.angle(u, deg=True):.3f}" for u in (at.u3, at.u4)]
+    >>> position = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), 1)
+    >>> [f"{np.angle(u, deg=True):.3f}" for u in (position.u3, position.u4)]
     ['20.298', '57.325']
     """
     d, a, b, c, _, _ = lengths
@@ -188,10 +188,10 @@ def find_parallel_pairs(lengths: Loop, half: HalfAngle, branch: Number) -> tuple
     return (a == c) & (b == d) & (side > 0), (a == b) & (c == d) & (side < 0)
 
 
-def put_parallel_pairs(at: Position, first: Number, second: Number) -> Position:
+def put_parallel_pairs(position: Position, first: Number, second: Number) -> Position:
     """Put in the exact directions u3 = u1, u4 = u2 where `first`, u3 = -u2, u4 = -u1 where `second`."""
-    xp = namespace(first, at.u2)
-    u3 = xp.where(first, at.u1, xp.where(second, -at.u2, at.u3))
-    u4 = xp.where(first, at.u2, xp.where(second, -at.u1, at.u4))
-    sine = xp.where(first | second, sign(at.root) * 2.0 * abs(at.half.sk), at.sin_mu)
-    return at._replace(u3=u3, u4=u4, sin_mu=sine)
+    xp = namespace(first, position.u2)
+    u3 = xp.where(first, position.u1, xp.where(second, -position.u2, position.u3))
+    u4 = xp.where(first, position.u2, xp.where(second, -position.u1, position.u4))
+    sine = xp.where(first | second, sign(position.root) * 2.0 * abs(position.half.sk), position.sin_mu)
+    return position._replace(u3=u3, u4=u4, sin_mu=sine)

@@ -19,7 +19,7 @@ def transmission_angle(state: State) -> Array:
 
     Source: R. L. Norton, Design of Machinery.
     """
-    return np.asarray(np.arctan2(np.abs(state.at.sin_mu), np.abs(dot(state.at.u3, state.at.u4))))
+    return np.asarray(np.arctan2(np.abs(state.position.sin_mu), np.abs(dot(state.position.u3, state.position.u4))))
 
 
 class TransmissionExtremes(NamedTuple):

@@ -187,12 +187,12 @@ class CircuitCurve:
 
     def place(self, point: Array) -> RestPosition:
         """Describe a point, theta_2 within the sweep, else counted from the circuit's range."""
-        at, from_ = (
-            self.state(point[None]).at,
+        position, from_ = (
+            self.state(point[None]).position,
             self.low if self.sweep is None else self.sweep[0] - self.theta_1 - AT_END,
         )
         theta_2 = self.theta_1 + from_ + math.remainder(point[0] - from_ - math.pi, TURN) + math.pi
-        theta_3, theta_4 = (float(np.angle(u)[0]) for u in (at.u3, at.u4))
+        theta_3, theta_4 = (float(np.angle(u)[0]) for u in (position.u3, position.u4))
         sine = math.sin(point[1])
         return RestPosition(
             float(theta_2), theta_3, theta_4, 0 if abs(sine) < AT_END else int(math.copysign(1.0, sine))
@@ -216,7 +216,7 @@ def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:
     >>> from fourbar.formulas.position import loop
     >>> lengths = loop(100, 40, 120, 80)  # mm; Norton, example 4-1, as in `close_loop`
     >>> s = on_curve(lengths, 0.0, 40 * pi / 180, transmission(lengths, 40 * pi / 180))
-    >>> [f"{np.angle(u, deg=True):.3f}" for u in (s.at.u3, s.at.u4)]
+    >>> [f"{np.angle(u, deg=True):.3f}" for u in (s.position.u3, s.position.u4)]
     ['20.298', '57.325']
     """
     d, a, b, c = lengths[:4]
@@ -226,8 +226,8 @@ def on_curve(lengths: Loop, theta_1: Number, psi: Number, mu: Number) -> State:
     u4, h2 = u3 * polar(1.0, mu), np.sin(mu)
     h3, h4 = (a / b) * sine(u4, u2), (a / c) * sine(u3, u2)
     k = Coefficients(h2, h3, h4, h2 - h3, (a / b) * (d / c) * np.sin(psi), 0.0, 0.0, 0.0)
-    at = Position(u1, u2, u3, u4, h2, diagonal, None, None, None)  # type: ignore[arg-type]  # what nothing here asks for
-    return State(lengths, theta_1, theta_1 + psi, at, k, 0.0, rates(k, 0.0, 0.0))
+    position = Position(u1, u2, u3, u4, h2, diagonal, None, None, None)  # type: ignore[arg-type]  # what nothing here asks for
+    return State(lengths, theta_1, theta_1 + psi, position, k, 0.0, rates(k, 0.0, 0.0))
 
 
 def _less_turned(p: Number, q: Number, angle: Number) -> Number:

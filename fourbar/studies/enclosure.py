@@ -191,9 +191,14 @@ class _Search:
         state = case.assemble(q, path.half_angle(q), self.branch, numbers["motion.omega_2"], acceleration)
         dynamics = case.dynamics(state, acceleration)
         forces = {f"|{name}|": dot(force, force) for name, force in dynamics.pins._asdict().items()}
-        at = state.at
-        cosine = dot(at.u3, at.u4)
-        return {case.names.value: dynamics.drive, **forces, "sine": at.sin_mu * at.sin_mu, "cosine": cosine * cosine}
+        position = state.position
+        cosine = dot(position.u3, position.u4)
+        return {
+            case.names.value: dynamics.drive,
+            **forces,
+            "sine": position.sin_mu * position.sin_mu,
+            "cosine": cosine * cosine,
+        }
 
     def over(self, boxes: NDArray[np.float64]) -> tuple[dict[str, Sloped], dict[str, Sloped]]:
         """Evaluate the quantities over the boxes and all tolerances, and at the centres without any."""

@@ -160,7 +160,7 @@ def _describe(
     bar = 4 if abs(state.k.h2[0]) < STILL * abs(state.k.h4[0]) else 2
     square = float(state.k[bar - 2][0]) ** 2
     slope = float(curve.slope(point[None])[0]) / square
-    J = float(np.sum(inertia(curve.lengths.a, curve.case.bodies, state.at, state.k))) / square
+    J = float(np.sum(inertia(curve.lengths.a, curve.case.bodies, state.position, state.k))) / square
     stable = "undecided" if undecided else "stable" if slope < 0.0 else "unstable"
     frequency = math.sqrt(-slope / J) / TURN if stable == "stable" and J > 0.0 else None
     return Equilibrium(curve.place(point), stable, f"theta_{bar}", slope, J, frequency, held)

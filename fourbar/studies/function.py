@@ -175,7 +175,7 @@ def _evaluate(
         for term in case.terms:
             if (status := term.status(state, None)) is not None:
                 ok = ok & (status == OK)
-        if case.drive is not None and (status := case.drive.status(state, case.sines(state.at))) is not None:
+        if case.drive is not None and (status := case.drive.status(state, case.sines(state.position))) is not None:
             ok = ok & (status == OK)
     results, zero = {}, given.zero
     for name in wanted:

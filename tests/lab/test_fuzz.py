@@ -12,7 +12,9 @@ import pytest
 
 import fourbar.formulas.mobility
 from fourbar.effects import spring
+from fourbar.effects.effect import Actions
 from fourbar.files import loads
+from fourbar.formulas.motion import State
 from fourbar.studies.enclosure import Extreme, Extremes
 from fourbar.studies.sloped import Sloped
 from fourbar_lab import fuzz as examine
@@ -195,14 +197,16 @@ def test_bounds_narrower_by_a_millionth_are_found(monkeypatch: pytest.MonkeyPatc
 def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A distance that may be 0 had 1 m added."""
 
-    def silent(effect: spring.Spring, across: Any) -> Any:
-        distance = np.abs(across)
-        if isinstance(distance, Sloped):
-            distance.values += np.array([float(ball.contains(0)) for ball in distance.values], dtype=object)
-        return effect.stiffness + effect.slack / distance
+    def act_silently(effect: spring.Springs, actions: Actions, state: State) -> None:
+        for each in effect.springs:
+            across = each.end.place(state) - each.start.place(state)
+            distance = np.abs(across)
+            if isinstance(distance, Sloped):
+                distance.values += np.array([float(ball.contains(0)) for ball in distance.values], dtype=object)
+            actions.pull(each.start, each.end, (each.stiffness + each.slack / distance) * across)
 
     assert outside.list_findings(meeting(0.1005)) == []
-    monkeypatch.setattr(spring, "_divide_by_distance", silent)
+    monkeypatch.setattr(spring.Springs, "act", act_silently)
     assert any("beyond" in line for line in outside.list_findings(meeting(0.1005)))
 
 

@@ -93,7 +93,7 @@ def find_poles(view: View) -> Indices:
     if view.scene.drive is not None:
         case, state = Case.of(view.scene, s.at.bar), compute_state(view.scene, s.at)
         with np.errstate(all="ignore"):
-            sine = view.scene.drive.leverage(state, case.sines(state.at))[0]
+            sine = view.scene.drive.leverage(state, case.sines(state.position))[0]
         return np.flatnonzero(sine[:-1] * sine[1:] <= 0.0)
     pair = {2: (s.theta_4, s.theta_3), 3: (s.theta_4, s.theta_2), 4: (s.theta_3, s.theta_2)}[view.scene.drive_bar]
     sine = np.sin(pair[0] - pair[1])

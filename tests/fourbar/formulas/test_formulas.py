@@ -155,9 +155,9 @@ def test_pairs_stay_parallel_on_one_side_of_the_change_points_alone() -> None:
 def read_from_the_output(drawn: Drawn) -> tuple[State, Any, Any]:
     """The state read in theta_2, and position and coefficients read in theta_4."""
     moving, from_output = drawn.moving(), prepare_path(loop(*drawn.bars.lengths), drawn.bars.ground_angle, 4)
-    theta_4 = np.angle(moving.at.u4)
+    theta_4 = np.angle(moving.position.u4)
     # of the triangle B, A, O2: bars 3 and 2 there are as bars 4 and 3 in the order of theta_2
-    sign = -np.sign((moving.at.u2 * moving.at.u3.conjugate()).imag)
+    sign = -np.sign((moving.position.u2 * moving.position.u3.conjugate()).imag)
     return moving, *from_output.motion(from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign)
 
 
@@ -166,14 +166,14 @@ def test_read_in_theta_4_the_linkage_lies_and_moves_the_same() -> None:
     compared = 0
     for drawn in random_positions(31, 300, 0.2):
         moving, at, k = read_from_the_output(drawn)
-        other_sine = abs(float((moving.at.u2 * moving.at.u3.conjugate()).imag[0]))
+        other_sine = abs(float((moving.position.u2 * moving.position.u3.conjugate()).imag[0]))
         if other_sine < 0.2:
             continue
         compared += 1
         size = (max(drawn.bars.lengths) / min(drawn.bars.lengths)) ** 2
         allowed = FROM_EITHER_END * size / (drawn.sine * other_sine)
         for name in ("u1", "u2", "u3", "u4", "sin_mu", "diagonal"):
-            assert abs(getattr(at, name) - getattr(moving.at, name)) <= allowed, name
+            assert abs(getattr(at, name) - getattr(moving.position, name)) <= allowed, name
         mine = moving.k
         grown = size * (1.0 + abs(mine.h3) + 1.0 / abs(mine.h4)) ** 3 / (drawn.sine * other_sine) ** 2
         for found, expected in (

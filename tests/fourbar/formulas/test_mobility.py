@@ -288,7 +288,7 @@ def test_time_ratio_is_the_time_of_both_strokes() -> None:
     bars = uniform(3.0, 1.0, 2.5, 2.2)
     n = 200_000
     theta_2 = (np.arange(n) + 0.5) * (2 * math.pi / n)
-    at = compute_state(bars, theta_2, 1).at
+    at = compute_state(bars, theta_2, 1).position
     ahead = np.count_nonzero(np.sin(theta_2 - np.angle(at.u3)) * at.sin_mu > 0.0)  # omega_4 > 0
     ratio = max(ahead, n - ahead) / min(ahead, n - ahead)
     assert time_ratio(bars) == pytest.approx(ratio, rel=8.0 / n)  # both ends counted to one step

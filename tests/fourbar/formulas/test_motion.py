@@ -28,7 +28,7 @@ def angle(at: State, bar: int) -> np.ndarray:
 
 
 def assembled(at: State) -> np.ndarray:
-    return (at.at.half.outer >= 0.0) & (at.at.half.inner >= 0.0)
+    return (at.position.half.outer >= 0.0) & (at.position.half.inner >= 0.0)
 
 
 def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
@@ -97,24 +97,24 @@ def test_singular_positions_have_no_speed_and_their_neighbours_keep_theirs() -> 
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     theta_2 = np.array([0.0, 1.0, math.pi])
     moving = compute_state(link, theta_2, 1, 2.0, 5.0)
-    assert find_singular(moving.at).tolist() == [True, False, True] and assembled(moving).all()
-    assert np.isnan(moving.at.root).tolist() == [True, False, True]
-    assert np.isfinite(moving.at.sin_mu).all() and np.isfinite(moving.at.u3).all()
+    assert find_singular(moving.position).tolist() == [True, False, True] and assembled(moving).all()
+    assert np.isnan(moving.position.root).tolist() == [True, False, True]
+    assert np.isfinite(moving.position.sin_mu).all() and np.isfinite(moving.position.u3).all()
     for bar in (3, 4):
         assert np.isnan(moving.omega(bar)).tolist() == [True, False, True]
     assert (moving.omega(4)[1], moving.alpha(4)[1], moving.alpha(3)[1]) == (2.0, 5.0, 0.0)
     still = compute_state(link, theta_2, 1, 2.0)
     assert np.isnan(still.alpha(3)).tolist() == np.isnan(still.alpha(4)).tolist() == [True, False, True]
-    assert not find_singular(compute_state(linkage(), ANGLES, 1).at).any()
+    assert not find_singular(compute_state(linkage(), ANGLES, 1).position).any()
 
 
 @pytest.mark.parametrize("lengths", [(3, 1, 2, 2), (0.99, 0.97, 0.98, 0.98)])
 def test_within_the_rounding_of_a_change_point_no_direction_is_left(lengths: tuple[float, ...]) -> None:
     theta_2 = math.pi + 2.0 * EPS * np.arange(5)  # the next doubles after pi
     moving = compute_state(fourbar.uniform(*lengths), theta_2, 1)
-    assert (moving.at.sin_mu > 0.0).all() and (moving.at.sin_mu < 8.0 * EPS).all()
-    assert find_singular(moving.at).all() and np.isnan(moving.omega(3)).all()
-    assert not find_singular(compute_state(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).at).any()
+    assert (moving.position.sin_mu > 0.0).all() and (moving.position.sin_mu < 8.0 * EPS).all()
+    assert find_singular(moving.position).all() and np.isnan(moving.omega(3)).all()
+    assert not find_singular(compute_state(fourbar.uniform(*lengths), theta_2 + 1e-13, 1).position).any()
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
     theta_2 = theta_1 + math.pi * half_turn + np.array([1e-9, 0.5, 2.0])
     branch = -branch if half_turn else branch
     moving = compute_state(link, theta_2, branch, 2.0, 3.0)
-    u1, u2 = cmath.exp(1j * theta_1), moving.at.u2
+    u1, u2 = cmath.exp(1j * theta_1), moving.position.u2
     together = lengths[1] == lengths[3]  # a parallelogram
     directions, speeds, growths = (
         ((u1, u2), (0.0, 2.0), (0.0, 3.0)) if together else ((-u2, -u1), (2.0, 0.0), (3.0, 0.0))
@@ -140,7 +140,7 @@ def test_pairs_that_stay_parallel_keep_the_directions_of_ground_and_input(
         assert np.array_equal(moving.omega(bar), np.full(3, speeds[k]))
         assert np.array_equal(moving.alpha(bar), np.full(3, growths[k]))
     # between the bars: the angle of input and ground
-    assert np.abs(moving.at.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - theta_1)), rel=8 * EPS, abs=2 * EPS)
+    assert np.abs(moving.position.sin_mu) == pytest.approx(np.abs(np.sin(theta_2 - theta_1)), rel=8 * EPS, abs=2 * EPS)
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
@@ -158,7 +158,7 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch: int, the
         )
         for bar in (3, 4):
             assert on.direction(bar) == pytest.approx(near.direction(bar), abs=2.0 * step)
-        assert find_singular(on.at).tolist() == [True, False]
+        assert find_singular(on.position).tolist() == [True, False]
         assert np.isnan(on.omega(3)).tolist() == np.isnan(on.alpha(4)).tolist() == [True, False]
     # with b and c unlike each other nothing closes there
     assert not assembled(compute_state(fourbar.uniform(0.3, 0.3, 0.2, 0.25), np.zeros(1), branch)).any()
@@ -167,10 +167,10 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch: int, the
 def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
     """Bars 3 and 4 of a parallelogram lie as its ground and input do: so does the angle between them."""
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    at = compute_state(link, np.linspace(0.01, 3.1, 200), 1).at
+    at = compute_state(link, np.linspace(0.01, 3.1, 200), 1).position
     assert np.array_equal(at.sin_mu, at.u2.imag) and np.array_equal(dot(at.u3, at.u4), at.u2.real)
     # 8 EPS has no digit left, the next double has
-    assert find_singular(compute_state(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).at).tolist() == [
+    assert find_singular(compute_state(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).position).tolist() == [
         True,
         False,
     ]
@@ -184,10 +184,10 @@ def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
         link = fourbar.uniform(d, a, b, b)
         moving = compute_state(link, psi, 1, 2.0)
         e = np.abs(d - a * np.exp(1j * psi))
-        assert assembled(moving).all() and np.array_equal(find_singular(moving.at), e / b <= 8.0 * EPS)
-        assert np.array_equal(np.isnan(moving.omega(3)), find_singular(moving.at))
+        assert assembled(moving).all() and np.array_equal(find_singular(moving.position), e / b <= 8.0 * EPS)
+        assert np.array_equal(np.isnan(moving.omega(3)), find_singular(moving.position))
         status = fourbar.solve(fourbar.Scene(link, fourbar.Motion(psi, 2.0))).status
-        assert [each == "singular" for each in status] == find_singular(moving.at).tolist()
+        assert [each == "singular" for each in status] == find_singular(moving.position).tolist()
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 1.2, -2.9])

@@ -35,7 +35,7 @@ class Drawn(NamedTuple):
 
     @property
     def sine(self) -> float:
-        return float(abs(self.moving().at.sin_mu[0]))
+        return float(abs(self.moving().position.sin_mu[0]))
 
 
 def random_positions(seed: int, count: int, least_sine: float = 0.05) -> list[Drawn]:
@@ -156,7 +156,7 @@ def test_three_centres_of_three_bars_are_collinear() -> None:
 def test_the_coupler_turns_about_I13_and_bars_2_and_4_share_I24() -> None:
     for drawn in random_positions(16, 200):
         moving, sine = drawn.moving(), drawn.sine
-        O4 = drawn.bars.ground * moving.at.u1
+        O4 = drawn.bars.ground * moving.position.u1
         (x, y) = instant_centres(*drawn)[1, 3].point
         spin = float(moving.omega(3)[0])
         pin, speed = moving.foot(3)[0], moving.velocity(3, 0.0)[0]

@@ -93,7 +93,7 @@ def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre
     three = Body(0.7, 0.02, 0.11 + 0.07j)
     arm = s.point(3, three.z) - s.point(4, s.lengths.c)
     expected = -three.I * s.alpha(3) - three.m * cross(arm, s.acceleration(3, three.z))
-    found = coupler_about_B(s.lengths, three, s.at, s.moving, drive_sine(s.at, 4))
+    found = coupler_about_B(s.lengths, three, s.position, s.moving, drive_sine(s.position, 4))
     assert np.allclose(found, expected, rtol=0.0, atol=64 * FEW_ROUNDINGS)
 
 
@@ -116,9 +116,9 @@ def two_readings() -> tuple[State, State]:
     """The same positions with theta_2 and with theta_4 as the independent angle."""
     bars = uniform(0.3, 0.1, 0.25, 0.22)
     by_2 = compute_state(bars, np.array([0.4, 1.0, 4.0]), 1)
-    lengths, theta_4 = by_2.lengths, np.angle(by_2.at.u4)
+    lengths, theta_4 = by_2.lengths, np.angle(by_2.position.u4)
     reading = prepare_path(lengths, 0.0, 4)
-    sign = np.sign(drive_sine(by_2.at, 4))
+    sign = np.sign(drive_sine(by_2.position, 4))
     at, k = reading.motion(reading.position(theta_4, reading.half_angle(theta_4), sign), sign)
     return by_2, State(lengths, 0.0, by_2.theta_2, at, k, 1.0, rates(k, 1.0, 0.0))
 
@@ -155,8 +155,12 @@ def test_a_point_moves_by_either_angle_alike() -> None:
 def test_a_short_ground_takes_the_moment_of_the_force_at_A_from_virtual_work(ground: float, taken: bool) -> None:
     s = compute_state(uniform(ground, 1.0, 1.2, 1.1), np.array([0.4, 1.0, 4.0]), 1)
     wrenches = Wrenches(1.0 + 2.0j, -0.5j, 0.3 + 0.1j, 0.7, -0.4, 0.2)
-    forces = [pin_forces(s.lengths, s.at, 2, s.at.sin_mu, wrenches, 0.2j, moment).F32 for moment in (0.3, -0.5)]
-    along = [dot(s.at.u2, F32) for F32 in forces]
+    forces = [
+        pin_forces(s.lengths, s.position, 2, s.position.sin_mu, wrenches, 0.2j, moment).F32 for moment in (0.3, -0.5)
+    ]
+    along = [dot(s.position.u2, F32) for F32 in forces]
     assert np.allclose(*along, rtol=0.0, atol=64 * FEW_ROUNDINGS * np.max(np.abs(forces)))
     for F32, moment in zip(forces, (0.3, -0.5), strict=True):
-        assert np.allclose(cross(s.at.u2, F32), moment, rtol=0.0, atol=FEW_ROUNDINGS * np.max(np.abs(F32))) is taken
+        assert (
+            np.allclose(cross(s.position.u2, F32), moment, rtol=0.0, atol=FEW_ROUNDINGS * np.max(np.abs(F32))) is taken
+        )

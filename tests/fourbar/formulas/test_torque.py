@@ -151,7 +151,7 @@ def test_free_acceleration_of_sympy() -> None:
         linkage = fourbar.FourBar(0.13, linkage.input, linkage.coupler, linkage.output, theta_1)
         for branch in (1, -1):
             at = state_of(linkage, relative[0], branch)
-            if abs(np.angle(at.at.u3 / at.at.u2) - relative[1]) < 1e-8:
+            if abs(np.angle(at.position.u3 / at.position.u2) - relative[1]) < 1e-8:
                 alpha = free_acceleration(linkage, relative[0], rate, branch)
                 alpha_3 = at.k.h3 * alpha + at.k.dh3 * rate**2
                 assert abs(at.k.h3 * rate - rate - -0.17963733938852067) < 1e-9
@@ -168,7 +168,7 @@ def test_statics_of_motiongenesis() -> None:
 
     def held(angle: float, branch: int) -> tuple[float, float, float]:
         """The torque that holds it at rest, and theta_3, theta_4."""
-        at = state_of(linkage, angle, branch).at
+        at = state_of(linkage, angle, branch).position
         theta_3, theta_4 = float(np.angle(at.u3)), float(np.angle(at.u4))
         loads = (fourbar.Load(3, (200.0, np.pi / 2), (1.0, theta_3)),)
         motion = fourbar.Motion(angle, 0.0, branch=branch)
@@ -206,12 +206,12 @@ def of(lengths: tuple[float, ...]) -> fourbar.FourBar:
 
 def J_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
     """The equivalent inertia of all bars, kg m^2."""
-    return np.asarray(sum(inertia(linkage.input.length, list_bodies(linkage), state.at, state.k)))
+    return np.asarray(sum(inertia(linkage.input.length, list_bodies(linkage), state.position, state.k)))
 
 
 def slope_of(linkage: fourbar.FourBar, state: State) -> np.ndarray:
     """Its derivative by the independent angle."""
-    return np.asarray(2.0 * half_slope(linkage.input.length, list_bodies(linkage), state.at, state.k))
+    return np.asarray(2.0 * half_slope(linkage.input.length, list_bodies(linkage), state.position, state.k))
 
 
 @pytest.mark.parametrize("lengths", SHAPES.values(), ids=SHAPES.keys())
@@ -225,7 +225,7 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(lengths: tuple[float, 
         bar = linkage.bar(number)
         v = np.abs(state.velocity(number, bar.to_centre))
         energy += 0.5 * bar.mass * v**2 + 0.5 * bar.moment_of_inertia * np.asarray(state.omega(number)) ** 2
-    ok = np.isfinite(state.at.u3)
+    ok = np.isfinite(state.position.u3)
     assert ok.any()
     J, slope = J_of(linkage, state), slope_of(linkage, state)
     assert 0.5 * J[ok] * 3.0**2 == pytest.approx(energy[ok], rel=1e-13)
@@ -235,12 +235,12 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(lengths: tuple[float, 
     # q = theta_4: the chain rule, on the path that reads the loop from bar 4
     rate, bend = state.k.h4, state.k.dh4
     backwards = prepare_path(state.lengths, linkage.ground_angle, 4)
-    q = np.angle(state.at.u4)
+    q = np.angle(state.position.u4)
     half = backwards.half_angle(q)
     for sign in (1.0, -1.0):
         with np.errstate(invalid="ignore"):  # of bars that stay parallel, whose coefficients are put in
             at, k = backwards.motion(backwards.position(q, half, sign), sign)
-        same = ok & (np.abs(at.u2 - state.at.u2) < 1e-9)
+        same = ok & (np.abs(at.u2 - state.position.u2) < 1e-9)
         other = State(state.lengths, linkage.ground_angle, theta_2, at, k, 1.0, rates(k, 1.0, 0.0))
         expected = ((slope - 2.0 * J * bend / rate) / rate**3)[same]
         size = float(np.max(np.abs(expected), initial=0.0))
@@ -278,7 +278,7 @@ def test_positions_that_do_not_close_and_limits_are_quiet() -> None:
     linkage = of((0.3, 0.25, 0.1, 0.22, 0.4))
     limit = limit_positions(linkage)[0].theta_2
     state = state_of(linkage, np.array([limit, 0.4 + np.pi, 0.4]), 1, 3.0, 4.0)
-    assert np.isnan(state.at.u3[1:]).all() and not np.isfinite(state.k.h3[1:]).any()
+    assert np.isnan(state.position.u3[1:]).all() and not np.isfinite(state.k.h3[1:]).any()
     for number in (1, 2):
         motion = fourbar.Motion(fourbar.FromLimit(number), 3.0, 4.0)
         effects = (fourbar.Gravity(), fourbar.Viscous.at(B=0.1))
@@ -307,7 +307,7 @@ def test_directions_are_unit_vectors_and_the_last_rate_is_that_of_bar_4_against_
         state = state_of(of((*lengths, 0.0)), q, sign)
         k, closed = state.k, np.isfinite(state.k.h3)
         assert closed.sum() > 30 and closed[:20].all()
-        for u in (state.at.u2, state.at.u3, state.at.u4):
+        for u in (state.position.u2, state.position.u3, state.position.u4):
             assert np.all(np.abs(np.abs(u[closed]) - 1.0) <= 2 * EPS)
         assert np.all(np.abs(k.h43 - (k.h4 - k.h3))[:20] <= 64 * EPS * (np.abs(k.h3) + np.abs(k.h4))[:20])
 

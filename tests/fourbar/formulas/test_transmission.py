@@ -58,7 +58,7 @@ def test_extremes_are_those_of_a_scan() -> None:
         kinds.add((found.least == 0.0, found.greatest == math.pi))
         start, stop = find_intervals(bars)[0]
         theta_2 = np.linspace(start, stop, SCAN)[1:-1]
-        at = compute_state(bars, theta_2, 1).at
+        at = compute_state(bars, theta_2, 1).position
         ba, bo = -b * at.u3, -c * at.u4
         angle = np.abs(np.angle(ba / bo))  # A-B-O4
         step = (stop - start) / (SCAN - 1)
@@ -119,7 +119,7 @@ def test_advantage_where_the_output_stands_and_where_the_input_does() -> None:
     limit = limit_positions(rocker)[0].theta_2
     near = compute_state(rocker, limit + np.array([1e-4, 1e-6, 1e-8]), 1)
     advantage = np.abs(mechanical_advantage(near))
-    assert np.isfinite(near.at.sin_mu).all()
+    assert np.isfinite(near.position.sin_mu).all()
     # it falls as the root of the distance
     assert advantage[:-1] / advantage[1:] == pytest.approx([10.0, 10.0], rel=1e-2)
     flat = compute_state(FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0)), np.array([0.0]), 1)
@@ -136,7 +136,7 @@ def test_distance_is_that_to_the_edge_of_assembly() -> None:
         theta_2 = np.linspace(*choose_range(bars), 40) + 4 * math.pi
         distance = distance_to_singular(bars, theta_2)
         inside, outside = (
-            [~np.isnan(compute_state(bars, theta_2 + s * distance * (1.0 + away), 1).at.sin_mu) for s in (1, -1)]
+            [~np.isnan(compute_state(bars, theta_2 + s * distance * (1.0 + away), 1).position.sin_mu) for s in (1, -1)]
             for away in (-1e-9, 1e-9)
         )
         assert np.all(inside[0] & inside[1])

@@ -428,7 +428,7 @@ def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:
         list_bodies(scene.linkage, scene.effects),
         compute_state(scene.linkage, motion.theta_2, motion.branch),
     )
-    of_input, of_others = inertia(scene.linkage.input.length, carried, place.at, place.k)
+    of_input, of_others = inertia(scene.linkage.input.length, carried, place.position, place.k)
     expected = 0.5 * (of_input + of_others) * motion.omega_2**2
     np.testing.assert_allclose(found.kinetic, expected, rtol=1e-9, atol=1e-15)
     assert found.kinetic.max() > 0.1

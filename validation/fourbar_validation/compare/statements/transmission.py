@@ -92,8 +92,8 @@ def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
     first, second = (theta[bar] for bar in MOVING_BARS if bar != drive)
     angle = np.abs(wrap_angle(theta[4] - theta[3]))
     sine = np.abs(np.sin(angle))
-    half = state.at.half  # a row of its own compares whether both say that the loop closes
-    closed = answer.assembled & (half.outer >= 0.0) & (half.inner >= 0.0) & ~find_singular(state.at)
+    half = state.position.half  # a row of its own compares whether both say that the loop closes
+    closed = answer.assembled & (half.outer >= 0.0) & (half.inner >= 0.0) & ~find_singular(state.position)
     extremes = transmission.transmission_extremes(linkage)
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = EQUIVALENCE.factor * count_half_turns(linkage.ground_angle, at.theta_2) / (find_lever(linkage) * sine)
@@ -102,8 +102,8 @@ def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
         largest = np.maximum(1.0, np.maximum(np.abs(ratio), np.abs(answer.quantities["omega_3"] / at.omega_2)))
         allowed_gain = allowed / sine * largest / np.abs(ratio)
     # the divisor of every tolerance must not come from the formulas alone
-    yield _Claim("condition", np.abs(state.at.sin_mu - np.sin(theta[4] - theta[3])), allowed, closed)
-    drive_condition = np.abs(np.abs(drive_sine(state.at, drive)) - np.abs(np.sin(second - first)))
+    yield _Claim("condition", np.abs(state.position.sin_mu - np.sin(theta[4] - theta[3])), allowed, closed)
+    drive_condition = np.abs(np.abs(drive_sine(state.position, drive)) - np.abs(np.sin(second - first)))
     yield _Claim("drive condition", drive_condition, allowed, closed)
     acute = np.minimum(angle, math.pi - angle)
     yield _Claim("transmission angle", np.abs(transmission.transmission_angle(state) - acute), allowed, closed)
