@@ -97,12 +97,12 @@ def advise(scene: Scene, error: float, setup: TrialSetup | None = None) -> Advic
 
 def choose_positions(scene: Scene) -> Command:
     """Take the scene's positions and others between them: the error peaks there, most near a pole of T3, T4."""
-    at = command_of(scene)
-    if np.ptp(at.branch) != 0:
-        return at
-    between = np.linspace(at.theta_2.min(), at.theta_2.max(), BETWEEN + 1)
-    theta_2 = np.union1d(at.theta_2, between)
-    return at._replace(angle=theta_2, branch=np.full(theta_2.shape, at.branch[0], dtype=np.int8))
+    command = command_of(scene)
+    if np.ptp(command.branch) != 0:
+        return command
+    between = np.linspace(command.theta_2.min(), command.theta_2.max(), BETWEEN + 1)
+    theta_2 = np.union1d(command.theta_2, between)
+    return command._replace(angle=theta_2, branch=np.full(theta_2.shape, command.branch[0], dtype=np.int8))
 
 
 class _CheapestSearch:

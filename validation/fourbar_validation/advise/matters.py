@@ -72,8 +72,8 @@ def compute_errors_between(scene: Scene, trial: Trial, samples: slice, steps: in
     degree = min(SPLINE, len(theta_2) - 1)
     curves = {name: make_interp_spline(theta_2, values, degree)(places) for name, values in read.items()}
     branch = np.full(places.shape, trial.at.branch[samples][0], dtype=np.int8)
-    at = Command(places, branch, curves.pop("omega_2"), curves.pop("alpha_2"))
-    yield compute_errors(scene, at, curves)
+    command = Command(places, branch, curves.pop("omega_2"), curves.pop("alpha_2"))
+    yield compute_errors(scene, command, curves)
 
 
 def measure_influences(scene: Scene, setup: TrialSetup, settings: Settings) -> list[SettingInfluence]:

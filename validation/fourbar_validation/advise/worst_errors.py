@@ -39,15 +39,15 @@ QUANTITIES = WorstErrors._fields
 NO_ANSWER = WorstErrors(*[math.inf] * len(QUANTITIES))
 
 
-def compute_errors(scene: Scene, at: Command, quantities: dict[str, Array]) -> WorstErrors:
+def compute_errors(scene: Scene, command: Command, quantities: dict[str, Array]) -> WorstErrors:
     """Compute the errors of an answer at the motion that its engine really made.
 
     The torque on bar 3 or 4 has poles where that bar stands still: it is judged where the bar turns
     at more than a tenth of its greatest speed, as in the regression report.
     """
-    if not np.isfinite(at.theta_2).all():
+    if not np.isfinite(command.theta_2).all():
         return NO_ANSWER
-    formulas = solve(scene, "force", at=at)
+    formulas = solve(scene, "force", at=command)
     judged = formulas.status_code == OK
     if not judged.any():
         return NO_ANSWER

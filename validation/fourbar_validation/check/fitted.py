@@ -208,14 +208,14 @@ def _try_offset(judge: Judge) -> Iterator[Mistake]:
 
     def residuals(offsets: Array, rows: NDArray[np.int_]) -> Array:
         """Write one line for each offset."""
-        at, m = judge.at, len(offsets)
+        command, m = judge.at, len(offsets)
         many: dict[str, Any] = {
             name: np.tile(values[rows], m)
             for name in ("angle", "branch", "speed", "acceleration")
-            if np.ndim(values := getattr(at, name)) == 1
+            if np.ndim(values := getattr(command, name)) == 1
         }
         many["angle"] += np.repeat(offsets, len(rows))
-        moved = solve(judge.scene, judge.stage, at=at._replace(**many, remainder=None, time=None))
+        moved = solve(judge.scene, judge.stage, at=command._replace(**many, remainder=None, time=None))
         parts = []
         for key in keys:
             theirs = judge.table.values[key][rows].reshape(len(rows), -1)

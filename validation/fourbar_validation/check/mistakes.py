@@ -28,16 +28,16 @@ NEARER = 10.0
 """A mistake that brings every row that differs this much nearer is named, though it does not explain it wholly."""
 
 
-def list_hypotheses(scene: Scene, at: Command) -> Iterator[Mistake]:
+def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
     """List every mistake that can be made on this scene, the simplest first."""
     for text, change, applies in COLUMN_MISTAKES:
         yield Mistake(text, partial(_change_column, change, applies), whole=False)
     for bar in (2, 3):
         yield Mistake(f"relative to bar {bar} instead of the ground", partial(_subtract_angle_of, bar), whole=False)
-    yield from _scale_inertial(scene, at)
-    for text, changed, command in _list_other_problems(scene, at):
+    yield from _scale_inertial(scene, command)
+    for text, changed, other_command in _list_other_problems(scene, command):
         try:
-            wrong = solve(changed, "position" if command.omega_2 is None else "force", at=command)
+            wrong = solve(changed, "position" if other_command.omega_2 is None else "force", at=other_command)
         except FourBarError:  # the mistake leaves no valid scene
             continue
         yield Mistake(text, partial(_take_from, wrong))
@@ -62,14 +62,14 @@ def _take_from(wrong: Solution, quantity: str, right: Solution) -> Array | None:
     return getattr(wrong, quantity, None)
 
 
-def _scale_inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
+def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
     """Inertial forces in another unit than the loads they are added to: forces and torque are linear in each."""
-    if at.omega_2 is None:
+    if command.omega_2 is None:
         return
     bare = replace(scene, loads=(), effects=())
     massless = {name: replace(bar, mass=0.0, inertia=bar.moment_of_inertia) for name, bar in list_moving(bare)}
     pointlike = {name: replace(bar, inertia=0.0) for name, bar in list_moving(bare)}
-    of_mass, of_inertia = (solve(replace_bars(bare, **bars), "force", at=at) for bars in (pointlike, massless))
+    of_mass, of_inertia = (solve(replace_bars(bare, **bars), "force", at=command) for bars in (pointlike, massless))
 
     def scaled(by_mass: float, by_inertia: float) -> Callable[[str, Solution], Array | None]:
         def predict(quantity: str, right: Solution) -> Array | None:
@@ -91,27 +91,31 @@ def _scale_inertial(scene: Scene, at: Command) -> Iterator[Mistake]:
     yield Mistake("I alpha with the wrong sign", scaled(1.0, -1.0))
 
 
-def _list_other_problems(scene: Scene, at: Command) -> Iterator[tuple[str, Scene, Command]]:
+def _list_other_problems(scene: Scene, command: Command) -> Iterator[tuple[str, Scene, Command]]:
     """List scenes and commands that mistakes amount to: the same formulas answer them."""
-    for text, command in _list_other_commands(at):
-        yield text, scene, command
+    for text, other_command in _list_other_commands(command):
+        yield text, scene, other_command
     for text, changed in chain(_change_gravity(scene), _change_loads(scene), _change_bars(scene)):
-        yield text, changed, at
+        yield text, changed, command
     for drive in {2, 3, 4} - {scene.drive_bar} if scene.drive is None else ():
-        yield f"the torque acts on bar {drive} instead of bar {scene.drive_bar}", replace(scene, drive_bar=drive), at
+        yield (
+            f"the torque acts on bar {drive} instead of bar {scene.drive_bar}",
+            replace(scene, drive_bar=drive),
+            command,
+        )
 
 
-def _list_other_commands(at: Command) -> Iterator[tuple[str, Command]]:
-    yield "the other branch", at._replace(branch=-at.branch)
-    yield "theta_2 read as degrees", at._replace(angle=np.radians(at.theta_2))
-    in_degrees = np.degrees(np.fmod(at.theta_2, TURN))  # a whole turn is 6.28 of these degrees
-    yield "theta_2 in radians where degrees were announced", at._replace(angle=in_degrees)
-    if at.omega_2 is not None:
-        yield "no inertial forces (statics)", at._replace(speed=0.0, acceleration=0.0)
-        if np.any(at.alpha_2):
-            yield "alpha_2 is left out", at._replace(acceleration=0.0)
-        yield "omega_2 in rev/min taken for rad/s", at._replace(speed=at.omega_2 / RPM)
-        yield "omega_2 in rad/s taken for rev/min", at._replace(speed=at.omega_2 * RPM)
+def _list_other_commands(command: Command) -> Iterator[tuple[str, Command]]:
+    yield "the other branch", command._replace(branch=-command.branch)
+    yield "theta_2 read as degrees", command._replace(angle=np.radians(command.theta_2))
+    in_degrees = np.degrees(np.fmod(command.theta_2, TURN))  # a whole turn is 6.28 of these degrees
+    yield "theta_2 in radians where degrees were announced", command._replace(angle=in_degrees)
+    if command.omega_2 is not None:
+        yield "no inertial forces (statics)", command._replace(speed=0.0, acceleration=0.0)
+        if np.any(command.alpha_2):
+            yield "alpha_2 is left out", command._replace(acceleration=0.0)
+        yield "omega_2 in rev/min taken for rad/s", command._replace(speed=command.omega_2 / RPM)
+        yield "omega_2 in rad/s taken for rev/min", command._replace(speed=command.omega_2 * RPM)
 
 
 def _change_gravity(scene: Scene) -> Iterator[tuple[str, Scene]]:

@@ -83,13 +83,13 @@ def judge(problem: dict[str, Any], answered: dict[str, Any]) -> list[Judged]:
     return [_judge_quantity(name, answers[name], errors[name], answered["answers"].get(name)) for name in answers]
 
 
-def _answer_at(problem: dict[str, Any], at: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+def _answer_at(problem: dict[str, Any], motion: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Evaluate the reference at the motion that an engine really made."""
     if problem["mechanism"] != "four-bar" or problem["ask"] != "answer":
         raise InputError("at", None, "is judged of a four-bar's positions alone: answer at the command")
     scene = protocol.scene_from_json(problem["scene"])
     scene, command = protocol.command_from_json(scene, problem["command"])
-    made = protocol.read_motion(at, command)
+    made = protocol.read_motion(motion, command)
     answers, errors = collect_answers(solve(scene, "error", at=made))
     return {name: values.tolist() for name, values in answers.items()}, {k: v.tolist() for k, v in errors.items()}
 

@@ -56,12 +56,12 @@ class Adapter(Protocol):
         """Answer a scene, given the description and the command, never a result of the formulas."""
 
 
-def explain_refusal(engine: Adapter, at: Command) -> str:
+def explain_refusal(engine: Adapter, command: Command) -> str:
     """Say why an engine cannot be asked: it does not declare that it takes what is commanded; empty where it does."""
     takes = getattr(engine, "commands", ("theta_2",))
-    if at.commanded in takes:
+    if command.commanded in takes:
         return ""
-    return f"it takes a command of {', '.join(takes)}, and here {at.commanded} is commanded"
+    return f"it takes a command of {', '.join(takes)}, and here {command.commanded} is commanded"
 
 
 @dataclass(slots=True, eq=False)

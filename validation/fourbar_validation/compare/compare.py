@@ -166,9 +166,9 @@ class Comparison:
 
     def _compare_assembled(self) -> Row:
         """Compare where both close the loop."""
-        theirs, ours, at = self.answer.assembled, self.formulas, self.answer.at
-        assert theirs is not None and at is not None
-        differ = (theirs != ours.assembled) & ~mark_touching(self.scene.linkage, at.angle, at.bar)
+        theirs, ours, command = self.answer.assembled, self.formulas, self.answer.at
+        assert theirs is not None and command is not None
+        differ = (theirs != ours.assembled) & ~mark_touching(self.scene.linkage, command.angle, command.bar)
         count = np.count_nonzero(differ)
         reason = f"{count} of {len(differ)} positions differ" if count else "the same positions"
         return Row.judged(self._who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2)

@@ -44,13 +44,15 @@ class Reversal:
         return f"dry friction reverses at {place}: {most} jumps from ({ends[0]}) to ({ends[1]}) N"
 
 
-def find_reversals(scene: Scene, at: Command, solution: Solution) -> list[Reversal]:
+def find_reversals(scene: Scene, command: Command, solution: Solution) -> list[Reversal]:
     """Find every reversal between two positions of a sweep, in their order.
 
     A position at which the pin is at rest lies within its reversal and ends no stretch.
     """
     pins = [pin for effect in scene.effects for pin in effect.dry_pins]
-    if not pins or at.omega_2 is None or solution.omega_3 is None or np.ndim(at.omega_2) or np.ndim(at.alpha_2):
+    if not pins or command.omega_2 is None or solution.omega_3 is None:
+        return []
+    if np.ndim(command.omega_2) or np.ndim(command.alpha_2):
         return []
     reversals = []
     for pin in dict.fromkeys(pins):
@@ -61,8 +63,8 @@ def find_reversals(scene: Scene, at: Command, solution: Solution) -> list[Revers
             if solution.status_code[i] != OK:
                 last = None
             elif not at_rest[i]:
-                if last is not None and slip[last] * slip[i] < 0.0 and at.branch[last] == at.branch[i]:
-                    reversals.append(_bisect(scene, at, pin, last, i, float(slip[last])))
+                if last is not None and slip[last] * slip[i] < 0.0 and command.branch[last] == command.branch[i]:
+                    reversals.append(_bisect(scene, command, pin, last, i, float(slip[last])))
                 last = i
     return sorted(reversals, key=lambda reversal: reversal.position)
 
@@ -116,14 +118,14 @@ def _compute_speeds(solution: Solution) -> dict[int, Any]:
     return {1: 0.0, 2: solution.omega_2, 3: solution.omega_3, 4: solution.omega_4}
 
 
-def _bisect(scene: Scene, at: Command, pin: str, i: int, j: int, slip: float) -> Reversal:
+def _bisect(scene: Scene, command: Command, pin: str, i: int, j: int, slip: float) -> Reversal:
     """Halve the interval between positions i and j; there, friction in the sense of either side."""
 
     def look(theta_2: float, side: int, stage: str) -> Solution:
-        moved = at._replace(angle=np.array([theta_2]), branch=at.branch[i : i + 1], remainder=None, time=None)
+        moved = command._replace(angle=np.array([theta_2]), branch=command.branch[i : i + 1], remainder=None, time=None)
         return solve(scene, stage, at=moved, side=side)
 
-    low, high = float(at.theta_2[i]), float(at.theta_2[j])
+    low, high = float(command.theta_2[i]), float(command.theta_2[j])
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         if middle in (low, high):

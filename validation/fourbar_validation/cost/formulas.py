@@ -29,28 +29,28 @@ AT_MOST = 25
 Quantities = dict[str, Any]
 
 
-def choose_few(at: Command) -> Command:
+def choose_few(command: Command) -> Command:
     """Choose at most AT_MOST positions, evenly over the sweep."""
-    rows = np.unique(np.linspace(0, len(at.theta_2) - 1, min(AT_MOST, len(at.theta_2))).round().astype(int))
-    return at._replace(angle=at.theta_2[rows], branch=at.branch[rows])
+    rows = np.unique(np.linspace(0, len(command.theta_2) - 1, min(AT_MOST, len(command.theta_2))).round().astype(int))
+    return command._replace(angle=command.theta_2[rows], branch=command.branch[rows])
 
 
-def evaluate_double(scene: Scene, at: Command) -> Quantities:
+def evaluate_double(scene: Scene, command: Command) -> Quantities:
     """Evaluate by `fourbar.solve`."""
-    s = solve(scene, "force", at=at)
+    s = solve(scene, "force", at=command)
     return {name: getattr(s, name) for name in ("torque", *PIN_FORCES)}
 
 
-def evaluate_single(scene: Scene, at: Command) -> Quantities:
+def evaluate_single(scene: Scene, command: Command) -> Quantities:
     """Evaluate the formulas on float32 arrays."""
     case = change_numbers(Case.of(scene), _round_single)
     path = case.path._replace(u1=np.complex64(case.path.u1))
     case = case._replace(path=path)
     with np.errstate(all="ignore"):
-        theta_2 = at.theta_2.astype(np.float32)
-        speed, growth = (np.float32(value) for value in (at.omega_2 or 0.0, at.alpha_2))
-        position = path.position(theta_2, path.half_angle(theta_2), at.branch)
-        state = case.state(theta_2, change_numbers(position, _round_single), at.branch, speed, growth)
+        theta_2 = command.theta_2.astype(np.float32)
+        speed, growth = (np.float32(value) for value in (command.omega_2 or 0.0, command.alpha_2))
+        position = path.position(theta_2, path.half_angle(theta_2), command.branch)
+        state = case.state(theta_2, change_numbers(position, _round_single), command.branch, speed, growth)
         state = change_numbers(state, _round_single)
         dynamics = case.dynamics(state, growth)
     assert dynamics.drive.dtype == np.float32
@@ -71,18 +71,18 @@ def _stack(vector: Any, n: int) -> Array:
     return np.stack([values.real, values.imag], axis=1)
 
 
-def solve_thirteen_equations(scene: Scene, at: Command) -> Quantities:
+def solve_thirteen_equations(scene: Scene, command: Command) -> Quantities:
     """Solve thirteen equations per position, with kinematics by the formulas."""
     if any(effect.loaded_pins for effect in scene.effects):
         raise NotImplementedError("friction that depends on the pin forces is not linear in them")
-    x = thirteen.solve_thirteen(make_bodies(scene, at), scene.drive_bar)
+    x = thirteen.solve_thirteen(make_bodies(scene, command), scene.drive_bar)
     columns = {name: getattr(thirteen, name) for name in PIN_FORCES}
     return {"torque": x[:, thirteen.TORQUE], **{name: x[:, k : k + 2] for name, k in columns.items()}}
 
 
-def make_bodies(scene: Scene, at: Command) -> thirteen.FreeBodies:
+def make_bodies(scene: Scene, command: Command) -> thirteen.FreeBodies:
     """Set up the free bodies with what acts on them, moments about the mass centres, by our kinematics."""
-    state, parts = compute_state(scene, at), list_bodies(scene.linkage, scene.effects)
+    state, parts = compute_state(scene, command), list_bodies(scene.linkage, scene.effects)
     n = len(state.theta_2)
     actions = Actions(state, parts).add((*scene.loads, *scene.effects))
     acting = actions.wrenches(Wrenches())
@@ -99,7 +99,7 @@ def make_bodies(scene: Scene, at: Command) -> thirteen.FreeBodies:
     return thirteen.FreeBodies(first, second, force, moment)
 
 
-def evaluate_balls(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quantities:
+def evaluate_balls(scene: Scene, command: Command, bits: int = FIFTY_DIGITS) -> Quantities:
     """Evaluate balls of the independent reference, (n,) objects."""
     from flint import arb, ctx
 
@@ -108,7 +108,7 @@ def evaluate_balls(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quant
     before, ctx.prec = ctx.prec, bits
     try:
         outputs = []
-        for theta_2, branch in zip(at.theta_2.tolist(), at.branch.tolist(), strict=True):
+        for theta_2, branch in zip(command.theta_2.tolist(), command.branch.tolist(), strict=True):
             x = {name: arb(value) for name, value in collect_inputs(scene, theta_2).items()}
             outputs.append(compute_outputs(scene, branch, x) or {})
     finally:
@@ -117,9 +117,11 @@ def evaluate_balls(scene: Scene, at: Command, bits: int = FIFTY_DIGITS) -> Quant
     return out | {name: [(y.get(f"{name}_x"), y.get(f"{name}_y")) for y in outputs] for name in PIN_FORCES}
 
 
-def compare_with_reference(scene: Scene, at: Command, quantities: Quantities, reference: Quantities) -> WorstErrors:
+def compare_with_reference(
+    scene: Scene, command: Command, quantities: Quantities, reference: Quantities
+) -> WorstErrors:
     """Find the worst errors on their scales against balls of many more digits."""
-    formulas = solve(scene, "force", at=at)
+    formulas = solve(scene, "force", at=command)
     worst = {}
     for name in ("torque", *PIN_FORCES):
         sizes = scale_of(name, scene, formulas, getattr(formulas, name))

@@ -156,8 +156,8 @@ def _vary_tolerance() -> list[Curve]:
 
 def _vary_drives() -> list[Curve]:
     """List each drive with the integrator that carries it."""
-    at = replace(BEST, flywheel=1.0)
-    fast = replace(at, integrator="implicitfast", time_constant_steps=3.0)
+    light = replace(BEST, flywheel=1.0)
+    fast = replace(light, integrator="implicitfast", time_constant_steps=3.0)
     curves = [trace_steps(f"flywheel {f:g}, RK4", replace(BEST, flywheel=f)) for f in (1e2, 1e4, 1e6, 1e8)]
     tried: list[tuple[str, Build]] = [
         ("joint equality, RK4", drives.WheelEquality),
@@ -168,6 +168,6 @@ def _vary_drives() -> list[Curve]:
         ("gentle velocity actuator, RK4", drives.GentleVelocityActuator),
     ]
     for name, drive in tried:
-        carried = (at, drive) if name.endswith("RK4") else (fast, drive, MORE_STEPS)
+        carried = (light, drive) if name.endswith("RK4") else (fast, drive, MORE_STEPS)
         curves.append(trace_steps(name, *carried))
     return curves

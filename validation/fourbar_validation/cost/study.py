@@ -14,7 +14,8 @@ import numpy as np
 from fourbar.errors import FourBarError, LimitError
 from fourbar.files import dump
 from fourbar.formulas.mobility import turns_fully
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene
+from fourbar.scene import command as command_of
 from fourbar_validation.advise.advise import advise
 from fourbar_validation.advise.worst_errors import NO_ANSWER, WorstErrors, compute_errors
 from fourbar_validation.compare.answer import Adapter
@@ -84,7 +85,7 @@ class CostStudy:
 
     def __init__(self, name: str, scene: Scene, folder: Path) -> None:
         self.name, self.scene, self.folder = name, scene, folder
-        self.command = command(scene)
+        self.command = command_of(scene)
         self.left_out: list[str] = []
         self._rigs: dict[tuple[bool, bool, bool], TrialSetup] = {}
         self.units: dict[str, Callable[[], list[CostPoint]]] = {
@@ -127,12 +128,13 @@ class CostStudy:
                 scene = replace(scene, motion=scene.motion.replace(speed=sign * SLOW, acceleration=0.0))
             if bare:
                 scene = replace(scene, loads=(), effects=())
-            at = command(scene)
+            command = command_of(scene)
             if settled:
-                before = float(at.theta_2.min() if at.omega_2 > 0.0 else at.theta_2.max())  # type: ignore[operator]
-                before -= math.copysign(2.0 * math.pi, at.omega_2)  # type: ignore[arg-type]
-                at = at._replace(angle=np.append(at.theta_2, before), branch=np.append(at.branch, at.branch[0]))
-            self._rigs[slow, bare, settled] = TrialSetup(scene, at)
+                before = float(command.theta_2.min() if command.omega_2 > 0.0 else command.theta_2.max())  # type: ignore[operator]
+                before -= math.copysign(2.0 * math.pi, command.omega_2)  # type: ignore[arg-type]
+                angle, branch = np.append(command.theta_2, before), np.append(command.branch, command.branch[0])
+                command = command._replace(angle=angle, branch=branch)
+            self._rigs[slow, bare, settled] = TrialSetup(scene, command)
         return self._rigs[slow, bare, settled]
 
     def _try_curve(self, curve: Curve) -> list[CostPoint]:
@@ -215,9 +217,9 @@ class CostStudy:
             except (NotImplementedError, AssertionError) as error:
                 self.left_out.append(f"{label}: {error}")
                 continue
-            at = few if label == "50 digits" else self.command
-            times = [time_call(partial(method, self.scene, at)) for _ in range(ROUNDS)]
-            points.append(self._make_point("formulas", FORMULAS, label, errors, times, len(at.theta_2)))
+            command = few if label == "50 digits" else self.command
+            times = [time_call(partial(method, self.scene, command)) for _ in range(ROUNDS)]
+            points.append(self._make_point("formulas", FORMULAS, label, errors, times, len(command.theta_2)))
         return points
 
     def _time_inverse(self) -> list[CostPoint]:
@@ -233,8 +235,8 @@ class CostStudy:
             raise LimitError(f"{engine.name}: {answer.refusal}")
         assert answer.assembled is not None
         rows = np.flatnonzero(answer.assembled)
-        at = self.command._replace(angle=self.command.theta_2[rows], branch=self.command.branch[rows])
-        errors = compute_errors(self.scene, at, {name: value[rows] for name, value in answer.quantities.items()})
+        command = self.command._replace(angle=self.command.theta_2[rows], branch=self.command.branch[rows])
+        errors = compute_errors(self.scene, command, {name: value[rows] for name, value in answer.quantities.items()})
         times = [time_call(partial(engine.answer, self.scene, self.command)) for _ in range(ANSWERS)]
         return self._make_point(
             curve, EXACT, label or engine.name, errors, times, len(self.command.theta_2), setting_value
@@ -252,8 +254,8 @@ class CostStudy:
 
 def _leave_out_first(trial: Trial) -> None:
     """Leave out the turn that a soft closure takes to settle from its exact start."""
-    at = trial.at
-    trial.at = Command(at.theta_2[1:], at.branch[1:], at.omega_2[1:], at.alpha_2[1:])  # type: ignore[index]
+    command = trial.at
+    trial.at = Command(command.theta_2[1:], command.branch[1:], command.omega_2[1:], command.alpha_2[1:])  # type: ignore[index]
     trial.quantities = {name: values[1:] for name, values in trial.quantities.items()}
 
 

@@ -131,11 +131,10 @@ def place(point: Any, ground_angle: float) -> tuple[float, float]:
     return rotate(ground_angle, *offset) if point.bar == 1 else offset
 
 
-def list_speeds(at: Command) -> tuple[Array, Array]:
+def list_speeds(command: Command) -> tuple[Array, Array]:
     """Return speed and acceleration of the commanded bar at each position, (n,); a speed that is not stated is 0."""
-    omega, alpha = (
-        np.broadcast_to(np.asarray(0.0 if x is None else x, float), at.angle.shape) for x in (at.speed, at.acceleration)
-    )
+    rates = (0.0 if rate is None else rate for rate in (command.speed, command.acceleration))
+    omega, alpha = (np.broadcast_to(np.asarray(rate, float), command.angle.shape) for rate in rates)
     return omega, alpha
 
 

@@ -34,37 +34,38 @@ FIRST_ORDER = 0.1
 forces and the torque undetermined; the torque's own first order can cancel."""
 
 
-def predict_from_data(scene: Scene, at: Command, quantity: str, mask: Mask | None = None) -> Array:
+def predict_from_data(scene: Scene, command: Command, quantity: str, mask: Mask | None = None) -> Array:
     """Predict for a derivation that works in angles and lengths themselves."""
-    return predict_error(scene, at, quantity, 0.0, mask)
+    return predict_error(scene, command, quantity, 0.0, mask)
 
 
-def predict_in_world_axes(scene: Scene, at: Command, quantity: str, mask: Mask | None = None) -> Array:
+def predict_in_world_axes(scene: Scene, command: Command, quantity: str, mask: Mask | None = None) -> Array:
     """Predict for an engine that differences points of the linkage in world axes, as Pinocchio's frame Jacobians do."""
-    return predict_error(scene, at, quantity, sum_lengths(scene.linkage), mask)
+    return predict_error(scene, command, quantity, sum_lengths(scene.linkage), mask)
 
 
-def predict_about_mass_centre(scene: Scene, at: Command, quantity: str, mask: Mask | None = None) -> Array:
+def predict_about_mass_centre(scene: Scene, command: Command, quantity: str, mask: Mask | None = None) -> Array:
     """Predict for an engine that moves a tree of bodies about the mass centre of all of them, as MuJoCo does.
 
     Every bar is accelerated with the first of its tree and back again by its own joint.
     """
     furthest = max(abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
-    return predict_error(scene, at, quantity, sum_lengths(scene.linkage) + furthest, mask, carried=True)
+    return predict_error(scene, command, quantity, sum_lengths(scene.linkage) + furthest, mask, carried=True)
 
 
 def predict_error(
-    scene: Scene, at: Command, quantity: str, reach: float, mask: Mask | None = None, *, carried: bool = False
+    scene: Scene, command: Command, quantity: str, reach: float, mask: Mask | None = None, *, carried: bool = False
 ) -> Array:
     """Predict the absolute error of a quantity at each position, or at those of a mask, (n,).
 
     With `carried` the accelerations of the bars are differences of others as large as the fastest bar's at `reach`.
     NaN where the loop does not close; infinite at a singular position, where the equations have no answer.
     """
-    n, (omega, alpha) = len(at.theta_2), list_speeds(at)
+    n, (omega, alpha) = len(command.theta_2), list_speeds(command)
     errors = np.full(n, np.nan)
     for i in range(n) if mask is None else np.flatnonzero(mask).tolist():
-        moved = _compute_sensitivity(scene, float(at.theta_2[i]), int(at.branch[i]), float(omega[i]), float(alpha[i]))
+        theta_2, branch = float(command.theta_2[i]), int(command.branch[i])
+        moved = _compute_sensitivity(scene, theta_2, branch, float(omega[i]), float(alpha[i]))
         if moved is None:
             continue
         lost = ROUNDINGS * EPS * moved.data["theta_4"] >= FIRST_ORDER * float(moved.data["condition"])

@@ -72,27 +72,28 @@ def scene_from_json(data: Any) -> Scene:
         raise (error if error.file else error.in_file("scene")) from None
 
 
-def command_to_json(scene: Scene, at: Command) -> dict[str, Any]:
+def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
     """Write what is commanded: an angle or a stroke, its speed and acceleration, the branch."""
-    if at.stroke is None:
-        (place, speed, acceleration), values = COMMANDS[at.bar], (at.angle, at.speed, at.acceleration)
+    if command.stroke is None:
+        names, values = COMMANDS[command.bar], (command.angle, command.speed, command.acceleration)
     else:
-        (place, speed, acceleration), values = STROKE_COMMAND, (at.stroke, at.stroke_speed, scene.motion.acceleration)
+        names, values = STROKE_COMMAND, (command.stroke, command.stroke_speed, scene.motion.acceleration)
+    place, speed, acceleration = names
     data = {place: _write_numbers(values[0])}
     if values[1] is not None:
         data |= {speed: _write_numbers(values[1]), acceleration: _write_numbers(values[2])}
-    if at.stroke is not None:
+    if command.stroke is not None:
         data["side"] = scene.motion.side
-    same = bool((at.branch == at.branch[0]).all())
-    data["branch"] = int(at.branch[0]) if same else at.branch.tolist()
-    if at.time is not None:
-        data["time"] = at.time.tolist()
-    if at.remainder is not None:
+    same = bool((command.branch == command.branch[0]).all())
+    data["branch"] = int(command.branch[0]) if same else command.branch.tolist()
+    if command.time is not None:
+        data["time"] = command.time.tolist()
+    if command.remainder is not None:
         from mpmath import mp, mpf
 
         with mp.workdps(DIGITS):
-            digits = str(mp.nstr(mpf(at.remainder), DIGITS + 5))  # they read back as they were
-        data["remainder"] = [digits] * len(at.angle)
+            digits = str(mp.nstr(mpf(command.remainder), DIGITS + 5))  # they read back as they were
+        data["remainder"] = [digits] * len(command.angle)
     return data
 
 

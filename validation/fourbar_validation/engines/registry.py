@@ -208,16 +208,16 @@ FOLDERS = tuple(Path(folder) for spec in [find_spec(LAB.replace("-", "_"))] if s
 """Folder of the lab, whose engines.toml a run reads too; none if the lab is not installed."""
 
 
-def hold(engine: Engine, scene: Scene, at: Command, answer: Answer, formulas: Solution | None = None) -> Held:
+def hold(engine: Engine, scene: Scene, command: Command, answer: Answer, formulas: Solution | None = None) -> Held:
     """Hold an answer to the engine's tolerance and quantities, with the errors predicted for it at a command.
 
     `formulas`: their solution at the command, with which an engine that can answers again within theta_2's rounding.
     """
-    nearby = None if formulas is None else make_nearby(engine, scene, at, formulas)
-    return Held(engine.tolerance, engine.answers, make_prediction(engine, scene, at, answer), nearby)
+    nearby = None if formulas is None else make_nearby(engine, scene, command, formulas)
+    return Held(engine.tolerance, engine.answers, make_prediction(engine, scene, command, answer), nearby)
 
 
-def make_prediction(engine: Engine, scene: Scene, at: Command, answer: Answer) -> Predicted | None:
+def make_prediction(engine: Engine, scene: Scene, command: Command, answer: Answer) -> Predicted | None:
     """Give what computes the errors to be expected, should any be called for; an alarm leaves no own excuse."""
     if answer.refusal is not None:
         return None
@@ -226,14 +226,14 @@ def make_prediction(engine: Engine, scene: Scene, at: Command, answer: Answer) -
             return None
         return lambda quantity, mask: answer.predicted.get(quantity, np.zeros(len(mask)))
     predict = engine.predictor
-    if at.bar != 2 or at.stroke is not None:
+    if command.bar != 2 or command.stroke is not None:
         return None  # the prediction knows the command of bar 2 alone
     if predict is None or (engine.tolerance.conditioned and (find_missing("flint") or find_refusal(scene))):
         return None  # the law in the condition stands alone
-    return lambda quantity, mask: predict(scene, at, quantity, mask)
+    return lambda quantity, mask: predict(scene, command, quantity, mask)
 
 
-def make_nearby(engine: Engine, scene: Scene, at: Command, formulas: Solution) -> Nearby | None:
+def make_nearby(engine: Engine, scene: Scene, command: Command, formulas: Solution) -> Nearby | None:
     """Give what answers within the rounding of the theta_2 that are stated, if the engine does.
 
     Near a limit position the last digits of theta_2 decide sin(theta_4 - theta_3), and with it every other number:
@@ -241,17 +241,18 @@ def make_nearby(engine: Engine, scene: Scene, at: Command, formulas: Solution) -
 
     A drive on bar 3 or 4 has poles of its own, which another theta_2 for the same sine does not correct.
     """
-    if not engine.nearby or scene.drive_bar != 2 or at.remainder is not None or at.speed is None or at.bar != 2:
+    by_input = scene.drive_bar == 2 and command.bar == 2
+    if not engine.nearby or not by_input or command.remainder is not None or command.speed is None:
         return None
-    omega, alpha = list_speeds(at)
+    omega, alpha = list_speeds(command)
 
     def answer(mask: Mask) -> dict[str, Array]:
         adapter, out = engine.start(), make_blank(len(mask), COMPARED)
         for i in np.flatnonzero(mask & np.isfinite(formulas.sin_mu)).tolist():
-            shift = shift_to(scene.linkage, float(at.theta_2[i]), float(formulas.sin_mu[i]))
+            shift = shift_to(scene.linkage, float(command.theta_2[i]), float(formulas.sin_mu[i]))
             if shift is not None:
                 row = slice(i, i + 1)
-                moved = Command(at.theta_2[row], at.branch[row], omega[row], alpha[row], shift)
+                moved = Command(command.theta_2[row], command.branch[row], omega[row], alpha[row], shift)
                 for name, values in adapter.answer(scene, moved).quantities.items():
                     out[name][row] = values
         return out

@@ -146,8 +146,8 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     axes.yaxis.set_minor_locator(NullLocator())
     middle = int(np.flatnonzero(good)[np.count_nonzero(good) // 2])
-    at = (float(_choose_base(solution, None)[middle]), float(allowed[middle]))
-    axes.annotate("allowed", at, (0, -9), textcoords="offset points", fontsize=7.5, ha="center", color=ALLOWED)
+    place = (float(_choose_base(solution, None)[middle]), float(allowed[middle]))
+    axes.annotate("allowed", place, (0, -9), textcoords="offset points", fontsize=7.5, ha="center", color=ALLOWED)
 
 
 def find_worst_of_segments(error: Array, phase: float) -> np.ndarray[Any, np.dtype[np.intp]]:
@@ -186,9 +186,9 @@ def _label(quantity: str, solution: Solution) -> str:
     return f"{name} (°)" if quantity in ANGLES else f"|{quantity}| (N)"
 
 
-def _choose_base(solution: Solution, at: Command | None) -> Array:
+def _choose_base(solution: Solution, command: Command | None) -> Array:
     """Choose what a curve is drawn over: the time of a free motion, else theta_2 in degrees."""
-    angle = (solution.at if at is None else at).angle
+    angle = (solution.at if command is None else command).angle
     if solution.time is not None and len(solution.time) == len(angle):
         return solution.time
     return np.degrees(angle)

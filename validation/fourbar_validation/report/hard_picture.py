@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from fourbar.quantities import OK
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene
+from fourbar.scene import command as command_of
 from fourbar.solve import solve
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.tolerance import DEGRADED, EPS, K, divide, find_condition, find_error, magnitude
@@ -63,11 +64,11 @@ def list_approaches() -> list[Approach]:
 
 def list_errors(scene: Scene, quantity: str, engine: Engine) -> tuple[Array, Array] | None:
     """Return (theta_2, error relative to the value itself) of one engine, or None where it refuses."""
-    at = command(scene)
+    command = command_of(scene)
     if engine.through_time:
-        psi = np.abs(at.theta_2 - at.theta_2[0]) - abs(at.theta_2[-1] - at.theta_2[0])
-        at = Command(at.theta_2[-psi > SIMULATED_FROM], at.branch[-psi > SIMULATED_FROM], *at[2:4])
-    answer: Answer = engine.start().answer(scene, at)
+        psi = np.abs(command.theta_2 - command.theta_2[0]) - abs(command.theta_2[-1] - command.theta_2[0])
+        command = Command(command.theta_2[-psi > SIMULATED_FROM], command.branch[-psi > SIMULATED_FROM], *command[2:4])
+    answer: Answer = engine.start().answer(scene, command)
     if answer.refusal is not None or quantity not in answer.quantities or answer.at is None:
         return None
     ours = solve(scene, "force", at=answer.at)
@@ -100,7 +101,7 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
     solution = solve(approach.scene, "force")
     size = magnitude(getattr(solution, quantity))
     singular = _find_singular(approach)
-    predicted = divide(predict_in_world_axes(approach.scene, command(approach.scene), quantity), size)
+    predicted = divide(predict_in_world_axes(approach.scene, command_of(approach.scene), quantity), size)
     law = K * EPS / find_condition(quantity, approach.scene.linkage, solution)
     shown = np.isfinite(predicted)
     axes.loglog(approach.distances, law, color=INK, linestyle=(0, (1, 1)), linewidth=1, label="law K eps/condition")
@@ -124,6 +125,6 @@ def _draw(axes: Any, approach: Approach, quantity: str) -> None:
 
 def _find_singular(approach: Approach) -> float:
     """Return theta_2 of the singular position: the positions lie at the distances from it."""
-    theta_2 = command(approach.scene).theta_2
+    theta_2 = command_of(approach.scene).theta_2
     side = math.copysign(1.0, float(theta_2[0] - theta_2[-1]))
     return float(theta_2[0]) - side * float(approach.distances[0])

@@ -58,11 +58,11 @@ NEAR = 1e-6
 
 def check_identities(question: Question) -> Iterator[Row]:
     """Check each equation that the stage of the solution allows."""
-    solution, at, linkage = question.solution, question.at, question.scene.linkage
+    solution, command, linkage = question.solution, question.at, question.scene.linkage
     closing = solution.assembled & (solution.status_code != OVERFLOW)
     gap = find_gap(linkage, solution.theta_2, solution.theta_3, solution.theta_4)
     yield _make_row(question, "closure", CLOSURE, gap, closing)
-    if question.scene.motion.angle is None and question.scene.motion.law is None and at.bar == 2:
+    if question.scene.motion.angle is None and question.scene.motion.law is None and command.bar == 2:
         yield _check_sweep(question)
     if solution.F12 is not None and (solution.status_code == OK).any():
         yield from _check_sums(question)
@@ -73,14 +73,14 @@ def _check_sweep(question: Question) -> Row:
 
     At the end of an interval narrower than four degrees it leaves out a quarter of that, which is half of the sweep.
     """
-    at, linkage = question.at, question.scene.linkage
-    start, stop = float(at.theta_2[0]), float(at.theta_2[-1])
+    command, linkage = question.at, question.scene.linkage
+    start, stop = float(command.theta_2[0]), float(command.theta_2[-1])
     if (start, stop) == (0.0, 2.0 * np.pi):
-        missed = np.maximum(-find_margin(linkage, at.theta_2), 0.0)
+        missed = np.maximum(-find_margin(linkage, command.theta_2), 0.0)
     else:
         left_out = min(np.radians(1.0), 0.5 * (stop - start))
         missed = np.abs(find_margin(linkage, np.array([start - left_out, stop + left_out])))
-    allowed = IDENTITY.factor * count_half_turns(linkage.ground_angle, at.theta_2)
+    allowed = IDENTITY.factor * count_half_turns(linkage.ground_angle, command.theta_2)
     reason = "one degree short of where the loop just closes, or a whole turn"
     return question.row("sweep", np.array([missed.max()]), allowed, reason)
 
@@ -159,9 +159,9 @@ def _check_sums(question: Question) -> Iterator[Row]:
 
 def _sum_actions(question: Question) -> tuple[Actions, Array]:
     """Sum what acts at the speeds that were answered, not at another evaluation of them; also the place of O4."""
-    scene, at, solution = question.scene, question.at, question.solution
-    state = compute_state(scene, at)
-    speeds = {f"omega_{bar}": getattr(solution, f"omega_{bar}") for bar in MOVING_BARS if bar != at.bar}
+    scene, command, solution = question.scene, question.at, question.solution
+    state = compute_state(scene, command)
+    speeds = {f"omega_{bar}": getattr(solution, f"omega_{bar}") for bar in MOVING_BARS if bar != command.bar}
     state = state._replace(moving=state.moving._replace(**speeds))
     with np.errstate(all="ignore"):
         actions = Actions(state, list_bodies(scene.linkage, scene.effects)).add((*scene.loads, *scene.effects))
@@ -197,12 +197,12 @@ def check_status(question: Question) -> Iterator[Row]:
 
 def _solve_exactly(question: Question) -> tuple[OfSome | None, OfSome | None]:
     """Give the sine between bars 3 and 4 in many digits, and how many solutions friction has, at some positions."""
-    scene, at = question.scene, question.at
-    unknown = at.remainder is not None or at.commanded != "theta_2" or find_missing("flint")
+    scene, command = question.scene, question.at
+    unknown = command.remainder is not None or command.commanded != "theta_2" or find_missing("flint")
     loaded = any(effect.loaded_pins for effect in scene.effects)
     return (
-        None if unknown else lambda indices: compute_sines(scene.linkage, select_positions(at, indices)),
-        (lambda indices: count_solutions(scene, select_positions(at, indices))) if loaded else None,
+        None if unknown else lambda indices: compute_sines(scene.linkage, select_positions(command, indices)),
+        (lambda indices: count_solutions(scene, select_positions(command, indices))) if loaded else None,
     )
 
 

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene
+from fourbar.scene import command as command_of
 from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.engines.guests import list_numbers
 from fourbar_validation.engines.registry import ENGINES, Engine
@@ -116,30 +117,30 @@ def judge(
 
 def ask(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
     """Put a scene to the engines that it needs, each position once; say what is left out."""
-    at = command(scene)
+    command = command_of(scene)
     if scene.motion.free is not None:
-        return Question(name, scene, at, engines)
-    question = Question(name, scene, at)
-    numbers = (at.angle, at.branch, 0.0 if at.speed is None else at.speed, at.acceleration)
-    if len(at.angle) > 1 and all(np.ptp(values) == 0 for values in numbers):  # constant conditions are not swept
+        return Question(name, scene, command, engines)
+    question = Question(name, scene, command)
+    numbers = (command.angle, command.branch, 0.0 if command.speed is None else command.speed, command.acceleration)
+    if len(command.angle) > 1 and all(np.ptp(values) == 0 for values in numbers):  # constant conditions are not swept
         question.left_out.append("positions: all are the same, one is evaluated")
-        question.at = select_positions(at, np.array([0]))._replace(time=None)
+        question.at = select_positions(command, np.array([0]))._replace(time=None)
     question.engines = list(_choose_called_for(engines, question.at, question.left_out))
     question.solve()  # untimed: the first call of a process pays for what every later one finds loaded
     return question
 
 
-def _choose_called_for(engines: Iterable[Engine], at: Command, left_out: list[str]) -> Iterator[Engine]:
+def _choose_called_for(engines: Iterable[Engine], command: Command, left_out: list[str]) -> Iterator[Engine]:
     """Choose the engines that the question needs; the others are left out before they are imported."""
     for engine in engines:
         reason = None
-        if at.speed is None:
+        if command.speed is None:
             reason = None if engine.positions else "the scene states positions only, and it gives forces"
-        elif engine.through_time and not np.any(at.speed):
+        elif engine.through_time and not np.any(command.speed):
             reason = "omega_2 is 0: nothing moves through time"
-        elif engine.through_time and len(at.angle) == 1:
+        elif engine.through_time and len(command.angle) == 1:
             reason = "one position is no motion through time"
         if reason is None:
-            yield engine if at.speed is not None else replace(engine, answers=engine.positions)
+            yield engine if command.speed is not None else replace(engine, answers=engine.positions)
         else:
             left_out.append(f"{engine.name}: {reason}")

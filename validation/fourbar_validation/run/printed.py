@@ -102,14 +102,14 @@ def _find_known(reference: Solution, quantity: str, n: int) -> Array:
 
 def check_blocks(question: Question) -> Iterator[Row]:
     """Check a sweep of more than one block of positions, at the ends of its blocks, against the scene's own sweep."""
-    scene, at, solution = question.scene, question.at, question.solution
-    if at.speed is None or at.remainder is not None:
+    scene, command, solution = question.scene, question.at, question.solution
+    if command.speed is None or command.remainder is not None:
         return
-    n = len(at.angle)
+    n = len(command.angle)
     ok = np.flatnonzero(solution.status_code == OK)
     long = np.concatenate((np.resize(ok if len(ok) else np.arange(n), BLOCK), np.arange(n)))
     ends = np.unique([0, BLOCK - 1, BLOCK, len(long) - 1])
-    repeated = select_positions(at, long)
+    repeated = select_positions(command, long)
     if sum(len(effect.loaded_pins) for effect in scene.effects) > 1:  # each may take a search
         repeated.angle[1 : BLOCK - 1] = np.nan
     together = solve(scene, "force", at=repeated)
@@ -128,10 +128,11 @@ def check_blocks(question: Question) -> Iterator[Row]:
         apart = find_error(quantity, one, expected, size) * condition
         error[finite] = np.maximum(error[finite], apart[finite])
     alone = {angle: np.empty(n) for angle in ("theta_3", "theta_4")}
-    solve(scene, at=at, out=alone)  # they are found without vectors then
+    solve(scene, at=command, out=alone)  # they are found without vectors then
     for angle, angles in alone.items():
         apart = find_error(angle, angles, getattr(solution, angle), np.ones(n))
-        apart *= find_condition(angle, scene.linkage, solution) / count_half_turns(scene.linkage.ground_angle, at.angle)
+        half_turns = count_half_turns(scene.linkage.ground_angle, command.angle)
+        apart *= find_condition(angle, scene.linkage, solution) / half_turns
         error[-1] = max(error[-1], np.nan_to_num(apart[ok], nan=np.inf).max(initial=0.0))
     reason = f"{len(long)} positions at once against {n}"
     yield question.row("blocks", error, EQUIVALENCE.factor, reason, theta_2=together.theta_2[ends])
@@ -139,8 +140,8 @@ def check_blocks(question: Question) -> Iterator[Row]:
 
 def check_error_bars(question: Question) -> Iterator[Row]:
     """Check the error bars by the true error, in 320 bits; no bar may be larger than what a comparison is allowed."""
-    scene, at, solution = question.scene, question.at, question.solution
-    if at.omega_2 is None or at.remainder is not None or find_refusal(scene) or find_missing("flint"):
+    scene, command, solution = question.scene, question.at, question.solution
+    if command.omega_2 is None or command.remainder is not None or find_refusal(scene) or find_missing("flint"):
         return
     # the sense of dry friction at a pin at rest is no question of rounding
     usable = np.flatnonzero((solution.status_code == OK) & ~question.reversing(EQUIVALENCE.factor))
@@ -148,9 +149,9 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         return
     spread = np.linspace(0, len(usable) - 1, SAMPLE).astype(int).tolist()
     indices = usable[
-        np.unique([*spread, *(int(np.argmin(pull[usable])) for pull in _compute_pulls(scene, at, solution))])
+        np.unique([*spread, *(int(np.argmin(pull[usable])) for pull in _compute_pulls(scene, command, solution))])
     ]
-    sampled = select_positions(at, indices)
+    sampled = select_positions(command, indices)
     exact, ours = BallArithmetic().answer(scene, sampled), solve(scene, "error", at=sampled)
     reference = make_reference(scene, exact)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
@@ -171,10 +172,10 @@ def check_error_bars(question: Question) -> Iterator[Row]:
         yield question.row(bar, share, 1.0, reason, tells, float(condition[index]), sampled.theta_2)
 
 
-def _compute_pulls(scene: Scene, at: Command, solution: Solution) -> Iterator[Array]:
+def _compute_pulls(scene: Scene, command: Command, solution: Solution) -> Iterator[Array]:
     """Compute what each spring, torsion spring and load over a table does, by free bodies: (n,), N and N m together."""
     assert solution.theta_3 is not None and solution.theta_4 is not None
-    motion = move(scene.linkage, at.theta_2, *list_speeds(at), solution.theta_3, solution.theta_4)
+    motion = move(scene.linkage, command.theta_2, *list_speeds(command), solution.theta_3, solution.theta_4)
     alone: list[Scene] = [replace(scene, loads=(load,), effects=()) for load in scene.loads if load.table is not None]
     for effect in scene.effects:
         if isinstance(effect, (Springs, Torsion)):
@@ -216,10 +217,10 @@ def check_law(question: Question) -> Iterator[Row]:
     is decided by the accelerations of neighbouring pieces and by the ends alone. Angle, speed and acceleration of
     every position, and the conditions on the pieces, by the worst of them.
     """
-    law, at = question.scene.motion.law, question.at
-    if law is None or at.time is None:
+    law, command = question.scene.motion.law, question.at
+    if law is None or command.time is None:
         return
-    assert isinstance(at.speed, np.ndarray)
+    assert isinstance(command.speed, np.ndarray)
     t, angle = np.array(law.time), np.array(law.angle)
     h, rise = np.diff(t), np.diff(angle) / np.diff(t)
     speed = law.at(t)[1]
@@ -236,14 +237,14 @@ def check_law(question: Question) -> Iterator[Row]:
     else:  # one cubic through the first two pieces, and through the last two
         jerk = (last - first) / h
         errors.append(np.abs([jerk[1] - jerk[0], jerk[-1] - jerk[-2]]) * float(h.min()) / bent)
-    piece = np.clip(np.searchsorted(t, at.time, side="right") - 1, 0, len(h) - 1)
+    piece = np.clip(np.searchsorted(t, command.time, side="right") - 1, 0, len(h) - 1)
     theta, omega, alpha = _interpolate_hermite(
-        at.time - t[piece], angle[piece], speed[piece], first[piece], last[piece], h[piece]
+        command.time - t[piece], angle[piece], speed[piece], first[piece], last[piece], h[piece]
     )
     along = [
-        np.abs(theta - at.angle) / max(1.0, farthest),
-        np.abs(omega - at.speed) / size,
-        np.abs(alpha - at.acceleration) / bent,
+        np.abs(theta - command.angle) / max(1.0, farthest),
+        np.abs(omega - command.speed) / size,
+        np.abs(alpha - command.acceleration) / bent,
     ]
     error = np.max(along, axis=0)
     error[find_worst(error)] = np.max([error[find_worst(error)], *(misfit.max(initial=0.0) for misfit in errors)])

@@ -160,26 +160,26 @@ class Question:
             yield make_breakdown(self.name, engine, error, part)
 
 
-def ask_at(adapter: Adapter, scene: Scene, at: Command) -> Answer:
+def ask_at(adapter: Adapter, scene: Scene, command: Command) -> Answer:
     """Give an engine what is commanded, and nothing that the formulas computed from it."""
-    bare = remove_angles(at)
+    bare = remove_angles(command)
     answer = adapter.answer(scene, bare)
     if answer.at is bare:
-        return replace(answer, at=at)
-    if at.stroke is not None and answer.at is not None:
-        require_near(answer.at, at)
+        return replace(answer, at=command)
+    if command.stroke is not None and answer.at is not None:
+        require_near(answer.at, command)
     return answer
 
 
-def remove_angles(at: Command) -> Command:
+def remove_angles(command: Command) -> Command:
     """Take out of a command by a stroke the bar's motion, which the formulas computed from it: NaN."""
-    if at.stroke is None:
-        return at
-    unknown = np.full_like(at.angle, np.nan)
-    speed = None if at.speed is None else unknown
-    return at._replace(angle=unknown, speed=speed, acceleration=unknown, condition=None, lost=None)
+    if command.stroke is None:
+        return command
+    unknown = np.full_like(command.angle, np.nan)
+    speed = None if command.speed is None else unknown
+    return command._replace(angle=unknown, speed=speed, acceleration=unknown, condition=None, lost=None)
 
 
-def select_positions(at: Command, indices: NDArray[np.intp]) -> Command:
+def select_positions(command: Command, indices: NDArray[np.intp]) -> Command:
     """Take some positions of a command."""
-    return at.part(indices)._replace(remainder=None)
+    return command.part(indices)._replace(remainder=None)

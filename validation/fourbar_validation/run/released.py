@@ -157,13 +157,13 @@ def _compare_forces(question: Question) -> Iterator[Row]:
     what = "a released linkage has no drive"
     yield Row.judged((name, FORMULAS, "exact"), "torque", np.abs(none), 0.0, what, solution.theta_2)
     held = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0), drive_bar=2, drive=None)
-    at = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
+    command = Command(solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
     driven_ones = [
         (
-            Question(name, prescribed, select_positions(at, indices), output=question.output),
+            Question(name, prescribed, select_positions(command, indices), output=question.output),
             take_member(solution, indices),
         )
-        for prescribed, indices in _prescribe(held, at)
+        for prescribed, indices in _prescribe(held, command)
     ]
     for engine in question.engines:
         if engine.tolerance == EQUIVALENCE and "theta_3" in engine.answers and not engine.missing():
@@ -193,25 +193,25 @@ def _compare_forces_by(engine: Engine, driven: Question, solution: Solution) -> 
     return [row for row in rows if row.quantity != "undecided"]
 
 
-def _prescribe(scene: Scene, at: Command) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
+def _prescribe(scene: Scene, command: Command) -> Iterator[tuple[Scene, NDArray[np.intp]]]:
     """Prescribe the instants at which the linkage moves, and each standstill with the couples of dry friction there.
 
     An engine has no friction at rest. A standstill that lasts is held: every pin takes the same part of its torque, and
     no more than all of it; one that ends begins to move against the whole torque.
     """
-    assert at.omega_2 is not None
+    assert command.omega_2 is not None
     friction = next((effect for effect in scene.effects if isinstance(effect, Friction)), None)
-    resting = np.flatnonzero(at.omega_2 == 0.0) if friction is not None else np.empty(0, dtype=int)
-    moving = np.setdiff1d(np.arange(len(at.theta_2)), resting)
+    resting = np.flatnonzero(command.omega_2 == 0.0) if friction is not None else np.empty(0, dtype=int)
+    moving = np.setdiff1d(np.arange(len(command.theta_2)), resting)
     if len(moving):
         yield scene, moving
     if friction is None:
         return
     bare = replace(scene, effects=tuple(effect for effect in scene.effects if effect is not friction))
-    numbers = np.stack((at.theta_2, at.alpha_2), axis=1)[resting]
+    numbers = np.stack((command.theta_2, command.alpha_2), axis=1)[resting]
     for first in resting[np.unique(numbers, axis=0, return_index=True)[1]].tolist():
         index = np.array([first])
-        here = select_positions(at, index)
+        here = select_positions(command, index)
         needed, begins = FreeBody().answer(bare, here).quantities["torque"][0], float(np.sign(here.alpha_2)[0])
         turning = FreeBody().answer(bare, here._replace(speed=np.ones(1))).quantities
         rate = {1: 0.0, 2: 1.0, 3: turning["omega_3"][0], 4: turning["omega_4"][0]}

@@ -134,9 +134,9 @@ def _draw_load(rng: np.random.Generator, linkage: FourBar, weight: float, ranges
     bar = int(rng.choice(MOVING_BARS))
     length, size = linkage.bar(bar).length, weight * ranges.load(rng)
     force = None if rng.random() < ranges.without_force else (size, ANY_ANGLE(rng))
-    at = (length * ranges.arm(rng), ANY_ANGLE(rng))
+    arm = (length * ranges.arm(rng), ANY_ANGLE(rng))
     moment = float(rng.choice([0.0, size * length * EITHER_SIGN(rng)]))
-    return Load(bar, force, at, moment, "bar" if rng.random() < 0.5 else "world")
+    return Load(bar, force, arm, moment, "bar" if rng.random() < 0.5 else "world")
 
 
 def _draw_springs(rng: np.random.Generator, linkage: FourBar, weight: float, ranges: Ranges) -> list[Any]:

@@ -76,9 +76,9 @@ def look(engine: Adapter, linkage: FourBar, places: Iterable[Place]) -> Seen:
     return {place: {name: float(answer[name][i]) for name in names} for i, place in enumerate(ordered)}
 
 
-def require_answer(engine: Adapter, scene: Scene, at: Command) -> Answer:
+def require_answer(engine: Adapter, scene: Scene, command: Command) -> Answer:
     """Give an engine's answer; LimitError where it refuses those positions."""
-    answer = engine.answer(scene, at)
+    answer = engine.answer(scene, command)
     if answer.refusal is not None:
         raise LimitError(answer.refusal)
     return answer

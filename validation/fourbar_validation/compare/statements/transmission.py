@@ -62,8 +62,8 @@ class _Claim(NamedTuple):
 
 def _compare_over(scene: Scene, answer: Answer, predicted: Predicted | None) -> Iterator[Finding]:
     """Compare the worst position of each statement over the scene's own motion."""
-    at = answer.at
-    assert at is not None
+    command = answer.at
+    assert command is not None
     for claim in _list_claims(scene, answer):
         allowed, mask = claim.allowed, claim.where & ~(claim.allowed >= NOTHING_TO_TELL)
         beyond = mask & ~(claim.error <= allowed)
@@ -76,19 +76,17 @@ def _compare_over(scene: Scene, answer: Answer, predicted: Predicted | None) -> 
             mask = mask & ~(allowed >= NOTHING_TO_TELL)
         if mask.any():
             most = np.flatnonzero(mask)[find_worst(find_used(claim.error[mask], allowed[mask]))]
-            yield Finding(float(claim.error[most]), float(allowed[most]), float(at.theta_2[most]), claim.what)
-    yield _compare_distance(scene, at)
+            yield Finding(float(claim.error[most]), float(allowed[most]), float(command.theta_2[most]), claim.what)
+    yield _compare_distance(scene, command)
 
 
 def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
     """List what the formulas state at each position, against the engine's angles and speeds."""
-    at, linkage = answer.at, scene.linkage
-    assert at is not None and at.omega_2 is not None and answer.assembled is not None
-    state, drive = (
-        state_of(linkage, at.theta_2, at.branch),
-        scene.drive_bar or 2,
-    )  # the leverage of a line is a quantity
-    theta = {2: at.theta_2, **{bar: answer.quantities[f"theta_{bar}"] for bar in (3, 4)}}
+    command, linkage = answer.at, scene.linkage
+    assert command is not None and command.omega_2 is not None and answer.assembled is not None
+    state = state_of(linkage, command.theta_2, command.branch)
+    drive = scene.drive_bar or 2  # the leverage of a line is a quantity
+    theta = {2: command.theta_2, **{bar: answer.quantities[f"theta_{bar}"] for bar in (3, 4)}}
     first, second = (theta[bar] for bar in MOVING_BARS if bar != drive)
     angle = np.abs(wrap_angle(theta[4] - theta[3]))
     sine = np.abs(np.sin(angle))
@@ -96,10 +94,11 @@ def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
     closed = answer.assembled & (half.outer >= 0.0) & (half.inner >= 0.0) & ~find_singular(state.position)
     extremes = transmission.transmission_extremes(linkage)
     with np.errstate(divide="ignore", invalid="ignore"):
-        allowed = EQUIVALENCE.factor * count_half_turns(linkage.ground_angle, at.theta_2) / (find_lever(linkage) * sine)
-        ratio = answer.quantities["omega_4"] / at.omega_2
+        half_turns = count_half_turns(linkage.ground_angle, command.theta_2)
+        allowed = EQUIVALENCE.factor * half_turns / (find_lever(linkage) * sine)
+        ratio = answer.quantities["omega_4"] / command.omega_2
         gained = transmission.mechanical_advantage(state, *RADII) * ratio * (RADII[1] / RADII[0]) - 1.0
-        largest = np.maximum(1.0, np.maximum(np.abs(ratio), np.abs(answer.quantities["omega_3"] / at.omega_2)))
+        largest = np.maximum(1.0, np.maximum(np.abs(ratio), np.abs(answer.quantities["omega_3"] / command.omega_2)))
         allowed_gain = allowed / sine * largest / np.abs(ratio)
     # the divisor of every tolerance must not come from the formulas alone
     yield _Claim("condition", np.abs(state.position.sin_mu - np.sin(theta[4] - theta[3])), allowed, closed)
@@ -109,21 +108,21 @@ def _list_claims(scene: Scene, answer: Answer) -> Iterator[_Claim]:
     yield _Claim("transmission angle", np.abs(transmission.transmission_angle(state) - acute), allowed, closed)
     outside = np.maximum(np.maximum(extremes.least - angle, angle - extremes.greatest), 0.0)
     yield _Claim("beyond the extremes", outside, allowed, closed)
-    moving = closed & (at.omega_2 != 0.0) & ~(allowed >= NOTHING_TO_TELL)  # a missing number is none that holds
+    moving = closed & (command.omega_2 != 0.0) & ~(allowed >= NOTHING_TO_TELL)  # a missing number is none that holds
     yield _Claim("mechanical advantage", np.abs(gained), allowed_gain, moving, rates=True)
 
 
-def _compare_distance(scene: Scene, at: Command) -> Finding:
+def _compare_distance(scene: Scene, command: Command) -> Finding:
     """Compare how far it is to a singular position with the limits and dead centres that are stated."""
-    branch, drive = at.branch.astype(float), scene.drive_bar or 2
-    ours = transmission.distance_to_singular(scene.linkage, at.theta_2, drive, branch)
-    theirs = _compute_to_singular(scene, at.theta_2, branch)
+    branch, drive = command.branch.astype(float), scene.drive_bar or 2
+    ours = transmission.distance_to_singular(scene.linkage, command.theta_2, drive, branch)
+    theirs = _compute_to_singular(scene, command.theta_2, branch)
     error = np.where(np.isinf(ours) == np.isinf(theirs), 0.0, math.inf)
     finite = np.isfinite(ours) & np.isfinite(theirs)
     error[finite] = np.abs(ours[finite] - theirs[finite])
     most = int(np.argmax(error))
-    allowed = EPS * 8.0 * (abs(at.theta_2[most]) + abs(scene.linkage.ground_angle) + TURN)
-    return Finding(float(error[most]), float(allowed), float(at.theta_2[most]), "distance to a singular position")
+    allowed = EPS * 8.0 * (abs(command.theta_2[most]) + abs(scene.linkage.ground_angle) + TURN)
+    return Finding(float(error[most]), float(allowed), float(command.theta_2[most]), "distance to a singular position")
 
 
 def _find_collinear(linkage: FourBar) -> list[float]:

@@ -17,7 +17,8 @@ from fourbar.errors import InputError
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.effects import unwind
 from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene
+from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array, ReleasedAnswer
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.loaded import Values
@@ -43,7 +44,7 @@ class MujocoForward:
 
     def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
         """Integrate the motion at the given times, rising from 0 (s)."""
-        setting, start = f"RK4 {self.step:g} s", command(scene)
+        setting, start = f"RK4 {self.step:g} s", command_of(scene)
         interval = float(times[1] - times[0])  # the times are evenly spaced; the step divides the interval
         timestep = interval / math.ceil(interval / self.step - 1e-6)
         settings = replace(RECIPE, flywheel=0.0, timestep=timestep, time_constant_steps=TIME_CONSTANT_STEPS, pad=None)
@@ -110,19 +111,19 @@ class MujocoOneState:
     impedances: tuple[float, ...] = RUNGS
     name: str = ONE_STATE
 
-    def answer(self, scene: Scene, at: Command) -> Answer:
+    def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse a bar that MuJoCo cannot hold."""
         began = time.perf_counter()
         setting = "extrapolated" if len(self.impedances) > 1 else f"d = {self.impedances[0]:g}"
         try:
-            rungs = [_compute_at_impedance(scene, at, d) for d in self.impedances]
+            rungs = [_compute_at_impedance(scene, command, d) for d in self.impedances]
         except InputError as error:
             return Answer(ONE_STATE, setting, refusal=str(error))
         values, assembled = extrapolate(self.impedances, [rung for rung, _ in rungs]), rungs[0][1]
         return Answer(
             ONE_STATE,
             setting,
-            at,
+            command,
             assembled,
             values,
             shared="lengths, masses, inertias, centres, loads and effects as MJCF text; the command",
@@ -138,7 +139,7 @@ def extrapolate(impedances: tuple[float, ...], rungs: list[dict[str, Array]]) ->
     return {name: sum(w * rung[name] for w, rung in zip(weights, rungs, strict=True)) for name in rungs[0]}  # type: ignore[misc]
 
 
-def _compute_at_impedance(scene: Scene, at: Command, d: float) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+def _compute_at_impedance(scene: Scene, command: Command, d: float) -> tuple[dict[str, Array], NDArray[np.bool_]]:
     """Compute torque and pin forces at every position that assembles."""
     # no flywheel: the torque is on the driven bar itself
     settings = Settings(timestep=1e-3, impedance=d, pad=None, flywheel=0.0)
@@ -149,4 +150,4 @@ def _compute_at_impedance(scene: Scene, at: Command, d: float) -> tuple[dict[str
         torque = loop.solve_drive(scene.drive_bar, alpha_2, (0.0, 1.0), refinements=1)
         return {drive: math.nan if torque is None else torque, **loop.forces()}
 
-    return read_each(loop, at, (drive, *PIN_FORCES), read)[:2]
+    return read_each(loop, command, (drive, *PIN_FORCES), read)[:2]

@@ -25,7 +25,7 @@ SPEED = 100.0 * SIMULATED.factor
 """Allowed error of the speed, from loads and the closure in as many steps; ten times what was measured."""
 
 
-def compare_shipped(name: str, scene: Scene, at: Command) -> Row | None:
+def compare_shipped(name: str, scene: Scene, command: Command) -> Row | None:
     """Compare the file's rest pose, its keyframe and its drive; give the worst, None where nothing moves."""
     omega = scene.motion.omega_2
     if not omega or scene.motion.law is not None:
@@ -40,14 +40,14 @@ def compare_shipped(name: str, scene: Scene, at: Command) -> Row | None:
     def closed(what: str) -> None:
         mujoco.mj_forward(loop.model, d)
         errors.append((math.hypot(*loop.gap()) / (OPEN * size), f"{what}: the loop is open"))
-        wrong_branch = float(loop.branch() != at.branch[0]) if scene.motion.through == "sign" else 0.0
-        errors.append((math.inf if wrong_branch else 0.0, f"{what}: not {BRANCH_NAMES[int(at.branch[0])]}"))
+        wrong_branch = float(loop.branch() != command.branch[0]) if scene.motion.through == "sign" else 0.0
+        errors.append((math.inf if wrong_branch else 0.0, f"{what}: not {BRANCH_NAMES[int(command.branch[0])]}"))
 
     mujoco.mj_resetData(loop.model, d)
     closed("as it opens")
     mujoco.mj_resetDataKeyframe(loop.model, d, 0)
     closed("keyframe")
-    first = at.theta_2[np.argmin(np.abs(np.angle(np.exp(1j * (at.theta_2 - d.qpos[O2])))))]
+    first = command.theta_2[np.argmin(np.abs(np.angle(np.exp(1j * (command.theta_2 - d.qpos[O2])))))]
     apart = abs(math.remainder(float(first - d.qpos[O2]), math.tau))
     errors.append((apart / (K * EPS * max(1.0, abs(float(first)))), "keyframe: theta_2 is none of the scene's"))
     errors.append((abs(float(d.qvel[O2]) / omega - 1.0) / (K * EPS), "keyframe: omega_2"))

@@ -18,7 +18,8 @@ import numpy as np
 from fourbar.errors import FourBarError, InputError, LimitError
 from fourbar.linkage import PINS
 from fourbar.mjcf import choose_run, size_flywheel, write_mjcf
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene
+from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.engines.description import Value, list_unknowns, name_driving
 from fourbar_validation.engines.loaded import Assembled, Values
@@ -105,22 +106,23 @@ def examine_changed(scene: Scene, changes: Sequence[tuple[str, Value | None]]) -
 
 
 def _list_answers(loop: "UserLoop", scene: Scene) -> list[Answer]:
-    at = _choose_positions(command(scene))
-    answers = [_answer(ONE_STATE, scene, lambda: answer_one_state(loop, at))]
-    if at.omega_2 is not None and np.any(at.omega_2) and np.ptp(at.theta_2) > 0.0:
-        answers.append(_answer(THROUGH_TIME, scene, lambda: answer_through_time(loop, at)))
+    command = _choose_positions(command_of(scene))
+    answers = [_answer(ONE_STATE, scene, lambda: answer_one_state(loop, command))]
+    if command.omega_2 is not None and np.any(command.omega_2) and np.ptp(command.theta_2) > 0.0:
+        answers.append(_answer(THROUGH_TIME, scene, lambda: answer_through_time(loop, command)))
     return answers
 
 
-def _choose_positions(at: Command) -> Command:
+def _choose_positions(command: Command) -> Command:
     """Choose at most so many of the positions, spread evenly."""
-    n = len(at.theta_2)
-    if at.omega_2 is None:
+    n = len(command.theta_2)
+    if command.omega_2 is None:
         raise InputError("motion.omega_2", None, "is needed: without a speed there is no torque to compare")
-    if np.ptp(at.omega_2) != 0.0 or np.ptp(at.alpha_2) != 0.0:
+    if np.ptp(command.omega_2) != 0.0 or np.ptp(command.alpha_2) != 0.0:
         raise LimitError("omega_2 or alpha_2 differs from position to position: that is no one motion through time")
     keep = np.unique(np.linspace(0, n - 1, min(n, POSITIONS)).round().astype(int))
-    return Command(at.theta_2[keep], at.branch[keep], float(np.max(at.omega_2)), float(np.max(at.alpha_2)))
+    omega_2, alpha_2 = float(np.max(command.omega_2)), float(np.max(command.alpha_2))
+    return Command(command.theta_2[keep], command.branch[keep], omega_2, alpha_2)
 
 
 def _answer(name: str, scene: Scene, ask: Callable[[], Answer]) -> Answer:
@@ -266,7 +268,7 @@ class UserLoop(Assembled):
         return body == bearer
 
 
-def answer_one_state(loop: UserLoop, at: Command) -> Answer:
+def answer_one_state(loop: UserLoop, command: Command) -> Answer:
     """Answer every position by itself."""
     contacts = 0
 
@@ -280,34 +282,34 @@ def answer_one_state(loop: UserLoop, at: Command) -> Answer:
         contacts = max(contacts, int(loop.data.ncon))
         return values
 
-    out, assembled, gap = read_each(loop, at, [*list_unknowns(loop.scene), *MADE], read)
+    out, assembled, gap = read_each(loop, command, [*list_unknowns(loop.scene), *MADE], read)
     if contacts:
         loop.notes.append(f"{contacts} contacts at a position where nothing but pins should touch")
     evidence = {"closure_gap_m": gap, "contacts": float(contacts)}
-    return Answer(ONE_STATE, "as compiled", at, assembled, out, evidence=evidence)
+    return Answer(ONE_STATE, "as compiled", command, assembled, out, evidence=evidence)
 
 
-def answer_through_time(loop: UserLoop, at: Command) -> Answer:
+def answer_through_time(loop: UserLoop, command: Command) -> Answer:
     """Run the longest segment of positions that assembles at the file's own timestep."""
     model, data = loop.model, mujoco.MjData(loop.model)
     data.eq_active[:] = loop.data.eq_active
     if loop.crank is None:
         raise LimitError("pin O2 is not a hinge in this file: nothing can keep its crank at a speed")
-    assert isinstance(at.omega_2, float) and isinstance(at.alpha_2, float)
+    assert isinstance(command.omega_2, float) and isinstance(command.alpha_2, float)
     position = Assembler(loop)
-    order = order_in_time(at.theta_2, None, at.omega_2)
-    segment = max(split_segments(find_assembled(position, at, order), order), key=len, default=[])
+    order = order_in_time(command.theta_2, None, command.omega_2)
+    segment = max(split_segments(find_assembled(position, command, order), order), key=len, default=[])
     if len(segment) < 2:
         raise LimitError("nowhere do two neighbouring positions assemble in this file")
-    run = choose_run(at.theta_2[segment], at.omega_2, at.alpha_2)
+    run = choose_run(command.theta_2[segment], command.omega_2, command.alpha_2)
     timestep, sense = float(model.opt.timestep), loop.topology.sense["O2"]
     steps = run.time(run.stop) / timestep
     if not 1.0 <= steps <= MOST_STEPS:
         raise LimitError(
             f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion; must be 1 to {MOST_STEPS}"
         )
-    position.find(float(at.theta_2[segment[0]]), int(at.branch[segment[0]]))
-    data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(at.omega_2)
+    position.find(float(command.theta_2[segment[0]]), int(command.branch[segment[0]]))
+    data.qpos[:], data.qvel[:] = loop.data.qpos, loop.speeds(command.omega_2)
     heavy = max(loop.armature, size_flywheel(loop.scene))
     names = [*list_unknowns(loop.scene), *MADE]
     out, seen = make_blank(len(segment), names), {"closure_gap_m": 0.0, "speed_error": 0.0}
@@ -315,8 +317,8 @@ def answer_through_time(loop: UserLoop, at: Command) -> Answer:
     stepper = Stepper(model, data, timestep)
     for i, index in enumerate(segment):
         model.dof_armature[loop.crank] = heavy
-        data.qfrc_applied[loop.crank] = heavy * sense * at.alpha_2
-        stepper.to(run.time(float(at.theta_2[index])))
+        data.qfrc_applied[loop.crank] = heavy * sense * command.alpha_2
+        stepper.to(run.time(float(command.theta_2[index])))
         mujoco.mj_forward(model, data)
         if stepper.lost() or any(data.warning[kind].number for kind in WARNINGS):
             alarms.append("the simulation of this file blew up")
@@ -325,12 +327,12 @@ def answer_through_time(loop: UserLoop, at: Command) -> Answer:
         model.dof_armature[loop.crank] = loop.armature
         values = loop.ask(data.qpos.copy(), data.qvel.copy(), alpha_2)
         seen["closure_gap_m"] = max(seen["closure_gap_m"], float(np.hypot(*loop.gap())))
-        seen["speed_error"] = max(seen["speed_error"], abs(float(values["omega_2"]) / at.omega_2 - 1.0))
+        seen["speed_error"] = max(seen["speed_error"], abs(float(values["omega_2"]) / command.omega_2 - 1.0))
         for name, array in out.items():
             array[i] = values[name]
     model.dof_armature[loop.crank] = loop.armature
     finite = np.isfinite(out["theta_2"])
     out = {name: array[finite] for name, array in out.items()}
-    motion, _ = split_answer(out, at.branch[segment][finite])
+    motion, _ = split_answer(out, command.branch[segment][finite])
     setting = f"{mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix('mjINT_')} {timestep:g} s"
     return Answer(THROUGH_TIME, setting, motion, np.ones(finite.sum(), dtype=bool), out, evidence=seen, alarms=alarms)

@@ -11,7 +11,8 @@ import numpy as np
 
 import fourbar
 from fourbar.linkage import ENDS, MOVING_BARS, PIN_FORCE, PINS
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene
+from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.rows import Row
@@ -43,9 +44,9 @@ CUT = ErrorBound(
 def internal_forces(question: Question) -> list[Row]:
     """Judge N, V, M of each bar at a few cuts and positions, and that no cut bends more than the largest moment."""
     scene = take_few(question)
-    at = command(scene)
-    answer, solution = ask_free_bodies(scene, at), fourbar.solve(scene)
-    motion = _move(scene, at, answer)
+    command = command_of(scene)
+    answer, solution = ask_free_bodies(scene, command), fourbar.solve(scene)
+    motion = _move(scene, command, answer)
     rows = []
     for bar in MOVING_BARS:
         length = scene.linkage.bar(bar).length
@@ -64,11 +65,11 @@ def internal_forces(question: Question) -> list[Row]:
     return rows
 
 
-def _move(scene: Scene, at: Command, answer: Answer) -> BodyMotion:
+def _move(scene: Scene, command: Command, answer: Answer) -> BodyMotion:
     """Move the bars as the free bodies have them."""
     theta = [answer.quantities[f"theta_{bar}"] for bar in MOVING_BARS]
-    omega, alpha = (answer.quantities[f"{name}_{at.bar}"] for name in ("omega", "alpha"))
-    return move(scene.linkage, theta[0], omega, alpha, theta[1], theta[2], at.bar)
+    omega, alpha = (answer.quantities[f"{name}_{command.bar}"] for name in ("omega", "alpha"))
+    return move(scene.linkage, theta[0], omega, alpha, theta[1], theta[2], command.bar)
 
 
 @dataclass
@@ -92,13 +93,13 @@ class _Piece(BodyWrenches):
         """Add a force, world axes, at an arm from the bar's first pin, to the piece on which its foot lies."""
         if bar != self.bar:
             return
-        turned, at = (np.conj(self.motion.unit[bar]) * vector for vector in (force, arm))
-        beyond = at.real > self.cut
+        turned, lever = (np.conj(self.motion.unit[bar]) * vector for vector in (force, arm))
+        beyond = lever.real > self.cut
         self.N += np.where(beyond, turned.real, 0.0)
         self.V -= np.where(beyond, turned.imag, 0.0)
-        self.M += np.where(beyond, (at.real - self.cut) * turned.imag - at.imag * turned.real, 0.0)
+        self.M += np.where(beyond, (lever.real - self.cut) * turned.imag - lever.imag * turned.real, 0.0)
         self.pushing += np.abs(turned)
-        self.turning += np.abs(turned) * (np.abs(at) + abs(self.cut))
+        self.turning += np.abs(turned) * (np.abs(lever) + abs(self.cut))
 
     def twist(self, bar: int, couple: Any) -> None:
         """Add a couple, to the piece on which its place lies."""

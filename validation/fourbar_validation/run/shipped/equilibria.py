@@ -115,9 +115,9 @@ def _list_samples(question: Question) -> Array:
 
 def _hold(scene: Scene, angle: Array, branch: int) -> Array:
     """Ask the free bodies for the torque on the input at rest; NaN where it is ill-conditioned or does not assemble."""
-    at = Command(angle, np.full(angle.shape, branch, dtype=np.int8), np.zeros(angle.shape), np.zeros(angle.shape))
+    command = Command(angle, np.full(angle.shape, branch, dtype=np.int8), np.zeros(angle.shape), np.zeros(angle.shape))
     with np.errstate(all="ignore"):
-        answer = FreeBody().answer(scene, at)
+        answer = FreeBody().answer(scene, command)
         if answer.refusal is not None:
             raise NotAskedError(answer.refusal)
         if "torque" not in answer.quantities:  # no position assembles
@@ -134,12 +134,12 @@ def _count_missed(scene: Scene, branch: int, theta_2: Array, torque: Array, plac
     not counted, nor one at an end of which 320 bits find another sign than the free bodies, or none.
     """
     counted, open_steps = np.zeros(len(torque) - 1, dtype=int), ~np.isfinite(torque[:-1] * torque[1:])
-    for place, off in places:
-        at = theta_2[0] + np.remainder(place - theta_2[0], 2.0 * np.pi)
-        index = int(np.searchsorted(theta_2, at)) - 1
+    for angle, off in places:
+        turned = theta_2[0] + np.remainder(angle - theta_2[0], 2.0 * np.pi)
+        index = int(np.searchsorted(theta_2, turned)) - 1
         if 0 <= index < len(counted):
             counted[index] += 1
-        first, last = (int(np.searchsorted(theta_2, end)) - 1 for end in (at - off, at + off))
+        first, last = (int(np.searchsorted(theta_2, end)) - 1 for end in (turned - off, turned + off))
         if first != last:
             open_steps[max(first, 0) : max(last + 1, 0)] = True
     differing = ~open_steps & ((torque[:-1] * torque[1:] < 0.0) != (counted % 2 == 1))

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from fourbar.files import dump, loads
 from fourbar.quantities import LINE, OK, SCALARS, UNKNOWNS
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene
+from fourbar.scene import command as command_of
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer, Array
 from fourbar_validation.compare.compare import COMPARED, Comparison, Held
@@ -41,7 +42,7 @@ def take_few(question: Question) -> Scene:
 
     Raises NotAskedError where there are none.
     """
-    scene, at, solution = question.scene, question.at, question.solution
+    scene, command, solution = question.scene, question.at, question.solution
     if scene.motion.law is not None:
         raise NotAskedError("a motion law has no positions of its own choice")
     reference = question.reference
@@ -51,8 +52,8 @@ def take_few(question: Question) -> Scene:
         & (reference.condition >= WELL_CONDITIONED)
         & np.isfinite(reference.F12).all(axis=1)
     )
-    fit &= (reference.drive_condition >= WELL_CONDITIONED) & (at.branch == scene.motion.branch)
-    fit &= ~mark_reversing(scene, solution, NOT_AT_REST) & (np.asarray(at.speed) != 0.0)
+    fit &= (reference.drive_condition >= WELL_CONDITIONED) & (command.branch == scene.motion.branch)
+    fit &= ~mark_reversing(scene, solution, NOT_AT_REST) & (np.asarray(command.speed) != 0.0)
     for load in scene.loads:
         for corner in () if load.table is None else load.table.theta_2:
             fit &= np.abs(np.angle(np.exp(1j * (solution.theta_2 - corner)))) > FROM_A_CORNER
@@ -60,7 +61,7 @@ def take_few(question: Question) -> Scene:
     if not len(indices):
         raise NotAskedError("no position that is well-conditioned and moves")
     few = indices[np.unique(np.linspace(0, len(indices) - 1, SAMPLE + 2).astype(int)[1:-1])]
-    return at_places(replace(scene, title="", source="", pictures=()), at.places[few])
+    return at_places(replace(scene, title="", source="", pictures=()), command.places[few])
 
 
 def at_places(scene: Scene, places: Array) -> Scene:
@@ -141,10 +142,10 @@ def _write_toml(value: Any) -> str:
     return "[" + ",\n".join(map(_write_toml, value)) + "]" if isinstance(value, list) else json.dumps(value)
 
 
-def ask_free_bodies(scene: Scene, at: Command | None = None) -> Answer:
+def ask_free_bodies(scene: Scene, command: Command | None = None) -> Answer:
     """Ask the free bodies at the scene's own positions, or others."""
     with np.errstate(all="ignore"):
-        return ask_at(FreeBody(), scene, command(scene) if at is None else at)
+        return ask_at(FreeBody(), scene, command_of(scene) if command is None else command)
 
 
 def hold_to(question: Question, engine: str, scene: Scene, solution: Solution, answer: Answer) -> list[Row]:
