@@ -1,4 +1,4 @@
-"""Solver of a scene: block by block over the positions, stage by stage, no further than wanted."""
+"""Solver of a scene: block by block over the positions, stage by stage, no further than last_stage."""
 
 import cmath
 from collections.abc import Iterable, Iterator, KeysView, Mapping
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import BLOCK, Case, Evaluated
-from fourbar.evaluation.evaluate import ERROR, FORCE, evaluate, withhold_in_place
+from fourbar.evaluation.evaluate import ERROR, FORCE, evaluate, withhold_infinite
 from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
 from fourbar.quantities import (
     ANGLES,
@@ -102,18 +102,20 @@ def solve(
     else:
         commanded = command(scene)
     shape = commanded.angle.shape
-    wanted, names = find_requested(scene, shape, commanded, stage, out)
+    last_stage, names = find_requested(scene, shape, commanded, stage, out)
     code = np.zeros(shape, dtype=np.uint8)
     with np.errstate(all="ignore"):
         arrays = None
         if shape == (1,) and study is None and commanded.independent is None and out is None:
-            arrays = _solve_alone(_begin(scene, commanded, wanted, side), commanded, wanted, names, code)
+            arrays = _solve_alone(_begin(scene, commanded, last_stage, side), commanded, last_stage, names, code)
         if arrays is None:
             arrays, evaluated = make_arrays(names, shape, out), None
-            blocks = _list_members(study, wanted, side) if study else _list_blocks(scene, commanded, wanted, side)
+            blocks = (
+                _list_members(study, last_stage, side) if study else _list_blocks(scene, commanded, last_stage, side)
+            )
             for part, case, block in blocks:
                 # kept until the next block is evaluated, so that its memory is used again
-                evaluated = evaluate(case, block, wanted, names)
+                evaluated = evaluate(case, block, last_stage, names)
                 _store_block(case, evaluated, arrays, code, part)
     unwrap_angles(arrays, commanded.bar)
     if commanded.stroke is not None:
@@ -126,10 +128,10 @@ def solve(
     return solution
 
 
-def _begin(scene: Scene, commanded: Command, wanted: int, side: int) -> Case:
+def _begin(scene: Scene, commanded: Command, last_stage: int, side: int) -> Case:
     """Make the case of one linkage, with effects that count turns from where the motion begins."""
     case = Case.of(scene, commanded.bar)._replace(side=side)
-    if wanted < FORCE or not scene.counts_turns:
+    if last_stage < FORCE or not scene.counts_turns:
         return case
     if commanded.independent is not None:
         return case.with_start(commanded.part(slice(0, 1)))
@@ -137,11 +139,11 @@ def _begin(scene: Scene, commanded: Command, wanted: int, side: int) -> Case:
     return case.with_start(stated if stated.bar == commanded.bar else commanded)
 
 
-def _list_blocks(scene: Scene, commanded: Command, wanted: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
+def _list_blocks(scene: Scene, commanded: Command, last_stage: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
     """List the positions of one linkage block by block, those of a released one by their independent angle."""
-    case, free = _begin(scene, commanded, wanted, side), commanded.independent
+    case, free = _begin(scene, commanded, last_stage, side), commanded.independent
     if free is None:
-        for part in _split(len(commanded.angle), BLOCK if wanted < ERROR else LONG_BLOCK):
+        for part in _split(len(commanded.angle), BLOCK if last_stage < ERROR else LONG_BLOCK):
             yield (part,), case, commanded.part(part)
         return
     for bar in (2, 4):
@@ -150,11 +152,11 @@ def _list_blocks(scene: Scene, commanded: Command, wanted: int, side: int) -> It
             yield (index,), case.freed(bar, free.side[index]), commanded.part(index)
 
 
-def _list_members(study: Members, wanted: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
+def _list_members(study: Members, last_stage: int, side: int) -> Iterator[tuple[Part, Case, Command]]:
     """List the positions of many linkages block by block, each number repeated for the positions of its member."""
-    (m, n), size = study.at.angle.shape, BLOCK if wanted < ERROR else LONG_BLOCK
+    (m, n), size = study.at.angle.shape, BLOCK if last_stage < ERROR else LONG_BLOCK
     for rows in _split(m, max(1, size // n)):
-        begins = study.begin(rows) if wanted >= FORCE else study.scene
+        begins = study.begin(rows) if last_stage >= FORCE else study.scene
         for columns in _split(n, size):
             scene = study.members(rows, columns.stop - columns.start, begins)
             yield (
@@ -188,7 +190,7 @@ def _store_block(
 ) -> None:
     """Write what was evaluated into the arrays of all positions, where it is no number with the status that says so."""
     codes, values, _ = evaluated
-    withhold_in_place(case, evaluated)
+    withhold_infinite(case, evaluated)
     shape = code[part].shape
     code[part] = codes.reshape(shape)
     for name, value in values.items():
@@ -259,8 +261,8 @@ def find_requested(
             stage = "position" if commanded.speed is None else "force"
         if not isinstance(stage, str) or stage not in STAGES:
             raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
-        wanted = STAGES.index(stage)
-        names = _list_names(wanted, _list_absent(scene), tuple(point.name for point in scene.points))
+        last_stage = STAGES.index(stage)
+        names = _list_names(last_stage, _list_absent(scene), tuple(point.name for point in scene.points))
     else:
         expect("out", out, Mapping)
         names = out.keys()
@@ -274,10 +276,10 @@ def find_requested(
             if array.shape != wanted_shape or array.dtype != np.float64 or not array.flags.writeable:
                 allowed = f"must be float64 of shape {wanted_shape}, writeable"
                 raise InputError(f"out.{name}", (array.shape, str(array.dtype)), allowed)
-        wanted = max((STAGES.index(stages[name]) for name in out), default=0)
-    if wanted > 0 and commanded.speed is None:
-        raise InputError(f"motion.omega_{commanded.bar}", None, f"is needed for the stage {STAGES[wanted]!r}")
-    return wanted, names if commanded.bar == 2 else {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
+        last_stage = max((STAGES.index(stages[name]) for name in out), default=0)
+    if last_stage > 0 and commanded.speed is None:
+        raise InputError(f"motion.omega_{commanded.bar}", None, f"is needed for the stage {STAGES[last_stage]!r}")
+    return last_stage, names if commanded.bar == 2 else {**dict.fromkeys(names), "theta_2": None, "sin_mu": None}.keys()
 
 
 def make_arrays(names: Iterable[str], shape: tuple[int, ...], out: Mapping[str, Array] | None) -> dict[str, Array]:
@@ -294,9 +296,9 @@ def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
 
 
 @cache
-def _list_names(wanted: int, absent: tuple[str, ...], points: tuple[str, ...]) -> KeysView[str]:
-    """List the quantities of the stages up to the last one wanted."""
-    before = STAGES[: wanted + 1]
+def _list_names(last_stage: int, absent: tuple[str, ...], points: tuple[str, ...]) -> KeysView[str]:
+    """List the quantities of the stages up to the last one last_stage."""
+    before = STAGES[: last_stage + 1]
     return {
         name: stage for name, stage in _list_stages(points).items() if stage in before and name not in absent
     }.keys()
@@ -335,14 +337,14 @@ def unwrap_angles(arrays: Mapping[str, Array], bar: int) -> None:
 
 
 def _solve_alone(
-    case: Case, commanded: Command, wanted: int, names: KeysView[str], code: NDArray[np.uint8]
+    case: Case, commanded: Command, last_stage: int, names: KeysView[str], code: NDArray[np.uint8]
 ) -> dict[str, Array] | None:
     """Solve a single position in plain numbers, for arrays of one entry cost several times as much.
 
     None where any is no number: there NumPy goes on with inf and NaN, and statuses follow.
     """
     try:
-        codes, values, _ = evaluate(case, commanded.part((0,)), wanted, names)
+        codes, values, _ = evaluate(case, commanded.part((0,)), last_stage, names)
     except ArithmeticError:
         return None
     code[0] = codes

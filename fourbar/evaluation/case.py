@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 BLOCK = 8000
 """Positions evaluated at a time, measured: fewer pay for calls, more leave the cache. Of 8192 an array of complex
 numbers is a little more than the C library hands out again without asking the system for fresh pages, and from 10 000
-on OpenBLAS starts threads for the squares by which `withheld` looks for what is no number."""
+on OpenBLAS starts threads for the squares by which `is_finite` looks for what is no number."""
 UNDECIDED = 32.0 * U
 """A factor of Heron's formula smaller than this times its terms is evaluated in many digits: in doubles it is wrong
 by at most about 12 U times them."""
 NO_POSITIONS = np.empty(0, dtype=np.intp)
 NO_MOTION = Coefficients(*[np.nan] * 8)
-"""Coefficients of NaN, used where only positions are wanted."""
+"""Coefficients of NaN, used where only positions are evaluated."""
 Evaluated = tuple[NDArray[np.uint8], dict[str, Any], Position | None]
 """Status codes and quantities of some positions, vectors as x + i y, and where the drive must balance."""
 

@@ -1,8 +1,8 @@
 """Positions of a case evaluated stage by stage: kinematics, forces, error bars, and what has no value.
 
-The error bars are what the forces differ by from the same formulas in longer numbers. What is stated of the bars,
-loads, effects and of the command is exact, as doubles; everything else is computed again, with numbers whose own
-roundings are a thousandth of those of doubles or less.
+The error bar of a force is its distance to the value that the same formulas give in longer numbers. The stated numbers
+of bars, loads, effects and command are taken as exact; everything else is computed again, in numbers that round at
+most a thousandth as much as doubles.
 """
 
 import cmath
@@ -43,11 +43,11 @@ WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 """Statuses of positions at which an effect or the drive has no value, and so the forces have none."""
 
 
-def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) -> Evaluated:
-    """Evaluate a command, up to the last stage that the quantities named need.
+def evaluate(case: Case, command: Command, last_stage: int, names: KeysView[str]) -> Evaluated:
+    """Evaluate the named quantities at the positions of a command, up to the last stage that they need.
 
-    `command`: positions (n,), or one in plain numbers. Of a released motion the independent angle decides, and the
-    drive does nothing.
+    `command`: positions (n,), or one in plain numbers. In a released motion the independent angle fixes the position,
+    and the drive exerts nothing.
     """
     free, branch = command.independent, find_sign(command.branch)
     q: Any = command.angle
@@ -57,7 +57,10 @@ def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) ->
     elif q.ndim == 0:
         q = q.item()  # with Python's own numbers a formula takes half the time
     speed = 0.0 if speed is None else speed
-    half, exact = case.half_angle(q, command.remainder) if free is None else (case.path.half_angle(q), NO_POSITIONS)
+    if free is None:
+        half, refined_rows = case.half_angle(q, command.remainder)
+    else:
+        half, refined_rows = case.path.half_angle(q), NO_POSITIONS
     of_angles = command.bar == 2 and len(names) <= len(ANGLES) and set(names) <= set(ANGLES)
     if of_angles and free is None and command.remainder is None and not case.path.may_stay_parallel:
         return _evaluate_angles(case, half, branch, names)
@@ -65,20 +68,20 @@ def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) ->
     codes = _compute_codes(position.sin_mu, half, command) if free is None else np.zeros(q.shape, dtype=np.uint8)
     if is_any(codes):  # velocities are 0/0
         position = position._replace(root=np.where(codes == SINGULAR, np.nan, position.root))
-    state = case.state(q, position, branch, speed, acceleration, moving=wanted > 0)
+    state = case.state(q, position, branch, speed, acceleration, moving=last_stage > 0)
     if free is not None:
         state = state._replace(theta_2=command.angle)
     values = list_kinematics(case, state if free is None else state._replace(bar=2), names)
     if command.condition is not None and "condition" in names:
         values["condition"] = values["condition"] * command.condition
-    if wanted >= FORCE:
+    if last_stage >= FORCE:
         acting = case if free is None else case._replace(drive=None)
         dynamics = acting.dynamics(state, acceleration, case.side)
         counted = command.branch if free is None else None
-        bars = {}
-        if wanted == ERROR:
-            bars = compute_error_bars(acting, command, state, acceleration, branch, dynamics, exact)
-        codes, forces = _list_forces(acting, state, acceleration, counted, codes, names, dynamics, bars)
+        error_bars = {}
+        if last_stage == ERROR:
+            error_bars = compute_error_bars(acting, command, state, acceleration, branch, dynamics, refined_rows)
+        codes, forces = _list_forces(acting, state, acceleration, counted, codes, names, dynamics, error_bars)
         if free is not None:
             forces |= {name: np.zeros(codes.shape) for name in (*case.names, "power")}
         values |= {name: value for name, value in forces.items() if name in names}
@@ -86,7 +89,7 @@ def evaluate(case: Case, command: Command, wanted: int, names: KeysView[str]) ->
 
 
 def _compute_codes(sine: Any, half: HalfAngle, command: Command | None, unit: float = 1.0) -> Any:
-    """Compute statuses of positions from the sine of the transmission angle, or a multiple of it by `unit`."""
+    """Compute the status of each position from the sine of the transmission angle, times `unit`."""
     size, margin = abs(sine), NO_DIGIT_LEFT * unit
     if command is not None and command.remainder is not None:
         margin = 0.0  # known in many digits
@@ -98,7 +101,7 @@ def _compute_codes(sine: Any, half: HalfAngle, command: Command | None, unit: fl
     if not np.min(size, initial=np.inf) > margin:  # NaN where the loop does not close
         codes[size <= margin] = SINGULAR
         codes[np.isnan(sine)] = NOT_ASSEMBLED
-        codes[np.isnan(half.kk)] = OVERFLOW  # of theta_2 - theta_1, so that nothing is known of the loop
+        codes[np.isnan(half.kk)] = OVERFLOW  # theta_2 - theta_1 overflows, so the loop cannot be evaluated
     return codes
 
 
@@ -110,7 +113,7 @@ def find_sign(branch: NDArray[np.int8]) -> Any:
 
 
 def _evaluate_angles(case: Case, half: HalfAngle, branch: Any, names: KeysView[str]) -> Evaluated:
-    """Evaluate the two angles only: without vectors and the rest of the triangle."""
+    """Evaluate theta_3 and theta_4 alone, without the vectors of the bars."""
     theta_3, theta_4, root = case.path.angles(half, branch)
     codes = _compute_codes(root, half, None, 2.0 * case.path.lengths.b * case.path.lengths.c)
     angles = {"theta_3": theta_3, "theta_4": theta_4}
@@ -125,14 +128,14 @@ def _list_forces(
     codes: Any,
     names: KeysView[str],
     dynamics: Dynamics,
-    bars: dict[str, Any],
+    error_bars: dict[str, Any],
 ) -> tuple[Any, dict[str, Any]]:
-    """List the quantities of the force stage, error bars among them, with the statuses of the effects.
+    """List the quantities of the force stage, error bars included, and the statuses with those of the effects.
 
-    `branch`: of each position; None where no effect counts turns by it.
+    `branch`: the branch of each position, by which effects count turns; None for a released motion.
     """
     drive_names = case.names
-    values: dict[str, Any] = {**dynamics.pins._asdict(), drive_names.value: dynamics.drive, **bars}
+    values: dict[str, Any] = {**dynamics.pins._asdict(), drive_names.value: dynamics.drive, **error_bars}
     if "power" in names:
         values["power"] = dynamics.drive * case.drive_speed(state)
     if "drive_condition" in names:
@@ -169,53 +172,56 @@ def compute_error_bars(
     acceleration: Any,
     sign: Any,
     dynamics: Dynamics,
-    exact: NDArray[np.intp],
+    refined_rows: NDArray[np.intp],
 ) -> dict[str, Any]:
-    """Compute that of the drive (N m or N) and `force_error` (N, worst of the four pin forces), by name, each (n,).
+    """Compute the error bars of the drive (N m or N) and of the pin forces (N, the worst of the four), by name, (n,).
 
     Parameters
     ----------
-    state, acceleration, sign, dynamics : the evaluation that the error bars are for; the sign is that of the root.
-    exact : indices of the positions whose half angle is known in many digits.
+    state, acceleration, dynamics : evaluation in doubles, to which the error bars belong.
+    sign : branch, the sign of the root.
+    refined_rows : indices of the positions whose half angle is evaluated in many digits.
     """
-    longer, angle = case.lengthened(), state.theta_2 if state.q is None else state.q
+    longer, driven_angle = case.lengthened(), state.theta_2 if state.q is None else state.q
     lost, remainder = command.lost, command.remainder
     if lost is None:
         lost = np.array([0.0 if remainder is None else float(remainder), 0.0, 0.0])
-    numbers = enumerate((angle, state.speed, acceleration))
-    q, speed, growth = (lengthen(number) + lost[..., place] for place, number in numbers)
+    numbers = enumerate((driven_angle, state.speed, acceleration))
+    q, speed, longer_acceleration = (lengthen(number) + lost[..., place] for place, number in numbers)
     half = longer.path.half_angle(q)
-    if exact.size:
+    if refined_rows.size:
         from fourbar.formulas.many_digits import decide_half_angles
 
         left_out = 0.0 if remainder is not None else lost[..., 0]
-        half = decide_half_angles(case.linkage, case.path.unit, half, exact, angle, remainder, case.path.bar, left_out)
-    near = longer.assemble(q, half, sign, speed, growth)
-    longer_dynamics = longer.dynamics(near, growth, case.side)
+        half = decide_half_angles(
+            case.linkage, case.path.unit, half, refined_rows, driven_angle, remainder, case.path.bar, left_out
+        )
+    near = longer.assemble(q, half, sign, speed, longer_acceleration)
+    longer_dynamics = longer.dynamics(near, longer_acceleration, case.side)
     pairs = zip((*dynamics.pins, dynamics.drive), (*longer_dynamics.pins, longer_dynamics.drive), strict=True)
     *gaps, drive_gap = (np.abs(shorten(after - before)) for before, after in pairs)
-    drive_error = compute_bar(drive_gap, np.abs(dynamics.drive))
-    force_error = compute_bar(reduce(np.maximum, gaps), reduce(np.maximum, map(np.abs, dynamics.pins)))
+    drive_error = compute_error_bar(drive_gap, np.abs(dynamics.drive))
+    force_error = compute_error_bar(reduce(np.maximum, gaps), reduce(np.maximum, map(np.abs, dynamics.pins)))
     return {case.names.error: drive_error, "force_error": force_error}
 
 
-def compute_bar(gap: Any, size: Any) -> Any:
+def compute_error_bar(gap: Any, size: Any) -> Any:
     """Compute the error bar from the distance to the longer number and the size of the value.
 
-    Where there is no longer number, or none in the range of a double, no digit of the value itself is left.
+    The error bar is the size of the value, so that no digit is left, where the longer number is not finite as a double.
     """
     width = np.maximum(gap, U * size)  # the value itself was rounded by as much
     return select(np.isfinite(width), width, size)
 
 
 def is_finite(values: Mapping[str, Any]) -> bool:
-    """Return True if every entry is finite, judged by squares; also False if a square leaves the range of doubles."""
+    """Return True if the sum of the squares of each quantity is finite: False too where a square overflows."""
     squares = (np.vdot(value, value) if isinstance(value, np.ndarray) else value for value in values.values())
     return all(cmath.isfinite(square) for square in squares)
 
 
-def withhold_in_place(case: Case, evaluated: Evaluated) -> None:
-    """Write `withhold` in place wherever a result is no number."""
+def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
+    """Apply `withhold` to evaluated positions if any of their values is not finite."""
     codes, values, driven = evaluated
     if not is_finite(values):
         in_line: Any = False
@@ -225,10 +231,10 @@ def withhold_in_place(case: Case, evaluated: Evaluated) -> None:
 
 
 def withhold(values: dict[str, Any], code: NDArray[np.uint8], in_line: NDArray[np.bool_]) -> None:
-    """Replace a promised quantity that is no number: set the status that says so, and NaN from that stage on.
+    """Set the status of each position at which a promised quantity is not finite, and NaN from that stage on.
 
-    `code`: status of each position, changed in place. `in_line`: where the two bars that are not driven are in line:
-    there no forces hold them in balance.
+    `code`: status of each position, changed in place. `in_line`: True where the two bars that are not driven are in
+    line, so that no finite forces hold them in balance.
     """
     gone = np.zeros(code.shape, dtype=bool)
     for stage in STAGES:
@@ -267,19 +273,19 @@ SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
     "alpha_3": lambda state: state.moving.alpha_3,
     "alpha_4": lambda state: state.moving.alpha_4,
 }
-"""The scalars before the forces."""
+"""Formulas of the scalars that come before the forces, by name."""
 PLACES = frozenset(start + name for start in POINT_STAGES for name in ("A", "B", "G2", "G3", "G4"))
-"""The vectors before the forces, of the linkage's own points."""
+"""Names of the vectors that come before the forces, at the pins and mass centres of the linkage."""
 
 
-def list_kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str, Any]:
-    """List the wanted quantities that come before the forces, the scene's own points included."""
-    values = {name: evaluate(state) for name, evaluate in SCALAR_FORMULAS.items() if name in wanted}
-    if case.drive is not None and not wanted.isdisjoint(LINE_QUANTITIES):
+def list_kinematics(case: Case, state: State, names: KeysView[str]) -> dict[str, Any]:
+    """List the named quantities that come before the forces, those of the scene's own points included."""
+    values = {name: formula(state) for name, formula in SCALAR_FORMULAS.items() if name in names}
+    if case.drive is not None and not names.isdisjoint(LINE_QUANTITIES):
         stroke, unit = case.drive.line(state)
         of_line = {"stroke": stroke, "drive_line": unit, "stroke_speed": case.drive_speed(state)}
-        values |= {name: value for name, value in of_line.items() if name in wanted}
-    if not case.points and wanted.isdisjoint(PLACES):
+        values |= {name: value for name, value in of_line.items() if name in names}
+    if not case.points and names.isdisjoint(PLACES):
         return values
     lengths, (two, three, four) = case.lengths, case.bodies
     places: dict[int, list[tuple[str, Any]]] = {
@@ -293,10 +299,10 @@ def list_kinematics(case: Case, state: State, wanted: KeysView[str]) -> dict[str
         frame = state.frame(bar)
         for name, z in of_bar:
             r = z * frame.u
-            if name in wanted:
+            if name in names:
                 values[name] = frame.pin + r
-            if (velocity := f"v_{name}") in wanted:
+            if (velocity := f"v_{name}") in names:
                 values[velocity] = frame.velocity(r)
-            if (acceleration := f"a_{name}") in wanted:
+            if (acceleration := f"a_{name}") in names:
                 values[acceleration] = frame.acceleration(r)
     return values

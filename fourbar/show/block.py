@@ -187,7 +187,7 @@ class _Block:
             low, high = (self._value(value, drive.unit, max(map(abs, facts.held))) for value in facts.held)
             holds = "dry friction holds it between them" if facts.duty is None else "the range where dry friction holds"
             lines.append(self._row("at rest", f"{low} to {high}: {holds}"))
-        if facts.stroke is not None:
+        if facts.stroke_range is not None:
             lines += self._write_stroke()
         lines += self._write_power()
         if pressure is not None and facts.linear:
@@ -238,11 +238,11 @@ class _Block:
     def _write_stroke(self) -> list[str]:
         """Write the stroke, over what it assembles, and its speed."""
         facts, lines = self.facts, list[str]()
-        assert facts.stroke is not None
-        low, high = (self._value(x.value, "m", self.longest) for x in facts.stroke)
+        assert facts.stroke_range is not None
+        low, high = (self._value(x.value, "m", self.longest) for x in facts.stroke_range)
         row = low if facts.kind == "position" else f"{low} to {high}"
-        if facts.strokes is not None:
-            ends = (self._value(x, "m", self.longest) for x in facts.strokes)
+        if facts.stroke_limits is not None:
+            ends = (self._value(x, "m", self.longest) for x in facts.stroke_limits)
             row += "; assembles from {} to {}".format(*ends)
         lines.append(self._row("stroke", row))
         speed = facts.solution.stroke_speed

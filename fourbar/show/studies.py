@@ -99,7 +99,7 @@ def _write_mobility(linkage: FourBar, write: Callable[[float], str], everything:
     if transmission.worst > 0.0:
         yield f"smallest transmission angle: {_write_angle(transmission.worst)}"
     if (ratio := time_ratio(linkage)) is not None:
-        yield f"slower stroke of the output over the faster, at constant omega_2: {ratio:.4f}"
+        yield f"time ratio of the output strokes at constant omega_2: {ratio:.4f}"
 
 
 def _explain_turning(linkage: FourBar, bar: int, write: Callable[[float], str]) -> Iterator[str]:

@@ -26,13 +26,13 @@ from fourbar.studies.internal_forces import Bending, internal_forces
 CUTS = 40
 """Parts into which one call of `solve` cuts every interval that is looked at."""
 ROUNDS = 5
-"""Calls: a step of 5 degrees is cut down to 5e-8 degrees, less than a largest value can be told from the next by."""
+"""Calls of `solve`: from steps of 5 degrees a reversal is located to 5e-8 degrees, a peak to 1.6e-6 degrees."""
 MOST_PEAKS = 6
 """Number of peaks of one quantity that are listed, the highest."""
 BENDING_PEAKS, BENDING_ROUNDS = 3, 3
 """The same for bending moments: only the largest of a bar is shown, with four digits."""
 GROWING = 1e-3
-"""Part of itself by which what has a largest value grows no more in the last two calls; towards a pole it grows on."""
+"""Growth over the last two calls, as a part of the value, above which a quantity has a pole instead of a maximum."""
 AT_REST = 1e-12
 """Part of its largest slip below which a pin is at rest at a position."""
 FINE = 7200
@@ -75,11 +75,11 @@ class Between(NamedTuple):
     sweep: Solution
     """Solution at the positions of the sweep alone."""
     solution: Solution
-    """Solution at its positions and also at both sides of each reversal and where each of `list_sizes` is largest."""
+    """Solution at the positions of the sweep, at both sides of each reversal, and at the largest of each magnitude."""
     reversals: list[tuple[float, str]]
     """Commanded angle or stroke, rad or m, and the pin at which dry friction reverses there: the pin forces jump."""
     growing: set[str]
-    """Names of the sizes that grow without bound within a step; all of them where no step was searched."""
+    """Names of the magnitudes that grow without bound within a step; all of them where no step was searched."""
 
     @property
     def drive(self) -> Solution:
@@ -87,7 +87,7 @@ class Between(NamedTuple):
         return self.bounded(read_drive(self.sweep).keys.value, "power", "speed")
 
     def bounded(self, *names: str) -> Solution:
-        """Return the solution that holds the peaks of these sizes: the sweep alone where one of them has none."""
+        """Return the solution to take the peaks of magnitudes from: the sweep alone if one grows without bound."""
         return self.sweep if self.growing.intersection(names) else self.solution
 
 
@@ -100,9 +100,9 @@ def list_sizes(solution: Solution) -> dict[str, Array]:
 
 
 def locate_between(scene: Scene, solution: Solution) -> Between:
-    """Locate what the steps of a sweep, or of a motion law, pass over: by `solve`, at ever finer positions.
+    """Locate reversals and largest values between the positions of a sweep or motion law, by solving finer positions.
 
-    Nothing stands between the positions of a released motion, of a list of angles, or where they alone are known.
+    Nothing is searched for a released motion, a list of angles, or a scene without a speed.
 
     `solution`: of the scene's positions, or of its sweep in rising order, to the stage "force".
     """
@@ -161,7 +161,7 @@ def _has_between(scene: Scene, solution: Solution) -> bool:
 
 
 def _solve_at(scene: Scene, places: Array, branch: Branch, stage: str = "force") -> Solution:
-    """Solve at places (of what is commanded, or of a motion law the time) and branches."""
+    """Solve at commanded angles or strokes, or at the times of a motion law, each with its branch."""
     return solve(scene, stage, at=command_at(scene, places, branch))
 
 
@@ -173,9 +173,9 @@ def _merge(scene: Scene, solution: Solution, places: Array, branch: Branch) -> S
     """Solve at the positions of a solution and at others among them, in the order of the solution."""
     if not len(places):
         return solution
-    over = np.concatenate([solution.at.places, places])
-    order = np.unique(over, return_index=True)[1][:: 1 if over[0] < over[1] else -1]
-    return _solve_at(scene, over[order], np.concatenate([solution.at.branch, branch])[order])
+    merged = np.concatenate([solution.at.places, places])
+    order = np.unique(merged, return_index=True)[1][:: 1 if merged[0] < merged[1] else -1]
+    return _solve_at(scene, merged[order], np.concatenate([solution.at.branch, branch])[order])
 
 
 def _compute_slip(solution: Solution, pin: str) -> Array:
@@ -185,8 +185,8 @@ def _compute_slip(solution: Solution, pin: str) -> Array:
 
 
 def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array, Array, Branch]:
-    """List the steps in which a pin with dry friction changes its sense: pin, ends, branch."""
-    over, branch, steps = solution.at.places, solution.at.branch, list[tuple[str, int, int]]()
+    """List the steps in which the slip of a pin with dry friction changes sign: pin, ends, branch."""
+    places, branch, steps = solution.at.places, solution.at.branch, list[tuple[str, int, int]]()
     for pin in sorted({pin for effect in scene.effects for pin in effect.dry_pins}):
         slip = np.nan_to_num(_compute_slip(solution, pin))
         moving = np.flatnonzero(np.abs(slip) > AT_REST * np.abs(slip).max())
@@ -196,14 +196,14 @@ def _find_reversing(scene: Scene, solution: Solution) -> tuple[list[str], Array,
             if slip[i] * slip[j] < 0.0 and branch[i] == branch[j] and solution.assembled[i:j].all()
         ]
     first, last = (np.array([step[end] for step in steps], dtype=int) for end in (1, 2))
-    return [pin for pin, *_ in steps], over[first], over[last], branch[first]
+    return [pin for pin, *_ in steps], places[first], places[last], branch[first]
 
 
 def _find_largest(
     scene: Scene, solution: Solution, sizes: Sizes, most: int = MOST_PEAKS, rounds: int = ROUNDS
 ) -> tuple[Array, Branch, set[str]]:
-    """Find where each size is largest between positions that it has a local maximum at: places, branches, growing."""
-    over, branch, peaks = solution.at.places, solution.at.branch, list[tuple[str, int, int, int]]()
+    """Find the places and branches of the local maxima of each magnitude, and the names of those that grow."""
+    places, branch, peaks = solution.at.places, solution.at.branch, list[tuple[str, int, int, int]]()
     present = sizes(solution)
     for name, size in present.items():
         padded = np.concatenate([[-1.0], np.nan_to_num(size, nan=-1.0, posinf=-1.0), [-1.0]])
@@ -213,13 +213,13 @@ def _find_largest(
             start = i - (before[i] >= 0.0 and branch[i - 1] == branch[i])
             stop = i + (after[i] >= 0.0 and branch[min(i + 1, len(branch) - 1)] == branch[i])
             peaks.append((name, i, start, stop))
-        for i, j in pairwise(range(len(branch))):  # towards a gap it may grow whatever it is beside it
+        for i, j in pairwise(range(len(branch))):  # towards a gap a magnitude may grow without a local maximum
             if padded[i + 1] * padded[j + 1] < 0.0 and branch[i] == branch[j]:
                 peaks.append((name, i if padded[j + 1] < 0.0 else j, i, j))
     rows, names = np.arange(len(peaks)), [name for name, *_ in peaks]
     top, start, stop = (np.array([peak[k] for peak in peaks], dtype=int) for k in (1, 2, 3))
     opens = ~(solution.assembled[start] & solution.assembled[stop])
-    low, high, places = over[start], over[stop], over[top]
+    low, high, peak_places = places[start], places[stop], places[top]
     reached = [np.array([present[name][i] for name, i, *_ in peaks])]
     for _ in range(rounds if len(peaks) else 0):
         cut = _cut(low, high)
@@ -227,11 +227,11 @@ def _find_largest(
         values = np.array([np.nan_to_num(inside[n].reshape(cut.shape)[k], nan=-1.0) for k, n in enumerate(names)])
         inwards = np.abs(np.arange(CUTS + 1) - np.where(solution.assembled[start], 0, CUTS)[:, None])
         best = np.argmax(np.where(opens[:, None] & (values >= 0.0), inwards, values), axis=1)
-        places, low, high = (cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1))
+        peak_places, low, high = (cut[rows, np.clip(best + step, 0, CUTS)] for step in (0, -1, 1))
         reached.append(values[rows, best])
     growing = reached[-1] > (1.0 + GROWING) * reached[-3] if len(peaks) else rows > 0
-    kept = ~growing & (reached[-1] > reached[0]) & ~opens  # beside a gap others grow
-    return places[kept], branch[top][kept], {name for name, grows in zip(names, growing, strict=True) if grows}
+    kept = ~growing & (reached[-1] > reached[0]) & ~opens  # beside a gap other magnitudes grow
+    return peak_places[kept], branch[top][kept], {name for name, grows in zip(names, growing, strict=True) if grows}
 
 
 class PinLoad(NamedTuple):
@@ -252,13 +252,13 @@ class Facts:
     counts: dict[str, int]
     """Number of positions of each status."""
     commanded: tuple[float, float]
-    """First and last place."""
+    """First and last commanded angle or stroke, or time of a motion law or a released motion."""
     angles: dict[int, tuple[Peak, Peak]]
     """Smallest and largest angle of bars 2, 3 and 4."""
     transmission: Peak
     """Smallest transmission angle."""
     stretches: list[tuple[float | None, float | None]]
-    """Places from and up to which the linkage assembles, None at the ends of the motion; empty: everywhere."""
+    """Places from and up to which the linkage assembles, None at the ends of the motion; empty if it always does."""
     drive: Driving | None
     """Drive; None for a released linkage, and where only positions are known."""
     peak: Peak | None
@@ -268,9 +268,9 @@ class Facts:
     """Least and greatest torque or force while dry friction holds a pin that is at rest."""
     pins: dict[str, PinLoad]
     bending: dict[int, BarBending]
-    stroke: tuple[Peak, Peak] | None
+    stroke_range: tuple[Peak, Peak] | None
     """Smallest and largest stroke of the motion."""
-    strokes: tuple[float, float] | None
+    stroke_limits: tuple[float, float] | None
     """Smallest and largest stroke that assembles on the branch, and with a stroke commanded on the side."""
     between: Between
     """Events within the steps of the sweep."""
@@ -319,8 +319,8 @@ def summarize(scene: Scene, solution: Solution) -> Facts:
         held=None if drive is None else _find_held(solution, drive),
         pins=_list_pin_loads(solution, between),
         bending=locate_bending(scene, between),
-        stroke=None if fine.stroke is None else find_range(fine.stroke),
-        strokes=None if solution.stroke is None else _find_strokes(scene, solution),
+        stroke_range=None if fine.stroke is None else find_range(fine.stroke),
+        stroke_limits=None if solution.stroke is None else _find_stroke_limits(scene, solution),
         between=between,
         error=_find_error(solution, drive),
     )
@@ -341,12 +341,12 @@ def _find_kind(scene: Scene, solution: Solution) -> str:
 
 
 def _list_places(solution: Solution) -> Array:
-    """List what is commanded at each position, of a motion over time the times."""
+    """List the commanded angle or stroke at each position, or the times of a motion over time."""
     return solution.at.places if solution.time is None else solution.time
 
 
 def _solve_positions(scene: Scene, places: Array, like: Solution) -> Solution:
-    """Solve positions at other places, each on the branch of the nearest of a solution."""
+    """Solve positions at other places, each on the branch of the nearest position of a solution."""
     order = np.argsort(like.at.places, kind="stable")
     rising = like.at.places[order]
     nearest = np.clip(np.searchsorted(rising, places), 1, len(rising) - 1)
@@ -368,7 +368,7 @@ def _find_extreme(values: Array, places: Array, sign: int, smooth: bool) -> Peak
 
 
 def _list_stretches(scene: Scene, fine: Solution) -> list[tuple[float | None, float | None]]:
-    """List where the linkage assembles within a sweep; the ends are cut down to by the position formula."""
+    """List where the linkage assembles within a sweep, with ends that the position formula locates."""
     closes, places = fine.assembled, fine.at.places
     if closes.all():
         return []
@@ -394,7 +394,7 @@ def _find_held(solution: Solution, drive: Driving) -> tuple[float, float] | None
 
 
 def _find_peak(solution: Solution, values: Array | None) -> Peak:
-    """Find the value that is largest in size, and its place."""
+    """Find the value of largest magnitude, and its place."""
     assert values is not None
     worst = int(np.nanargmax(np.abs(values)))
     return Peak(float(values[worst]), float(_list_places(solution)[worst]))
@@ -412,8 +412,8 @@ def _list_pin_loads(solution: Solution, between: Between) -> dict[str, PinLoad]:
     return loads
 
 
-def _find_strokes(scene: Scene, solution: Solution) -> tuple[float, float]:
-    """Find the least and the greatest stroke over all that the commanded bar can reach on its branch."""
+def _find_stroke_limits(scene: Scene, solution: Solution) -> tuple[float, float]:
+    """Find the least and the greatest stroke over all angles that the commanded bar reaches on its branch."""
     positions, first = solution.at, int(np.argmax(solution.assembled))
     here = float(positions.angle[first])
     intervals = find_intervals(scene.linkage, positions.bar)

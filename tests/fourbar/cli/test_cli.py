@@ -342,7 +342,7 @@ def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
         "    ground + input = 0.4 < coupler + output = 0.47",
         "    |ground - input| = 0.2 > |coupler - output| = 0.03",
         f"smallest transmission angle: {least:.4f} deg",
-        f"slower stroke of the output over the faster, at constant omega_2: {one_stroke / (360.0 - one_stroke):.4f}",
+        f"time ratio of the output strokes at constant omega_2: {one_stroke / (360.0 - one_stroke):.4f}",
     ):
         assert line in lines
     assert f"output {abs(swung):.4f} deg" in lines[3]

@@ -169,7 +169,7 @@ def test_a_stroke_is_answered_in_strokes_with_its_range_and_bore() -> None:
     assert f"bore at least {bore:.4g} mm to push {np.nanmax(s.drive_force):.4g} N" in text and "to pull" in text
     assert "cylinder from bar 1 (ground) to bar 2 (input), 0.2 m/s" in text and "motor" not in text
     right = replace(scene, motion=motion.replace(side="right"))
-    assert summarize(right, fourbar.solve(right)).strokes == pytest.approx((0.16, 0.34), abs=1e-6)
+    assert summarize(right, fourbar.solve(right)).stroke_limits == pytest.approx((0.16, 0.34), abs=1e-6)
 
 
 def test_the_command_line_states_the_bore(capsys: pytest.CaptureFixture[str]) -> None:
