@@ -37,4 +37,4 @@ try:
 except RuntimeError as error:
     print("by default:", str(error).split(".", maxsplit=1)[0])
 else:
-    sys.exit("mended")
+    sys.exit("fixed")

@@ -36,4 +36,4 @@ for name, given in (("by default", {}), ("default_armature=None", {"default_arma
     print(f"{name}: {found[name]:.6f} rad/s^2; m g r/I is {EXACT:.6f}")
 assert abs(found["default_armature=None"] / EXACT - 1.0) < 1e-6
 if abs(found["by default"] / EXACT - 1.0) < 0.1:
-    sys.exit("mended")
+    sys.exit("fixed")

@@ -7,7 +7,7 @@ Found: After one iteration the accelerations are off by 91 % of the largest wher
   closed by a rocker. There is no warning, and they converge slowly. Of 400 random planar trees with loops 16 are off.
   Loops that share no bar are right: forty four-bars in one file agree to 2e-12.
 Since: 4.0.0 (3.17.0 is right)
-Until: 4.0.1, as its list of changes says; its wheel could not be had here
+Until: 4.0.1, according to its changelog; not run with it
 Reported: google-deepmind/mujoco #3767
 """
 
@@ -34,4 +34,4 @@ for jacobian in ("dense", "sparse"):
         found[jacobian, iterations] = data.qacc.copy()
         print(jacobian, iterations, data.qacc)
 if np.abs(found["sparse", 1] - found["dense", 1]).max() < 1e-9 * np.abs(found["dense", 1]).max():
-    sys.exit("mended")
+    sys.exit("fixed")

@@ -9,7 +9,7 @@ Found: Two bars in series in the plane, without loop, gravity or motor, stand at
   same code.
 Since: 3.2.7 or before
 Until: still in 3.2.7
-Reported: not reported yet; bulletphysics/bullet3 #4451 and #4462 mended another term
+Reported: not reported yet; bulletphysics/bullet3 #4451 and #4462 fixed another term
 """
 
 import math
@@ -62,4 +62,4 @@ for v in ((2.0, -3.0), (2.0, 0.0), (0.0, -3.0)):
     worst[v] = abs(reported - right)
     print(f"speeds {v}: second joint {reported:.4f} N, mass times acceleration {right:.4f} N")
 if not (worst[2.0, -3.0] > 1.0 and max(worst[2.0, 0.0], worst[0.0, -3.0]) < 1e-3):
-    sys.exit("mended")
+    sys.exit("fixed")

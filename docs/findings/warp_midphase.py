@@ -23,4 +23,4 @@ try:
 except NotImplementedError as error:
     print(error)
 else:
-    sys.exit("mended")
+    sys.exit("fixed")

@@ -1,11 +1,12 @@
-"""MuJoCo Warp builds (dJ/dt) v of `connect` and `weld` from the velocities of the evaluation before.
+"""MuJoCo Warp builds (dJ/dt) v of `connect` and `weld` from the velocities of the previous evaluation.
 
 Engine: mujoco-warp (mujoco_warp)
 With: mujoco=={version}
 Expected: mjw.forward of a state gives MuJoCo's closing force, whatever was evaluated before.
 Found: The first forward after a change of qvel gives another force (off by 26 % of the largest in a turn), the second
-  gives MuJoCo's: fwd_position makes the constraint before com_vel, in fwd_velocity, has the new velocities. Over a
-  simulated turn the error is of first order. Right after make_data the first forward lacks the term entirely.
+  gives MuJoCo's: fwd_position builds the constraint, and only later com_vel, in fwd_velocity, computes the new
+  velocities. Over a simulated turn the error is of first order. Right after make_data the first forward lacks the
+  term entirely.
 Since: #1294 of May 2026, which brought the term; run with 4.0.0
 Until: still in 4.0.0
 Reported: not reported yet; the term came with google-deepmind/mujoco_warp #1294
@@ -40,4 +41,4 @@ for _ in range(2):
 print("MuJoCo", data.efc_force[:2], " Warp, once", found[0], " twice", found[1])
 assert np.abs(found[1] - data.efc_force[:2]).max() < 1e-3, "another fault"
 if np.abs(found[0] - found[1]).max() < 1e-3:
-    sys.exit("mended")
+    sys.exit("fixed")

@@ -36,19 +36,19 @@ NOTES: dict[str, Any] = tomllib.loads(files("fourbar.mjcf").joinpath("notes.toml
 AT_REST = 1.0
 """rad/s that flywheel and timestep are laid out for where the scene states no speed."""
 SETTLING = 2.0
-"""Time constant with which the drive starts the input from rest, in timesteps: the crank lags by so many, for good."""
+"""Time constant, in timesteps, with which the servo starts the input from rest; its angle lags by as many."""
 RELEASED_STEPS = 6280
 """Number of timesteps, without a flywheel, in the time in which weights and loads would turn the linkage once."""
 RELEASED_CLOSURE = 2.0
 """Time constant of the closure of a released linkage, in timesteps: measured, 2 takes the least energy out of it."""
 STIFF_PAD, SOFT_PAD = 1e-4, 2e-3
-"""Stiff: the closure's softness plays no part above 1e-9. Soft: its forces have 7 digits after a single pass."""
+"""Pads of `Settings.pad`. Stiff: the closure's softness matters less than 1e-9. Soft: 7 digits after one iteration."""
 QUICK = 1.0
-"""rad/s^2. Newton stops where a pass moves the accelerations by less than 1e-15 rad/s^2 (mjMINVAL): below about
-this acceleration there is no second pass, and with stiff pads the forces of the first are wrong by up to 1e-3."""
+"""rad/s^2. MuJoCo's Newton solver stops where an iteration changes the accelerations by less than 1e-15 rad/s^2
+(mjMINVAL): below about this acceleration there is no second one, and stiff pads leave errors of up to 1e-3."""
 LIGHT = 100.0
-"""A bar this many times lighter than the other that the closure joins makes the closure softer than loads do: 10 g
-and 1 g on 14.5 kg had the inertial torque 3e-5 and 3e-3 wrong, in proportion to the ratio. Pads follow it from here."""
+"""Mass ratio of coupler and output above which `fit_pad` makes the pad smaller. The closure then softens by the ratio
+more than by the loads: the error of the inertial torque was 3e-5 for 10 g against 14.5 kg, and 3e-3 for 1 g."""
 Drive = Literal["flywheel", "motor", "none"]
 """Kind of drive: a flywheel that keeps omega_2 or alpha_2; a motor on the driven bar whose control is its couple;
 none. A free motion has none."""
@@ -139,15 +139,15 @@ def _write_comments(scene: Scene, drive: Drive, reader: str) -> list[str]:
         kinds += [] if _compute_span(scene.linkage) >= FULL_TURN and not change_points(scene.linkage) else ["limits"]
         kinds += ["cylinder_flywheel"] if scene.drive is not None else ["elsewhere"] if bar != 2 else []
     lines: list[str] = [notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar) for kind in ("opens", *kinds)]
-    if reader == "genesis" and (names := _name_untaken(scene)):
+    if reader == "genesis" and (names := _list_left_out_by_genesis(scene)):
         lines.append(notes["genesis_without"].format(names=", ".join(names)))
     lines += numbers["instant"] + (numbers["driven"] if drive == "flywheel" else []) + numbers["pins"]
     lines += [notes["loads"]] if reader == "mujoco" and scene.loads else []
     return [*lines, *numbers["after"]]
 
 
-def _name_untaken(scene: Scene) -> list[str]:
-    """Name what is no number of a joint but its rest angle."""
+def _list_left_out_by_genesis(scene: Scene) -> list[str]:
+    """List what Genesis leaves out: loads, springs, effects at B, and the rest angles of torsion springs."""
     names = ["loads"] if scene.loads else []
     for effect in scene.effects:
         pins = {pin for pin, *_ in effect.rows} if isinstance(effect, PinRows) else set()
@@ -158,56 +158,53 @@ def _name_untaken(scene: Scene) -> list[str]:
 
 
 def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
-    """Armature of pin O2, kg m^2: `settings.flywheel` times sum of m L^2 + I + (m g L + F L + M)/q.
+    """Compute the armature of pin O2, kg m^2: `settings.flywheel` times the sum of m L^2 + I + (m g L + F L + M)/q.
 
-    L is the longest arm at which anything acts, and the work is what each load and effect says of itself;
-    in a revolution it is then a small part of the flywheel's energy. q is the greater of omega_2^2 and |alpha_2|.
+    L is the longest lever arm, and q the greater of omega_2^2 and |alpha_2|. The work of weights and loads in a
+    revolution is then a small part of the flywheel's energy.
     """
-    return float(f"{settings.flywheel * (_sum_inertia(scene.linkage) + _sum_work(scene)):.3g}")
+    return float(f"{settings.flywheel * (_sum_inertia(scene.linkage) + _sum_load_inertia(scene)):.3g}")
 
 
 def compute_load_ratio(scene: Scene) -> float:
     """Return (m g L + F L + M)/(q (m L^2 + I)): loads and weights against the inertia of the bars."""
     inertia = _sum_inertia(scene.linkage)
-    return _sum_work(scene) / inertia if inertia else math.inf
+    return _sum_load_inertia(scene) / inertia if inertia else math.inf
 
 
 def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
-    """Choose the timestep by what moves the linkage, and for a free motion a closure that takes little energy out."""
-    quickest = (
-        math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + compute_load_ratio(scene) * _compute_quickness(scene)) or AT_REST
-    )
-    settings = replace(settings, flywheel=0.0, timestep=settings.timestep or math.tau / (RELEASED_STEPS * quickest))
+    """Choose the timestep by the speed that loads can cause, and a closure that takes little energy out if released."""
+    by_loads = compute_load_ratio(scene) * _compute_acceleration_scale(scene)
+    speed = math.sqrt((scene.motion.omega_2 or 0.0) ** 2 + by_loads) or AT_REST
+    settings = replace(settings, flywheel=0.0, timestep=settings.timestep or math.tau / (RELEASED_STEPS * speed))
     if scene.motion.free is None:
         return settings
     return replace(settings, pad=None, time_constant_steps=RELEASED_CLOSURE)
 
 
 def fit_pad(scene: Scene) -> float:
-    """Choose the pad that leaves the closure stiff enough for the loads, and soft enough for one pass of Newton.
+    """Choose the pad that leaves the closure stiff enough for the loads, and soft enough for one iteration.
 
-    The sag of the closure grows as pad^2 times the loads, the rounding of one pass as 1/(pad^2 times the loads).
+    The sag of the closure grows as pad^2 times the loads, the rounding of one iteration of MuJoCo's Newton solver as
+    1/(pad^2 times the loads).
     """
     _, a, b, c = scene.linkage.lengths
     least_sag = SOFT_PAD / math.sqrt(
         (1.0 + compute_load_ratio(scene)) * max(1.0, compute_mass_ratio(scene.linkage) / LIGHT)
     )
-    acceleration = _compute_quickness(scene) * a / max(b, c)  # of bars 3 and 4, by its size
+    acceleration = _compute_acceleration_scale(scene) * a / max(b, c)  # of bars 3 and 4, by its size
     return least_sag if acceleration < QUICK else min(STIFF_PAD, least_sag)
 
 
 def compute_mass_ratio(linkage: FourBar) -> float:
-    """Return the ratio of coupler and output, heavier by lighter: (I + m r^2)/L^2 about the first pin, as felt there.
-
-    1 where one of them has no mass.
-    """
-    felt = [(bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
-            for bar in (linkage.coupler, linkage.output)]  # fmt: skip
-    return max(felt) / min(felt) if min(felt) > 0.0 else 1.0
+    """Return the ratio of (I + m r^2)/L^2 of coupler and output, the greater over the less; 1 if one has no mass."""
+    masses = [(bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
+              for bar in (linkage.coupler, linkage.output)]  # fmt: skip
+    return max(masses) / min(masses) if min(masses) > 0.0 else 1.0
 
 
-def _compute_quickness(scene: Scene) -> float:
-    """Return the greater of omega_2^2 and |alpha_2|: by it the accelerations of all bars scale, rad/s^2."""
+def _compute_acceleration_scale(scene: Scene) -> float:
+    """Return the greater of omega_2^2 and |alpha_2|, rad/s^2, with which the accelerations of all bars grow."""
     return float(max((scene.motion.omega_2 or AT_REST) ** 2, abs(scene.motion.alpha_2)))
 
 
@@ -222,12 +219,12 @@ def _sum_inertia(linkage: FourBar) -> float:
     return inertia
 
 
-def _sum_work(scene: Scene) -> float:
-    """Sum of the couples that loads and effects may ask of the drive, by the accelerations' scale, kg m^2."""
-    quickness = _compute_quickness(scene)
-    speed = math.sqrt(quickness)
+def _sum_load_inertia(scene: Scene) -> float:
+    """Sum the couples of loads and effects on the drive, divided by the acceleration scale, kg m^2."""
+    acceleration = _compute_acceleration_scale(scene)
+    speed = math.sqrt(acceleration)
     couples = (find_row(term).couple(term, scene.linkage, speed) for term in (*scene.loads, *scene.effects))
-    return sum(couples) / quickness
+    return sum(couples) / acceleration
 
 
 FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
@@ -319,7 +316,7 @@ def _compute_span(linkage: FourBar) -> float:
 SINGLE = replace(RECIPE, flywheel=1e3, pad=None)
 """Settings for single precision, where a flywheel of 1e8 and fitted pads lose the closing force entirely."""
 FAST = replace(RECIPE, time_constant_steps=2.0)
-"""Settings for a closure whose acceleration lacks a term: the faster it yields, the sooner its error compensates."""
+"""Settings for a `connect` without (dJ/dt) v: with a short time constant the position error soon makes up for it."""
 SIMULATORS = {"mujoco": RECIPE, "warp": SINGLE, "mjx": FAST, "genesis": RECIPE, "newton": SINGLE}
 """Who reads the file, and the settings that carry the loop best there."""
 OWN_MOTORS = ("genesis", "newton")

@@ -41,9 +41,9 @@ FIRST = 64
 FINEST, FINEST_OF_MANY = 1e-10, 1e-4
 """rad; narrower boxes are not halved: without tolerances, and with them."""
 NEGLIGIBLE = 0.02
-"""A box over which theta_2 adds less than this share of what the tolerances add is not halved: the rest is theirs."""
+"""A box over which theta_2 adds less than this share of what the tolerances add is not halved, which hardly helps."""
 MANY = 2**15
-"""Boxes left; a quantity so level that more would be is bounded by these: a linkage that springs balance has none."""
+"""Boxes that are left, above which none is halved: a nearly constant quantity, as of a balanced linkage, has more."""
 DRIVES = (COUPLE.value, LINE.value)
 NAMES = (*DRIVES, *(f"|{name}|" for name in PIN_FORCES), "transmission")
 DISTANCE = math.radians(1.0)
@@ -51,7 +51,7 @@ DISTANCE = math.radians(1.0)
 TRIED = 10_000
 """Linkages drawn from the tolerances to say how many do not assemble: the share is known to half a percent of all."""
 FARTHEST = 1e5
-"""rad; farther round, boxes as narrow as are needed lie between two doubles."""
+"""Largest ground angle, rad; beyond it the narrowest boxes are smaller than the spacing of doubles."""
 PROVABLE = ("gravity", "viscous", "springs", "flywheel", "load")
 """Effects whose form in ball arithmetic is known."""
 Balls = NDArray[Any]
@@ -83,9 +83,9 @@ class Extremes(NamedTuple):
     """Extremes of the linkage without its tolerances, if it has any."""
 
     def over_estimate(self, name: str, sign: int) -> float | None:
-        """Compare how far the proven greatest (+1) or least (-1) lies from the nominal with the farthest linkage found.
+        """Return the distance of the proven greatest (+1) or least (-1) from the nominal, over that of the one found.
 
-        A ratio >= 1; None without tolerances, or where no linkage goes further than the nominal one.
+        At least 1; None without tolerances, or where no linkage is found beyond the nominal one.
         """
         if self.nominal is None:
             return None
@@ -98,10 +98,10 @@ class Extremes(NamedTuple):
 def extremes(scene: Scene, quantities: Sequence[str] = ()) -> Extremes:
     """Prove the largest and smallest drive, pin forces and transmission angle over the input's whole interval.
 
-    At the scene's omega_2, alpha_2 and branch. Where the scene has tolerances the bounds hold for every linkage within
-    them (three sigma of a normal one): `high` of the greatest and `low` of the least are then proven, and the other end
-    is what the worst corner found reaches. All bounds are those of the stated doubles without any rounding: a spring's
-    preload - stiffness length, or the inertia m L^2/12 that a bar leaves out, is exact.
+    omega_2, alpha_2 and branch are those of the scene. If the scene has tolerances, the bounds hold for every linkage
+    within them (three sigma of a normal one): `high` of the greatest and `low` of the least are then proven, and the
+    other end is what the worst corner found reaches. The stated doubles count as exact, and nothing derived from them
+    is rounded, such as a default inertia m L^2/12.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ class _Search:
         """Find the greatest (+1) or least (-1) value, enclosed and rounded outwards."""
         arb, quantity = self.arb, "sine" if name == "transmission" else name
         if quantity == "sine" and _bound_below(sign, self.over(self.start)[1][quantity]).max() * sign > 0.5:
-            quantity, sign = "cosine", -sign  # near a right angle it has the digits
+            quantity, sign = "cosine", -sign  # near a right angle the cosine has more digits
         low, high, theta_2 = self.enclosed(quantity, sign)
         if name not in DRIVES:
             low, high = (end.max(arb(0)).sqrt() for end in (low, high))
@@ -255,7 +255,7 @@ class _Search:
             done |= top <= closed
             if ((radius < finest) & ~np.isfinite(top)).any():
                 pole = math.degrees(float(centre[~np.isfinite(top)][0]))
-                why = "it has a pole there, or within the tolerances, or linkages that do not assemble"
+                why = "there it has a pole, or a linkage within the tolerances has one or does not assemble"
                 raise LimitError(f"{name} has no bound at theta_2 = {pole:.6g} deg: {why}")
             boxes = _split(boxes[~done], 2)
         farthest, proven = unit * best, unit * max(closed, best)
@@ -350,8 +350,8 @@ def _find_interval(scene: Scene) -> tuple[tuple[tuple[float, float], ...], float
                 parts = sorted(set(kept))
     parts = [(low, high) for low, high in parts if low < high]
     if not parts:
-        nowhere = f"is nowhere farther than {math.degrees(DISTANCE):g} deg from a limit of the input or a pole"
-        raise LimitError(f"the interval of theta_2 {nowhere}: nothing is proven there")
+        near = f"lies within {math.degrees(DISTANCE):g} deg of a limit of the input or of a pole"
+        raise LimitError(f"the whole interval of theta_2 {near}, where nothing is proven")
     return tuple(parts), DISTANCE if gaps else 0.0
 
 

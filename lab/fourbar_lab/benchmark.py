@@ -192,7 +192,7 @@ class Benchmark:
         try:
             judged = judge(problem, result)
         except InputError as error:
-            cell.letters, cell.reason = MISSING, f"no answer that can be judged: {error}"
+            cell.letters, cell.reason = MISSING, f"an answer that cannot be judged: {error}"
             return
         levels = find_levels([row for row in judged if row.level != MISSING])
         reactions, drive = (levels.get(name, MISSING) for name in ("reactions", "torque"))

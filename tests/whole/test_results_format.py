@@ -72,7 +72,7 @@ def test_every_quantity_stands_in_the_row_of_its_stage_with_its_unit() -> None:
 def test_every_engine_is_described() -> None:
     table = PAGE.partition("## The engines")[2].partition("## The quantities")[0]
     described = re.findall(r"^\| `([\w-]+)` \| .+ \|$", table, re.MULTILINE)
-    shipped = [check.rows.__name__ for check in CHECKS if check.shipped]
+    shipped = [check.make_rows.__name__ for check in CHECKS if check.shipped]
     assert sorted(described) == sorted(["engine", *WORK, *FORWARD, *shipped])
     names = {engine.name for engine in (*ENGINES, *load_further(), *HARD_ENGINES)}
     assert names | {FORMULAS} == set(WORK)
@@ -86,7 +86,7 @@ def test_every_quantity_of_a_scene_is_described(results: Path) -> None:
     stated = {row.quantity for row in check_statements("", scene, engine, engine.answer(scene, command(scene)))}
     of_positions = {q.name for q in QUANTITIES}
     assert set(described) == ({*IDENTITIES, *WHOLE, *FULL, *stated, SHIPPED, *OF_A_SCENE}) - of_positions
-    shipped = {check.rows.__name__ for check in CHECKS if check.shipped}  # each judges quantities of its own
+    shipped = {check.make_rows.__name__ for check in CHECKS if check.shipped}  # each judges quantities of its own
     rows = (row for file in (results / "results", SHIPPED_RUN) for row in read_columns(file / "results.csv"))
     seen = {row.quantity for row in rows if row.engine not in shipped}
     assert stated - {"through"} <= seen <= {*described, *of_positions}

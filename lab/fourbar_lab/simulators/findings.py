@@ -20,7 +20,7 @@ FIELDS = ("Engine", "With", "Expected", "Found", "Since", "Until", "Reported")
 """Fields of a script's docstring, after its first sentence; Engine: the name for pip, in brackets what is imported."""
 LOOK = "import importlib.metadata, importlib.util as u, sys; u.find_spec({0!r}) or sys.exit(1)"
 """Program for a Python interpreter that fails if a module is not installed."""
-MENDED = "mended"
+FIXED = "fixed"
 """Word that a script prints at its end, with exit status 1, if the finding no longer holds."""
 
 
@@ -39,15 +39,15 @@ class Reproduction:
         return name, module.strip("()")
 
     def run(self, python: str | Path, seconds: float) -> str:
-        """Run the script: "holds", "mended" or why it could not run."""
+        """Run the script: "holds", "fixed" or why it could not run."""
         return read_outcome(run_to_end([python, self.script], seconds=seconds))
 
 
 def read_outcome(done: Ended) -> str:
-    """Return what a script's end says; a traceback is no "mended"."""
+    """Return what a script's end says; a traceback is no "fixed"."""
     if not done.failed:
         return "holds"
-    return MENDED if done.last == MENDED else f"not run: {done.last}"
+    return FIXED if done.last == FIXED else f"not run: {done.last}"
 
 
 def read(script: Path) -> Reproduction:

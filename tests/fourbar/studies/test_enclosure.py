@@ -116,7 +116,7 @@ def test_the_share_of_the_linkages_that_come_apart_is_stated() -> None:
 def test_a_pole_within_the_tolerances_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(enclosure, "FINEST_OF_MANY", 1e-2)
     scene = replace(fourbar.load(MODELS / "crank_rocker.toml"), drive_bar=4)
-    with pytest.raises(fourbar.FourBarError, match=r"torque has no bound at theta_2 = .* a pole there"):
+    with pytest.raises(fourbar.FourBarError, match=r"torque has no bound at theta_2 = .* there it has a pole"):
         extremes(replace(scene, tolerances=(Tolerance("lengths.coupler", 0.01),)), ["torque"])
 
 
@@ -259,5 +259,5 @@ def test_a_torque_that_springs_balance_is_bounded_by_as_many_boxes_as_are_allowe
 def test_an_interval_that_lies_near_limits_throughout_is_one_line(lengths: tuple[float, ...], drive_bar: int) -> None:
     """The input swings by a degree, or a drive on the coupler has a pole wherever it is."""
     scene = Scene(fourbar.uniform(*lengths), Motion(0.0, 1.0), drive_bar)
-    with pytest.raises(fourbar.FourBarError, match="nowhere farther than 1 deg from a limit"):
+    with pytest.raises(fourbar.FourBarError, match="lies within 1 deg of a limit"):
         extremes(scene, ["torque"])

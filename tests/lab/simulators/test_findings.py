@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from fourbar.errors import DependencyError
 from fourbar_lab.cli import status
 from fourbar_lab.simulators import findings as module
-from fourbar_lab.simulators.findings import FIELDS, FOLDER, MENDED, find_interpreter, read, read_findings
+from fourbar_lab.simulators.findings import FIELDS, FIXED, FOLDER, find_interpreter, read, read_findings
 from fourbar_validation.engines.environments import Entry
 
 ALL = read_findings()
@@ -27,7 +27,7 @@ def test_each_finding_holds_or_says_since_when_not(
     if (place := find_interpreter(finding)) is None:
         pytest.skip(f"not run: {finding.engine[0]} is not installed")
     state = finding.run(place[0], SECONDS)
-    assert state == "holds" or (state == MENDED and not finding.fields["Until"].startswith("still")), state
+    assert state == "holds" or (state == FIXED and not finding.fields["Until"].startswith("still")), state
 
 
 def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
@@ -45,12 +45,12 @@ def test_each_finding_is_a_report_and_stands_in_the_list() -> None:
     ("code", "state"),
     [
         ("", "holds"),
-        ("import sys; sys.exit('mended')", MENDED),
+        ("import sys; sys.exit('fixed')", FIXED),
         ("1 / 0", "not run: ZeroDivisionError: division by zero"),
         ("while True: pass", "not run: no answer within 1 s"),
     ],
 )
-def test_a_script_that_breaks_down_is_not_mended(code: str, state: str, tmp_path: Path) -> None:
+def test_a_script_that_breaks_down_is_not_fixed(code: str, state: str, tmp_path: Path) -> None:
     (tmp_path / "one.py").write_text(f'"""It is so.\n\nEngine: pip (pip)\nSince: 1.0 and\n  more\n"""\n{code}\n')
     finding = read(tmp_path / "one.py")
     assert finding.sentence == "It is so." and finding.fields["Since"] == "1.0 and more"

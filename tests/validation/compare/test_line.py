@@ -12,7 +12,7 @@ from fourbar.effects import LinearDrive, SpringEnd
 from fourbar.scene import Scene
 from fourbar_validation.compare.rows import AGREES, FAILS
 from fourbar_validation.engines.exact import BallArithmetic
-from fourbar_validation.engines.guests import Asked, Hello, Program
+from fourbar_validation.engines.guests import GuestClient, Hello, Program
 from fourbar_validation.engines.registry import ENGINES, Engine, load_further
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
@@ -117,8 +117,8 @@ def test_a_fault_in_the_drive_is_caught(monkeypatch: pytest.MonkeyPatch, fault: 
 def test_who_cannot_do_it_refuses_in_one_line_that_names_it() -> None:
     scene = driven(1, 4)
     assert "the linear drive (drive.from, drive.to)" in BallArithmetic().answer(scene, fourbar.command(scene)).refusal
-    outside = Asked("outside", Program(("none",)), Hello("outside"))
+    outside = GuestClient("outside", Program(("none",)), Hello("outside"))
     assert (
         outside.answer(scene, fourbar.command(scene)).refusal
-        == "it does not name gravity, loads, cylinder among its effects"
+        == "the engine's hello does not list gravity, loads, cylinder in effects"
     )

@@ -218,7 +218,7 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     (tmp_path / "scene.toml").write_text(ONE_POSITION)
     out = tmp_path / "out"
     arguments = ["run", str(tmp_path / "scene.toml"), "--no-pictures", "--out", str(out)]
-    assert status([*arguments, "--engines", "mujoco-simulated"]) == FAILED  # one position is no motion through time
+    assert status([*arguments, "--engines", "mujoco-simulated"]) == FAILED  # a simulation needs more than one position
     sentence = "Nothing was compared on 1 scene: 8 of the formulas' own identities hold"
     assert sentence in " ".join(capsys.readouterr().out.split())
     assert sentence in (out / "report.md").read_text()

@@ -129,7 +129,7 @@ def moved(*motion: Any) -> Record:
     ("motion", "reason"),
     [
         ((fourbar.Sweep(0.0, 6.0, 20), 0.0), "omega_2 is 0: nothing moves through time"),
-        ((1.0, 2.0), "one position is no motion through time"),
+        ((1.0, 2.0), "a simulation needs more than one position"),
     ],
 )
 def test_what_does_not_move_through_time_is_not_simulated(motion: tuple[Any, float], reason: str) -> None:

@@ -106,7 +106,7 @@ def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
     assert guest.start().answer(scene, at).setting == "RK4 96/rev"
     answer = wanted.start().answer(scene, at)
     assert answer.evidence["wanted_error"] == 1e-3 and answer.setting != "RK4 96/rev"
-    assert refused.start().answer(scene, at).refusal == "it does not name 'fast' among its settings"
+    assert refused.start().answer(scene, at).refusal == "the engine's hello does not list 'fast' in settings"
     assert adjust_engines([exact], 1e-3)[0].start().answer(scene, at).setting == "exact"
 
 

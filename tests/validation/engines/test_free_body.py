@@ -16,7 +16,7 @@ from fourbar.linkage import PINS
 from fourbar.quantities import LINE_QUANTITIES, STAGE_OF
 from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
-from fourbar_validation.engines.free_body import FreeBody, grow_couples
+from fourbar_validation.engines.free_body import FreeBody, continue_couples
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.scenes import crank_rocker
@@ -176,7 +176,7 @@ def test_dry_friction_does_nothing_at_rest() -> None:
 )
 def test_friction_of_one_pin(F: complex, C: complex, x: float) -> None:
     """x = |F + C x| by hand; where the couple adds to its own load by as much as it is, the pin jams."""
-    found = grow_couples(np.array([[F]], dtype=complex), np.array([[[C]]], dtype=complex), np.array([1.0]))
+    found = continue_couples(np.array([[F]], dtype=complex), np.array([[[C]]], dtype=complex), np.array([1.0]))
     assert found[0, 0] == pytest.approx(x, rel=1e-14, nan_ok=True)
 
 
@@ -184,7 +184,7 @@ def test_friction_of_several_pins_fulfils_its_equations() -> None:
     rng = np.random.default_rng(0)
     F, C = (rng.normal(size=(200, *shape)) + 1j * rng.normal(size=(200, *shape)) for shape in ((3,), (3, 3)))
     k = np.array([0.05, 0.1, 0.02])
-    x = grow_couples(F, C, k)
+    x = continue_couples(F, C, k)
     load = np.abs(F + (C * x[:, None, :]).sum(axis=-1))
     assert (x > 0.0).all()
     assert np.abs(x - k * load).max() <= DIGITS * np.abs(x).max()

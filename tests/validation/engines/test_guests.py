@@ -84,7 +84,7 @@ PROGRAMS: dict[str, tuple[str, str, str]] = {
     "another hello": (
         '["gravity"]}',
         '["gravity"], "version": str(__import__("os").getpid())}',
-        "its hello is another",
+        "the engine's hello changed",
     ),
     "raises": (LAST, f"{AFTER_HELLO}    1 / 0\n", "exit status 1: ZeroDivisionError: division"),
     "early": (LAST, LAST + LAST, "answered question 1 where 2 was asked"),
@@ -218,7 +218,7 @@ def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
         assert found["right"].keys() == {"all"} and found["right"]["all"][0] == REFUSES
     assert judged(three, "OfAnyBar")["of any bar"]["all"][0] == REFUSES
     loaded = judged(crank_rocker(), write_program(tmp_path, "plain"))["plain"]
-    assert loaded["all"] == (REFUSES, "it does not name loads among its effects")
+    assert loaded["all"] == (REFUSES, "the engine's hello does not list loads in effects")
 
 
 def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -358,7 +358,7 @@ def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine: Any) ->
     if missing := engine.missing():
         pytest.skip(missing)
     program = guests.serve(engine.name, 120.0)
-    start = partial(guests.Asked, engine.name, program, guests.ask_hello(program))
+    start = partial(guests.GuestClient, engine.name, program, guests.ask_hello(program))
     outside = replace(engine, start=start)
     loaded = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 40), 10.0))
     stroke = fourbar.Motion(stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left")

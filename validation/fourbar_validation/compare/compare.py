@@ -64,8 +64,8 @@ OF_FORCES = (*FORCES, *DRY_FRICTION_QUANTITIES)
 MOST_UNDECIDED = 0.5
 """Share of the numbers of a scene that are undecided, beyond which it does not hold."""
 SLOW_DRIVE = 0.1
-"""T3 and T4, and the pin forces with them, have poles where omega_3, omega_4 vanish, a cylinder's force where it stands
-still: a simulation is judged where the drive moves at more than this part of its greatest speed."""
+"""Part of the drive's greatest speed above which a simulation's forces are judged. The torque on bar 3 or 4, the force
+of a cylinder and the pin forces have poles where the speed of the drive vanishes."""
 CLOSURE = "a e^{i theta_2} + b e^{i theta_3} = d e^{i theta_1} + c e^{i theta_4}"
 NOWHERE = "no position at which it is demanded"
 NUMBERS = ("error", "allowed", "theta_2", "condition")
@@ -103,8 +103,8 @@ class Comparison:
     """Solution of the formulas at `answer.at`."""
     held: Held
     reference: Solution | None = None
-    """Another derivation at the same positions: the stricter of its conditions and sizes and the formulas' own decides
-    what they may be wrong by; left out: the answer itself."""
+    """Second derivation at the same positions; by default the answer itself. The stricter of its scale and condition
+    and those of the formulas sets the allowed error."""
     scales: Scales = field(default_factory=dict)
     """Scales of `formulas` and `reference`, if an earlier answer was compared with them."""
 
@@ -189,34 +189,34 @@ class Comparison:
         assert self.answer.assembled is not None
         both = formulas.assembled & self.answer.assembled
         stated = both & _mark_stated(quantity, formulas, ours)
-        numbers, withheld = int(np.count_nonzero(both)), _count(formulas.status_code[both & ~stated])
-        if withheld and not stated.any():
-            return _Judged(self._row(quantity, REFUSES, f"the formulas state no value: {withheld}"), numbers)
+        closed, unstated = int(np.count_nonzero(both)), _count(formulas.status_code[both & ~stated])
+        if unstated and not stated.any():
+            return _Judged(self._row(quantity, REFUSES, f"the formulas state no value: {unstated}"), closed)
         answerable = stated & _mark_answerable(quantity, scene, formulas, tolerance)
-        jumping = answerable & _mark_jumping(quantity, scene, formulas, tolerance)
-        jumps = int(np.count_nonzero(jumping))  # the forces of either side of a reversal are right
-        note = f"; not judged: {withheld}" if withheld else ""
-        note += f"; {jumps} positions at which dry friction reverses not judged" if jumps else ""
-        mask = answerable & ~jumping
+        reversing = answerable & _mark_reversing(quantity, scene, formulas, tolerance)
+        reversals = int(np.count_nonzero(reversing))  # at a reversal the forces of either side are right
+        note = f"; not judged: {unstated}" if unstated else ""
+        note += f"; {reversals} positions at which dry friction reverses not judged" if reversals else ""
+        mask = answerable & ~reversing
         if not mask.any():
-            nowhere = "no position at which both may be held to it" + note
-            return _Judged(self._row(quantity, UNDECIDED, nowhere), numbers, jumps)
+            nowhere = "no position at which this quantity can be compared" + note
+            return _Judged(self._row(quantity, UNDECIDED, nowhere), closed, reversals)
         row, decided = self._judge(quantity, ours, theirs, mask, note)
-        return _Judged(row, numbers, jumps + decided)
+        return _Judged(row, closed, reversals + decided)
 
     def _judge(self, quantity: str, ours: Array, theirs: Array, mask: Mask, note: str) -> tuple[Row, int]:
-        """Judge the errors at the positions `where`; return the row, and the number of positions with a verdict."""
+        """Judge the errors at the positions of `mask`; return the row, and the number of positions with a verdict."""
         size, condition = self._scale(quantity)
         allowed = self.held.tolerance.allowed(condition)
         if self.held.predicted is not None:
             allowed, size = np.where(size == 0.0, 0.0, allowed), replace_zero_size(size)
         error = find_error(quantity, ours, theirs, size)
-        beyond, mended = mask & (error > allowed), np.zeros_like(mask)
+        beyond, settled = mask & (error > allowed), np.zeros_like(mask)
         retried = np.full_like(error, np.nan)
         if self.held.nearby is not None and beyond.any():
             retried = find_error(quantity, ours, self._answered_nearby[quantity], size)
             error = np.where(beyond, np.fmin(error, retried), error)
-            mended = beyond & (retried <= allowed)
+            settled = beyond & (retried <= allowed)
         predict: Callable[[Mask], Array] | None = None
         if (predicted := self.held.predicted) is not None:
 
@@ -226,8 +226,8 @@ class Comparison:
 
         worst = _judge_errors(error, condition, mask, allowed, self.held.tolerance, predict)
         reason, i = worst.reason, worst.position
-        if mended.any():
-            reason += f"; {np.count_nonzero(mended)} positions within the rounding of theta_2"
+        if settled.any():
+            reason += f"; {np.count_nonzero(settled)} positions within the rounding of theta_2"
         numbers = (error[i], worst.allowed, self.formulas.theta_2[i], condition[i])
         row = self._row(quantity, worst.verdict, reason + note, **dict(zip(NUMBERS, numbers, strict=True)))
         return row, worst.decided
@@ -262,9 +262,9 @@ def _judge_errors(
     tolerance: ErrorBound,
     predict: Callable[[Mask], Array] | None,
 ) -> _Worst:
-    """Judge errors at the positions `where` by what is allowed, and beyond it by what was predicted there.
+    """Judge errors at the positions of `mask` by the allowed error, and larger ones by the predicted error.
 
-    NaN at any of them fails. `allowed` is 0 where the quantity vanishes; the error is in its own unit there.
+    NaN at any of them fails. `allowed` is 0 where the quantity vanishes; the error is in the quantity's unit there.
     """
     decidable = mask & (condition * NOTHING_TO_TELL > EPS) if tolerance.conditioned else mask
     undecided = int(np.count_nonzero(mask & ~decidable))
@@ -281,7 +281,7 @@ def _judge_errors(
         predicted = np.nan_to_num(predict(beyond), nan=0.0, posinf=np.inf)
     bound = np.maximum(allowed, TIMES_PREDICTED * predicted)
     ratio = find_used(error, bound)
-    # first order says that no digit is left, no more
+    # where a first-order prediction reaches the value itself, no digit is left to judge
     lost = beyond & np.isfinite(error) & np.where(allowed > 0.0, predicted >= 1.0, predicted == np.inf)
     ratio[lost] = np.minimum(ratio[lost], 1.0)
     index = int(np.argmax(np.where(beyond, ratio, -1.0)))
@@ -299,10 +299,10 @@ def _judge_errors(
 
 
 def _mark_stated(quantity: str, formulas: Solution, ours: Array) -> Mask:
-    """Mark where the formulas have one value: beyond the range of doubles the motion, up to the stage that met it."""
+    """Mark where the formulas have a single value. After an overflow these are the quantities computed before it."""
     if quantity in OF_FORCES:
-        # at rest a jam is of the motion that would begin
-        # where there are several solutions an engine may find another, or none by its own iteration
+        # A jam at rest concerns the motion that would begin, so its forces are stated. Forces with several solutions
+        # are not: an engine may find another one, or not converge.
         stated = (formulas.status_code == JAMMED) & np.isfinite(magnitude(ours))
         return np.asarray(stated | (formulas.status_code == OK))
     beyond = (formulas.status_code == OVERFLOW) & np.isnan(magnitude(ours))
@@ -316,8 +316,8 @@ def _count(codes: NDArray[np.uint8]) -> str:
     return ", ".join(f"{count} {name}" for name, count in zip(STATUS_NAMES, counts, strict=True) if count)
 
 
-def _mark_jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
-    """Mark where dry friction reverses and a force may have either value; the motion is prescribed and has one."""
+def _mark_reversing(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
+    """Mark where dry friction reverses, so that a force may have either of two values."""
     near_jamming = quantity == "drive_condition" and any(effect.loaded_pins for effect in scene.effects)
     if quantity not in OF_FORCES and not near_jamming:
         return np.zeros(len(formulas), dtype=bool)
@@ -325,7 +325,7 @@ def _mark_jumping(quantity: str, scene: Scene, formulas: Solution, tolerance: Er
 
 
 def _mark_answerable(quantity: str, scene: Scene, formulas: Solution, tolerance: ErrorBound) -> Mask:
-    """Mark where a quantity may be demanded of an engine of this class."""
+    """Mark where an engine of this class can be expected to have the quantity."""
     if quantity in FORCES and scene.drive_bar != 2 and tolerance.in_time:
         speed = {3: formulas.omega_3, 4: formulas.omega_4}.get(scene.drive_bar, formulas.stroke_speed)
         assert speed is not None
@@ -334,6 +334,6 @@ def _mark_answerable(quantity: str, scene: Scene, formulas: Solution, tolerance:
 
 
 def mark_turning(speed: Array) -> Mask:
-    """Mark where a driven bar turns fast enough that its torque and the pin forces are no pole's, (n,)."""
+    """Mark where the driven bar is fast enough that its torque and the pin forces are not near a pole, (n,)."""
     fast = np.abs(np.nan_to_num(speed))
     return np.asarray(fast > SLOW_DRIVE * fast.max())

@@ -33,7 +33,7 @@ IDENTITIES = (
 """Rows of the formulas that no engine answers: they do not count as compared."""
 
 SHIPPED = ("study", "sensitivity", "internal_forces", "extremes", "tolerances", "equilibria", "sdf", "usd")
-"""Engines of the rows that judge what else is shipped. With the formulas' own they are our own consistency."""
+"""Engines of the rows that check functions other than `solve`: with `formulas` they are fourbar's own."""
 LONGEST = 500
 """Characters of what somebody else's code gives as a reason."""
 

@@ -1,10 +1,10 @@
 """The four-bar as three free bodies, by numpy alone: no closed formula, no engine.
 
-The two closure equations, closed by Newton's method, are once and twice differentiated linear in the
-speeds b omega_3, c omega_4 and in b alpha_3, c alpha_4. Forces and moments about the first pin of each bar
-and the two reactions at A and B are thirteen linear equations in F12, F32, F23, F43, F34, F14 and the
-torque, or the force of a linear drive (R. L. Norton, Design of Machinery, ch. 11, has them about the mass
-centres). Vectors of the plane are complex numbers, x + i y.
+Newton's method solves the two closure equations for the angles. Their first derivative is linear in b omega_3 and
+c omega_4, their second in b alpha_3 and c alpha_4. Forces and moments about the first pin of each bar and the two
+reactions at A and B are thirteen linear equations in F12, F32, F23, F43, F34, F14 and the torque, or the force of a
+linear drive (R. L. Norton, Design of Machinery, ch. 11, has them about the mass centres). Vectors of the plane are
+complex numbers, x + i y.
 """
 
 from dataclasses import replace
@@ -183,7 +183,7 @@ def balance(scene: Scene, motion: BodyMotion) -> tuple[Array, float, Array | flo
     total: Array = unknowns[..., 0]
     from_jamming: Array | float = 1.0
     if len(arms):
-        couples = grow_couples(loads[..., 0], loads[..., 1:], arms)
+        couples = continue_couples(loads[..., 0], loads[..., 1:], arms)
         from_jamming = compute_distance_from_jamming(loads[..., 0], loads[..., 1:], arms, couples)
         total = total + (unknowns[..., 1:] * couples[:, None, :]).sum(axis=-1)
     return total, residual, from_jamming
@@ -230,7 +230,7 @@ def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
     size = float((k * np.abs(F)).max()) or 1.0
     x = size * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1)) * rng.uniform(0.0, 1.0, (n, len(k)))
     many = (np.broadcast_to(F, (n, *F.shape)), np.broadcast_to(C, (n, *C.shape)))
-    x, settled, _ = _improve_couples(*many, k, x)
+    x, settled, _ = _solve_couples(*many, k, x)
     solutions: list[Array] = []
     for loads in x[settled & (x >= 0.0).all(axis=1)]:
         if all(np.abs(loads - other).max() > APART * max(loads.max(), other.max()) for other in solutions):
@@ -239,7 +239,7 @@ def _count_at_position(F: Complex, C: Complex, k: Array) -> int:
 
 
 def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
-    """-m a_G and -I alpha (d'Alembert), moments about the first pin, of which that of bar 3 moves."""
+    """Add -m a_G and -I alpha (d'Alembert), with moments about each bar's first pin; that of bar 3 accelerates."""
     for number in MOVING_BARS:
         bar = motion.linkage.bar(number)
         arm, alpha = motion.to_centre(number), motion.alpha[number]
@@ -249,10 +249,10 @@ def _add_inertia(motion: BodyMotion, wrenches: BodyWrenches) -> None:
 
 
 def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
-    """Rows: forces on bars 2, 3, 4 and moments over the bar's length, reactions at A and B; (n, 13, 13).
+    """Make the matrix of the equations, (n, 13, 13): forces and moments of bars 2, 3, 4, reactions at A and B.
 
-    The last column is the torque over the driven bar's length, so that every number is 0, 1 or of a unit vector; of a
-    linear drive what 1 N of it does to the bars of its ends.
+    Moments are divided by the bar's length, so that every entry is 0, 1 or a component of a unit vector. The last
+    column is that of the torque, or the effect of 1 N of a linear drive on the two bars that it joins.
     """
     matrix = np.zeros((len(motion.theta_2), 13, 13))
     for bar, (row, first, second) in ROWS.items():
@@ -297,23 +297,23 @@ def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
     return x, float(np.max(remaining, initial=0.0, where=np.isfinite(remaining)))
 
 
-def grow_couples(F: Complex, C: Complex, k: Array) -> Array:
-    """Grow the couples x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p), from none; NaN where that ends in a jam.
+def continue_couples(F: Complex, C: Complex, k: Array) -> Array:
+    """Solve x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p), by continuation from no friction; NaN where it jams.
 
     Parameters
     ----------
     F : pin forces without this friction, (n, p), N.
-    C : what a couple of 1 N m against the rotation at pin q adds to the force at pin p, (n, p, p), 1/m.
+    C : force that a couple of 1 N m against the rotation at pin q adds at pin p, (n, p, p), 1/m.
     k : mu r of each pin, m.
     """
     x = np.full(F.shape, np.nan)
     remaining = np.flatnonzero(np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2)))
     x[remaining] = 0.0
     for stage in range(1, FRICTION_STAGES + 1):
-        x[remaining], settled, det = _improve_couples(
+        x[remaining], settled, det = _solve_couples(
             F[remaining], C[remaining], k * (stage / FRICTION_STAGES), x[remaining]
         )
-        # without friction the determinant is 1: where it changes its sign the growth has turned back, into a jam
+        # without friction the determinant is 1; a change of its sign means that the branch has turned back
         grown = settled & (det > 0.0) & (x[remaining] >= 0.0).all(axis=1)
         x[remaining[~grown]] = np.nan
         remaining = remaining[grown]
@@ -321,27 +321,27 @@ def grow_couples(F: Complex, C: Complex, k: Array) -> Array:
 
 
 def compute_distance_from_jamming(F: Complex, C: Complex, k: Array, x: Array) -> Array:
-    """Least singular value of the slope of the equations of `grow_couples` at their solution, at most 1, (n,)."""
+    """Compute the least singular value of the Jacobian of the equations of `continue_couples`, at most 1, (n,)."""
     with np.errstate(invalid="ignore"):
-        _, matrix = _compute_slope(F, C, k, x)
+        _, matrix = _compute_friction_jacobian(F, C, k, x)
     far = np.full(len(x), np.nan)
     finite = np.isfinite(matrix).all(axis=(1, 2))
     far[finite] = np.minimum(np.linalg.svd(matrix[finite], compute_uv=False)[:, -1], 1.0)
     return far
 
 
-def _compute_slope(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, Array]:
-    """Compute the loads of the pins under some couples, (n, p), N, and the slope of `grow_couples`, (n, p, p)."""
+def _compute_friction_jacobian(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, Array]:
+    """Compute the pin forces under couples, (n, p), N, and the Jacobian of `continue_couples`, (n, p, p)."""
     force = F + (C * x[:, None, :]).sum(axis=-1)
     size = np.abs(force)
     direction = force / np.where(size == 0.0, 1.0, size)
     return size, np.eye(len(k)) - k[:, None] * (np.conj(direction)[..., None] * C).real
 
 
-def _improve_couples(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_], Array]:
-    """Improve the couples from those of a smaller friction; return also the determinant of their slope."""
+def _solve_couples(F: Complex, C: Complex, k: Array, x: Array) -> tuple[Array, NDArray[np.bool_], Array]:
+    """Solve by Newton's method from couples `x`; return also where it converged, and the Jacobian's determinant."""
     for _ in range(FRICTION_STEPS):
-        size, matrix = _compute_slope(F, C, k, x)
+        size, matrix = _compute_friction_jacobian(F, C, k, x)
         gap, terms = k * size - x, k * (np.abs(F) + (np.abs(C) * x[:, None, :]).sum(axis=-1))
         settled = (np.abs(gap) <= FRICTION_SETTLED * terms).all(axis=1)
         step = solve_system(matrix, gap[..., None])[0][..., 0]

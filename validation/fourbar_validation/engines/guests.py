@@ -32,7 +32,7 @@ CLASS = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*", re.ASCII)
 NOT_FOUND = 2
 """Exit status of our host where there is no such class or engine."""
 QUESTIONS = 4
-"""Questions to a guest about one scene at most, with hello: its limit of time is that of each."""
+"""Most questions to a guest about one scene, hello included; each may take as long as the guest's time limit."""
 QUANTITIES = (*COMPARED, *DRY_FRICTION_QUANTITIES)
 """Names of what an engine can answer."""
 COMMANDS = tuple(names[0] for names in protocol.KINDS_OF_COMMAND)
@@ -63,21 +63,21 @@ class Guest(Engine):
     number: int = 0
     """Number of the engine, so that it is drawn with the same mark in every process."""
     seconds: float | None = None
-    """Limit of time for each question."""
+    """Time limit for each question."""
     releases: bool = False
     """True if it integrates released motions."""
     setting: str = ""
     """Name of the setting with which it is asked, one of those that its hello lists."""
 
-    def at_step(self, step: float) -> "Asked":
+    def at_step(self, step: float) -> "GuestClient":
         """Return the engine that integrates with this step, s."""
         engine = self.start()
-        assert isinstance(engine, Asked)
+        assert isinstance(engine, GuestClient)
         engine.step = step
         return engine
 
     def at_setting(self, **setting: Any) -> "Guest":
-        """Return the guest that is asked with this setting, under the name that was chosen before."""
+        """Return the guest that is asked with this setting; without `name` it keeps its named setting."""
         name = setting.pop("name", self.setting)
         asked = {"name": name, **setting} if name else setting
         return replace(self, setting=name, start=partial(self.start, setting=asked))  # type: ignore[call-arg]
@@ -109,7 +109,7 @@ def name_guests(entries: Sequence[tuple[str, str, Program]], known: Iterable[str
         names.add(name)
         guest = Guest(
             name,
-            partial(Asked, name, program, hello, trouble),
+            partial(GuestClient, name, program, hello, trouble),
             hello.tolerance,
             answers=hello.answers,
             positions=tuple(quantity for quantity in hello.answers if quantity in ANGLES),
@@ -190,7 +190,7 @@ def ask_hello(program: Program) -> Hello:
 
 
 def read_hello(data: dict[str, Any]) -> Hello:
-    """Check what an engine says of itself; InputError names what is wrong."""
+    """Check the hello of an engine; InputError names what is wrong."""
 
     def texts(name: str, default: tuple[str, ...], allowed: Sequence[str] | None = None) -> tuple[str, ...]:
         values = data.get(name, list(default))
@@ -207,7 +207,7 @@ def read_hello(data: dict[str, Any]) -> Hello:
         return write_one_line(value)
 
     if "error" in data:
-        raise EngineError(text("error") or "it broke down without a word")
+        raise EngineError(text("error") or "the engine reported an error without text")
     name = text("engine")
     if not name or name != data["engine"]:
         raise InputError("engine", data.get("engine"), "must be a name of printable characters in one line")
@@ -249,8 +249,8 @@ def find_needs(scene: Scene) -> list[str]:
     return needs
 
 
-class Asked:
-    """The engine of a guest: its program runs on from scene to scene, and is started anew after it broke down."""
+class GuestClient:
+    """Client of a guest's program, which runs on from scene to scene and is started again after a failure."""
 
     def __init__(
         self, name: str, program: Program, hello: Hello, trouble: str = "", setting: dict[str, Any] | None = None
@@ -262,7 +262,7 @@ class Asked:
         """Step of a released motion, s."""
 
     def answer(self, scene: Scene, command: Command) -> Answer:
-        """Return its answer; EngineError says how it broke down."""
+        """Return the answer of the guest; EngineError where it fails."""
         if refusal := self._explain_refusal(find_needs(scene)):
             return Answer(self.name, "exact", refusal=refusal)
         data = {
@@ -293,8 +293,8 @@ class Asked:
         lacking = [need for need in needs if need not in self._hello.effects]
         name = self._setting.get("setting", {}).get("name")
         if name is not None and name not in self._hello.settings:
-            return f"it does not name {name!r} among its settings"
-        return f"it does not name {', '.join(lacking)} among its effects" if lacking else ""
+            return f"the engine's hello does not list {name!r} in settings"
+        return f"the engine's hello does not list {', '.join(lacking)} in effects" if lacking else ""
 
     def _ask(self, question: dict[str, Any], positions: int) -> dict[str, Any]:
         running = _RUNNING.setdefault(self._program, Running(self._program))
@@ -302,7 +302,7 @@ class Asked:
 
     def _greet(self, ask: Ask) -> None:
         if read_hello(ask(HELLO, 0)) != self._hello:
-            raise EngineError("its hello is another than before")
+            raise EngineError("the engine's hello changed after a restart")
 
 
 _RUNNING: dict[Program, Running] = {}

@@ -262,7 +262,7 @@ def _read_reply(data: Any) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise InputError("answer", data, "must be an object")
     if "error" in data:
-        raise EngineError(_read_text("error", data["error"]) or "it broke down without a word")
+        raise EngineError(_read_text("error", data["error"]) or "the engine reported an error without text")
     return data
 
 
@@ -356,7 +356,7 @@ def require_near(made: Command, command: Command) -> None:
     for key, name, size, most in zip(COMMANDS[command.bar], names, sizes, allowances, strict=True):
         value, commanded = getattr(made, name), getattr(command, name)
         if value is not None and not np.abs(value - commanded).max() <= most * size:
-            allowed = f"is too far from the command: it must be within {most * size:g} of it"
+            allowed = f"must be within {most * size:g} of the command"
             raise InputError(f"at.{key}", None, allowed)
 
 

@@ -74,7 +74,7 @@ class EngineLine:
 
 OWN = "our own consistency"
 OWN_ENGINES = (FORMULAS, *SHIPPED)
-"""Engines whose rows compare what is ours with what is ours: identities, and what else is shipped."""
+"""Engines whose rows check fourbar against itself: identities, and functions other than `solve`."""
 SCENES_SHOWN = 200
 PICTURED = 24
 """Scenes with pictures, if fewer fail: drawing one takes ten times as long as judging it by an exact engine."""

@@ -30,13 +30,13 @@ from fourbar_validation.run.shipped.sensitivities import sensitivity, study, tol
 class Check(NamedTuple):
     """A check, and when it is made."""
 
-    rows: Callable[[Question], Iterable[Row]]
+    make_rows: Callable[[Question], Iterable[Row]]
     shipped: bool = False
-    """True if it checks something shipped besides `solve`: the engine of its rows, by its own name."""
+    """True if it checks a function of fourbar other than `solve`, whose name is then the engine of its rows."""
     free: bool = False
     """True if it checks a free motion, False for a prescribed one."""
-    theta_2: str = ""
-    """Part of it that needs a command of theta_2, and is left out with another command."""
+    needs_theta_2: str = ""
+    """Message that is printed where theta_2 is not commanded and the check is left out; empty for any command."""
 
 
 CHECKS = (
@@ -45,16 +45,19 @@ CHECKS = (
     Check(check_points),
     Check(check_law),
     Check(check_blocks),
-    Check(check_error_bars, theta_2="error bars: balls are asked at theta_2, and `stability --bar` at the other bars"),
+    Check(
+        check_error_bars,
+        needs_theta_2="error bars: balls are asked at theta_2, and `stability --bar` at the other bars",
+    ),
     Check(check_residual),
-    Check(Question.find_reversals, theta_2="reversals of dry friction: they are drawn over theta_2"),
+    Check(Question.find_reversals, needs_theta_2="reversals of dry friction: they are drawn over theta_2"),
     Check(compare_answers),
-    Check(compare_statements, theta_2="statements of the linkage: engines are led to its limits by theta_2"),
-    Check(check_mjcf, theta_2="MJCF as shipped: it drives bar 2"),
+    Check(compare_statements, needs_theta_2="statements of the linkage: engines are led to its limits by theta_2"),
+    Check(check_mjcf, needs_theta_2="MJCF as shipped: it drives bar 2"),
     Check(compare_inertia),
-    Check(check_released, free=True, theta_2="released motions: engines begin at theta_2"),
+    Check(check_released, free=True, needs_theta_2="released motions: engines begin at theta_2"),
     *(Check(rows, shipped=True) for rows in (study, sensitivity, internal_forces, extremes, tolerances, equilibria)),
-    *(Check(rows, shipped=True, theta_2=f"{rows.__name__}: the file opens at theta_2") for rows in (sdf, usd)),
+    *(Check(rows, shipped=True, needs_theta_2=f"{rows.__name__}: the file opens at theta_2") for rows in (sdf, usd)),
 )
 """All checks of a scene. An exception in a check fails its own rows only."""
 OUTPUT = "output.txt"
@@ -71,7 +74,7 @@ def judge_for_report(
 ) -> Record:
     """Judge a scene and keep what the report needs of it.
 
-    `draw`: with its pictures and observed orders. `shipped`: with what else is shipped.
+    `draw`: with its pictures and observed orders. `shipped`: with checks of functions other than `solve`.
     """
     record = judge(name, scene, engines, order=draw, shipped=shipped)
     for i, row in enumerate(record.rows):
@@ -92,7 +95,7 @@ def judge(
     """Make every check of one scene.
 
     `order`: measure the observed order of what is simulated, which takes two more simulations and changes no row.
-    `shipped`: check what else is shipped (studies, sensitivities, files of other simulators), which takes a second.
+    `shipped`: check the functions other than `solve` too (studies, sensitivities, SDF and USD), which takes a second.
     """
     question, free = ask(name, scene, engines), scene.motion.free is not None
     question.order = order
@@ -100,46 +103,48 @@ def judge(
     question.solution  # noqa: B018 - timed
     seconds = time.perf_counter() - begin
     if shipped and not free and (question.at.speed is None or question.free_body is None or question.free_body.refusal):
-        what = "judged by what the free bodies say of forces, and here they say nothing"
-        question.left_out.append(f"what else is shipped: {what}")
+        reason = "they are checked against the free bodies, which have no forces for this scene"
+        question.left_out.append(f"functions other than solve: {reason}")
         shipped = False
     rows: list[Row] = []
     for check in CHECKS:
         if check.free == free and (shipped or not check.shipped):
-            if check.theta_2 and question.at.commanded != "theta_2":
-                question.left_out.append(f"{check.theta_2}; {question.at.commanded} is commanded")
+            if check.needs_theta_2 and question.at.commanded != "theta_2":
+                question.left_out.append(f"{check.needs_theta_2}; {question.at.commanded} is commanded")
                 continue
-            called = check.rows.__name__
+            called = check.make_rows.__name__
             engine, part = (called, "") if check.shipped else (FORMULAS, called)
-            rows += question.attempt(partial(check.rows, question), engine, part)
+            rows += question.attempt(partial(check.make_rows, question), engine, part)
     return question.record(rows, seconds)
 
 
 def ask(name: str, scene: Scene, engines: Sequence[Engine]) -> Question:
-    """Put a scene to the engines that it needs, each position once; say what is left out."""
+    """Ask the engines that a scene needs, each position once, and list what is left out."""
     command = command_of(scene)
     if scene.motion.free is not None:
         return Question(name, scene, command, engines)
     question = Question(name, scene, command)
     numbers = (command.angle, command.branch, 0.0 if command.speed is None else command.speed, command.acceleration)
-    if len(command.angle) > 1 and all(np.ptp(values) == 0 for values in numbers):  # constant conditions are not swept
+    if len(command.angle) > 1 and all(np.ptp(values) == 0 for values in numbers):  # a sweep of equal positions
         question.left_out.append("positions: all are the same, one is evaluated")
         question.at = select_positions(command, np.array([0]))._replace(time=None)
-    question.engines = list(_choose_called_for(engines, question.at, question.left_out))
-    question.solve()  # untimed: the first call of a process pays for what every later one finds loaded
+    question.engines = list(_select_needed(engines, question.at, question.left_out))
+    question.solve()  # not timed: the first call in a process also pays for imports
     return question
 
 
-def _choose_called_for(engines: Iterable[Engine], command: Command, left_out: list[str]) -> Iterator[Engine]:
-    """Choose the engines that the question needs; the others are left out before they are imported."""
+def _select_needed(engines: Iterable[Engine], command: Command, left_out: list[str]) -> Iterator[Engine]:
+    """Select the engines that the question needs; the others are left out before they are imported."""
     for engine in engines:
         reason = None
         if command.speed is None:
-            reason = None if engine.positions else "the scene states positions only, and it gives forces"
+            reason = (
+                None if engine.positions else "the scene states positions only, and this engine computes only forces"
+            )
         elif engine.through_time and not np.any(command.speed):
             reason = "omega_2 is 0: nothing moves through time"
         elif engine.through_time and len(command.angle) == 1:
-            reason = "one position is no motion through time"
+            reason = "a simulation needs more than one position"
         if reason is None:
             yield engine if command.speed is not None else replace(engine, answers=engine.positions)
         else:

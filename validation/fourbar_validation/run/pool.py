@@ -32,7 +32,7 @@ class Job:
 def make_jobs(suite: Suite, scenes: Iterable[int], engines: Sequence[Engine], draw: bool, sample: int = 0) -> list[Job]:
     """Make the jobs of some scenes; one of a file carries its own text alone.
 
-    `sample`: number of scenes of the suite, evenly chosen, in which what else is shipped is judged too.
+    `sample`: number of scenes of the suite, evenly chosen, in which functions other than `solve` are checked too.
     """
     jobs = []
     for i in scenes:

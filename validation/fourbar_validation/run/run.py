@@ -56,7 +56,7 @@ class RunOptions:
     drawn: bool = True
     """True for pictures; a long suite has them at the end, of the scenes that fail or come nearest to failing."""
     sample: int = SAMPLE
-    """Scenes, evenly chosen, in which what else is shipped is judged."""
+    """Scenes, evenly chosen, in which functions other than `solve` are checked."""
 
 
 class Progress:

@@ -21,7 +21,7 @@ from fourbar_validation.run.shipped.variants import SceneFile
 from tests.support.scenes import crank_rocker
 
 SHIPPED = FAULT_SCENES["shipped"]
-CHECKS = [check.rows for check in judge.CHECKS if check.shipped]
+CHECKS = [check.make_rows for check in judge.CHECKS if check.shipped]
 ENGINES = {"study", "sensitivity", "internal_forces", "extremes", "tolerances", "equilibria", "sdf", "usd"}
 
 
