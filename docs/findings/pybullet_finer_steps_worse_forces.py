@@ -31,7 +31,7 @@ URDF = "".join(LINK.format(name) for name in ("ground", "a", "b", "c")) + "".joi
 
 
 def torque(step: float, **settings: float) -> float:
-    """Of the motor after a tenth of a second."""
+    """Return the torque of the motor after a tenth of a second."""
     client = bullet.connect(bullet.DIRECT)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "loop.urdf"

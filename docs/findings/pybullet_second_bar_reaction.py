@@ -30,7 +30,7 @@ STEP = 1e-5
 
 
 def reaction(q: tuple[float, float], v: tuple[float, float]) -> tuple[float, float]:
-    """Of the second joint, as reported and by Newton's law from the speeds before and after the step."""
+    """Return the second joint's reaction, as reported and by Newton's law from the speeds before and after the step."""
     client = bullet.connect(bullet.DIRECT)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "two.urdf"

@@ -109,7 +109,7 @@ def show_waiting(scene: Scene) -> Iterator[None]:
 
 
 def read_lengths(texts: tuple[str, ...]) -> list[float]:
-    """Ground, input, coupler and output, m."""
+    """Read the lengths of ground, input, coupler and output, m."""
     names = ("ground", "input", "coupler", "output")
     return [read_number(f"length of {name}", text, "m", POSITIVE) for name, text in zip(names, texts, strict=True)]
 

@@ -308,7 +308,7 @@ def find_start(scene: Scene) -> Start:
 
 
 def _compute_span(linkage: FourBar) -> float:
-    """Width of the range that the input can turn through, rad."""
+    """Compute the width of the range that the input can turn through, rad."""
     least, most = choose_range(linkage)
     return min(abs(most - least), 2.0 * math.pi)
 
@@ -344,7 +344,7 @@ OMEGA = 1.0
 
 
 def make_scene(ground: float, input: float, coupler: float, output: float, omega: float = OMEGA) -> Scene:
-    """Uniform slender bars of 1 kg/m on the open branch, the input at omega (rad/s) from mid-range; lengths in m."""
+    """Make a scene of uniform slender bars of 1 kg/m, the input at omega (rad/s) from mid-range; lengths in m."""
     linkage = uniform(ground, input, coupler, output, per_metre=PER_METRE)
     title = f"four-bar {ground!r} {input!r} {coupler!r} {output!r}"
     # half a turn from the ground's line would start a parallelogram in its change point

@@ -70,7 +70,7 @@ def _unwind_torsion(effect: "Torsion", linkage: FourBar, q: Joints) -> Joints:
 
 
 def _add_flywheel(effect: "Flywheel", model: Model) -> None:
-    """Inertia of the body: MuJoCo's armature of pin O2 is what drives."""
+    """Add the flywheel as inertia of the body, because MuJoCo's armature of pin O2 is the drive."""
     model.inertia[effect.bar] += effect.inertia
 
 

@@ -91,7 +91,7 @@ def compute_frame(linkage: FourBar) -> CameraView:
 
 
 def add_appearance(root: ET.Element, linkage: FourBar) -> None:
-    """Extent and free camera of the viewer, light, background."""
+    """Add the extent and free camera of the viewer, light and background."""
     seen = compute_frame(linkage)
     ET.SubElement(root, "statistic", extent=write_rounded(seen.distance / 1.5), center=write_rounded(seen.x, seen.y, 0))
     visual = ET.SubElement(root, "visual")
@@ -224,7 +224,7 @@ class Model:
         return any(attribute in attributes for attributes in self.pin.values())
 
     def add_option(self, root: ET.Element) -> None:
-        """Integrator, solver, and flags that switch off what a closed loop does not need."""
+        """Add integrator, solver, and flags that switch off what a closed loop does not need."""
         s = self.settings
         options = {
             "timestep": join(self.timestep),
@@ -354,7 +354,7 @@ class Model:
             self._add_site(_find_body(root, load.bar), f"load_{index}", x, y)
 
     def add_actuators(self, root: ET.Element, drive: dict[str, str], *, cylinder: bool) -> None:
-        """Actuators: the drive by its attributes, without any there is none; loads and some springs, uncontrolled."""
+        """Add actuators: the drive, if it has attributes; loads and some springs, uncontrolled."""
         springs = {f"spring_{i}": s for i, s in enumerate(self.springs, 1) if not _is_slack_somewhere(s)}
         if not drive and not cylinder and not self.loads and not springs:
             return

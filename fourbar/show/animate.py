@@ -227,7 +227,7 @@ def _describe_pace(motion: Solution, rate: float, shown: int) -> str:
 
 
 def _collect_columns(solution: Solution) -> dict[str, Any]:
-    """Quantity by quantity."""
+    """Collect the values quantity by quantity."""
     columns: dict[str, Any] = {"sign": solution.branch.tolist()}
     if (solution.status_code != OK).any():
         columns["status"] = solution.status
@@ -335,6 +335,6 @@ def _hash_content(text: str) -> str:
 
 
 def embed_json(value: object) -> str:
-    """JSON that can stand inside a script element, whatever strings it holds."""
+    """Write JSON that can stand inside a script element, whatever strings it holds."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

@@ -47,7 +47,7 @@ def units(text: str) -> Conversion:
 
 
 def _explain_refusal(name: str, unit: str) -> str:
-    """Why a name is no unit for another one; empty where it is."""
+    """Explain why a name is no unit for another one; empty where it is."""
     from fourbar.quantities.units import UnitError, to_si
 
     try:

@@ -65,7 +65,7 @@ def draw_scene(seed: int, index: int) -> Scene:
 
 
 def _draw_own(rng: np.random.Generator, length: float) -> tuple[Any, ...]:
-    """Inertia and centre of a bar, or none: then they follow its length."""
+    """Draw inertia and centre of a bar, or none: then they follow its length."""
     return (0.1 * length * length, (0.5 * length, rng.uniform(-1.0, 1.0))) if rng.random() < 0.7 else ()
 
 
@@ -118,7 +118,7 @@ def _move_numbers(scene: Scene, parts: Array) -> dict[str, Any]:
 
 
 def _climb(scene: Scene, intervals: tuple[tuple[float, float], ...], name: str, sign: int) -> tuple[Array, float]:
-    """Parts of the tolerances and theta_2 of the greatest (+1) or least (-1) value found."""
+    """Find parts of the tolerances and theta_2 of the greatest (+1) or least (-1) value."""
     rng, k = np.random.default_rng(0), len(scene.tolerances)
     low, high = np.array(intervals).T
     spots = rng.integers(0, len(low), DRAWN)

@@ -28,7 +28,7 @@ def find_checkout(what: str) -> Path:
 
 @contextmanager
 def import_path() -> Iterator[str]:
-    """PYTHONPATH for another interpreter: it finds this code there, and no library of this environment."""
+    """Return PYTHONPATH for another interpreter: it finds this code there, and no library of this environment."""
     rest = filter(None, [os.environ.get("PYTHONPATH")])
     if CHECKOUT is not None:
         yield os.pathsep.join([str(CHECKOUT), str(PACKAGE.parent), str(CHECKOUT / "lab"), *rest])

@@ -60,7 +60,7 @@ XML = """
 
 
 def model(names, jacobian):
-  """Two rockers on the ground, then the crank with both couplers."""
+  """Makes two rockers on the ground, then the crank with both couplers."""
   sprung = names == ["sprung"]
   rockers, couplers, closures = "", "", ""
   for i, name in enumerate(names):
@@ -82,7 +82,7 @@ def model(names, jacobian):
 
 
 def states(names):
-  """qpos, qvel, torque and closing forces at each crank angle."""
+  """Yields qpos, qvel, torque and closing forces at each crank angle."""
   for degrees in EXPECTED[names[0]]:
     theta_2, rows = np.deg2rad(degrees), [EXPECTED[name][degrees] for name in names]
     qpos, qvel = [theta_4 for _, theta_4, _, _ in rows] + [theta_2], []

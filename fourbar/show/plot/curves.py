@@ -281,7 +281,7 @@ REMARK = 0.34
 
 
 def draw_transmission(axes: "Axes", view: View) -> None:
-    """Acute angle between coupler and output, with limit and dead-centre positions."""
+    """Draw the acute angle between coupler and output, with limit and dead-centre positions."""
     over = draw_axes(axes, view)
     sweep = view.sweep
     mu = np.degrees(np.arctan2(np.abs(sweep.sin_mu), np.abs(np.cos(sweep.theta_4 - sweep.theta_3))))

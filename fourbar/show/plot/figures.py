@@ -64,7 +64,7 @@ def _draw_kinematics(figure: "SubFigure", shown: View, labels: Labels) -> None:
 
 
 def _draw_points(figure: "SubFigure", shown: View, labels: Labels) -> None:
-    """Paths, speeds and accelerations of points."""
+    """Draw paths, speeds and accelerations of points."""
     panels = figure.subplot_mosaic([["linkage", "speeds"], ["linkage", "accelerations"]], width_ratios=[1.15, 1.0])
     linkage.draw_linkage(panels["linkage"], shown, labels, moving=True)
     curves.draw_speeds(panels["speeds"], shown)

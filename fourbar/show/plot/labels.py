@@ -49,7 +49,7 @@ class Labels:
         self.wanted.append(label)
 
     def keep_off(self, axes: "Axes", *points: Point, width: float = 1.0) -> None:
-        """Lines, given by their points, that labels do not cover; twice the same point is a mark.
+        """Keep labels off lines, given by their points; twice the same point is a mark.
 
         A broad line (`width` in typographic points) counts by what of it would be covered.
         """

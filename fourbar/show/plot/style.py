@@ -41,7 +41,7 @@ def choose_force_line(name: str) -> dict[str, Any]:
 
 
 def write_force_name(name: str) -> str:
-    """F12 as it is typeset."""
+    """Write the name of a pin force as it is typeset."""
     return f"$F_{{{name[1:]}}}$"
 
 
@@ -132,7 +132,7 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def write_number(value: float) -> str:
-    """Three significant digits, never in exponent form where four digits do."""
+    """Write three significant digits, never in exponent form where four digits do."""
     if value == 0.0:
         return "0"
     size = math.floor(math.log10(abs(value)))

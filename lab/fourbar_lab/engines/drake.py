@@ -86,22 +86,22 @@ class DrakeTree(Tree):
         return np.asarray(self.plant.CalcJacobianTranslationalVelocity(self.context, BY_SPEEDS, *arguments)[:2])
 
     def turn(self, bar: int) -> Array:
-        """Last row of the angular velocity's Jacobian."""
+        """Return the last row of the angular velocity's Jacobian."""
         arguments = (self.body[bar].body_frame(), self.world, self.world)
         return np.array(self.plant.CalcJacobianAngularVelocity(self.context, BY_SPEEDS, *arguments)[2])
 
     def set_motion(self, v: Array, a: Array) -> None:
-        """Speeds; accelerations are given with each request."""
+        """Set the speeds; accelerations come with each request."""
         self.plant.SetVelocities(self.context, v)
 
     def acceleration(self, name: str) -> Array:
-        """J a + (dJ/dt) v of a point."""
+        """Return J a + (dJ/dt) v of a point."""
         arguments = (*self.local[name], self.world, self.world)
         bias = self.plant.CalcBiasTranslationalAcceleration(self.context, BY_SPEEDS, *arguments)
         return np.asarray(self.point_jacobian(name) @ self.a + bias[:2, 0])
 
     def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
-        """Inverse dynamics with gravity as a force element and what acts on the bars as external forces."""
+        """Compute the inverse dynamics with gravity as a force element and what acts on the bars as external forces."""
         forces = MultibodyForces(self.plant)
         if any(field):
             self.plant.CalcForceElementsContribution(self.context, forces)

@@ -128,7 +128,7 @@ class ExudynBars(Loaded):
         return np.array(self.solver.GetSystemJacobian())[SIZE:, :SIZE]
 
     def gap(self) -> tuple[float, float]:
-        """B on bar 3 minus B on bar 4, from the constraint of pin B."""
+        """Return B on bar 3 minus B on bar 4, from the constraint of pin B."""
         x, y = self._read_constraint_gap()[B_ROWS].tolist()
         return x, y
 
@@ -173,7 +173,7 @@ class ExudynBars(Loaded):
         return {name: self.point(point) for name, point in POINTS.items()}
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
-        """Speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
+        """Return speeds, accelerations and multipliers; nothing where a toggle leaves them 0/0."""
         of_drive, commanded = self._read_constraint_jacobian(), np.eye(SIZE)[-1]  # a cylinder's is that of closed pins
         jacobian = np.vstack((of_drive[:-1], np.eye(SIZE)[self.turn[bar]]))
         try:

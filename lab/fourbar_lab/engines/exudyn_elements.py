@@ -54,14 +54,14 @@ class Bodies:
 
 
 def _add_viscous(effect: Any, bodies: Bodies) -> None:
-    """`CoordinateSpringDamper` between the two directions."""
+    """Add a `CoordinateSpringDamper` between the two directions."""
     for pin, damping in effect.coefficients:
         markers = [bodies.direction(bar) for bar in PINS[pin]]
         bodies.mbs.AddObject(ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, damping=damping))
 
 
 def _add_torsion(effect: Any, bodies: Bodies) -> None:
-    """`TorsionalSpringDamper`, which measures within half a turn of rest between axes that coincide there."""
+    """Add a `TorsionalSpringDamper`, which measures within half a turn of rest between axes that coincide there."""
     for pin, stiffness, rest, preload in effect.springs:
         first, second = PINS[pin]
         line = bodies.ground_angle if first == 1 else 0.0
@@ -71,7 +71,7 @@ def _add_torsion(effect: Any, bodies: Bodies) -> None:
 
 
 def _add_springs(effect: Any, bodies: Bodies) -> None:
-    """`SpringDamper` between two points."""
+    """Add a `SpringDamper` between two points."""
     for spring in effect.springs:
         ends = (spring.start, spring.end)
         bodies.mbs.AddObject(

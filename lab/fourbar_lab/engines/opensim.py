@@ -220,7 +220,7 @@ class OpenSimBars(Loaded):
         return values
 
     def _forces(self, leverage: float) -> dict[str, Any]:
-        """Joint reactions, closing force and torque of its constrained dynamics.
+        """Return joint reactions, closing force and torque of the constrained dynamics.
 
         Simbody holds the commanded bar to its motion by a couple: over the leverage it is what the drive gives. What it
         finds is given back as forces and found anew, until its multipliers hold nothing but rounding.
@@ -281,7 +281,7 @@ OpenSimConstraints = partial(Exact, "opensim-constraints", OpenSimBars, ("theta_
 
 
 def make_vec(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
-    """Three components."""
+    """Make a vector of three components."""
     return osim.Vec3(float(x), float(y), float(z))
 
 
@@ -295,5 +295,5 @@ def make_vector(values: Iterable[float]) -> Any:
 
 
 def _make_constants() -> list[Any]:
-    """Three functions of time that are zero, and may be given another value later."""
+    """Make three functions of time that are zero, and may be given another value later."""
     return [osim.Constant(value) for value in ZERO]

@@ -44,7 +44,7 @@ class LoopConstrained(ClosedTree):
         return pin.lcaba(self.tree.model, self.data, q, v, tau, self.models, self.closure_data, self.proximal).copy()
 
     def loop_force(self) -> Array:
-        """F43: lcaba leaves the force on bar 4, in the axes of bar 3, whatever frame the closure was given."""
+        """Return F43: lcaba leaves the force on bar 4, in the axes of bar 3, whatever frame the closure was given."""
         return np.array(-self.tree.rotation(3) @ self.closure_data[0].contact_force.linear[:2])
 
 

@@ -58,7 +58,7 @@ class PinocchioSlider:
         return forces[0], forces[1], forces[2]
 
     def _solve(self, a: Array, closing: Array) -> Array:
-        """Inverse dynamics with the force on the rod's end, its opposite and the load on the slider."""
+        """Solve the inverse dynamics with the force on the rod's end, its opposite and the load on the slider."""
         outside = [pin.Force.Zero() for _ in range(4)]
         for joint, force, frame in ((2, closing, self.frames[0]), (3, self.push - closing, self.frames[1])):
             turned = self.data.oMi[joint].rotation.T @ np.array([*force, 0.0])

@@ -64,7 +64,7 @@ def find_fitted(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
 
 
 def _find_ratios(judge: Judge, differing: list[str]) -> Iterator[Mistake]:
-    """Columns that are one number times ours: a unit, by name where a pair of units has that ratio."""
+    """Find columns that are one number times ours: a unit, by name where a pair of units has that ratio."""
     by_ratio: dict[tuple[str, float], set[str]] = {}
     for key in differing:
         mask = judge.where(key)
@@ -119,7 +119,7 @@ def _round_ratio(judge: Judge, key: str, near: float) -> tuple[str, float] | Non
 
 
 def _try_exchanged(differing: list[str]) -> Iterator[Mistake]:
-    """Two columns of one unit, each under the name of the other."""
+    """Try two columns of one unit, each under the name of the other."""
     for one, second in combinations(dict.fromkeys(map(name_quantity, differing)), 2):
         if UNITS[one] == UNITS[second] and (one in VECTORS) == (second in VECTORS):
             taken = {one: second, second: one}

@@ -177,7 +177,7 @@ class Judge:
         return findings
 
     def without_answer(self) -> list[int]:
-        """Lines that state a number where this linkage does not assemble, or is singular: none is right there."""
+        """List lines that state a number where this linkage does not assemble or is singular: none is right there."""
         missing = [self.table.stated(key) & ~self._answer(key) for key in self.table.values]
         return [self.table.lines[i] for i in np.flatnonzero(np.any(missing, axis=0))]
 

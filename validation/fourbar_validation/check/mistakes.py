@@ -63,7 +63,7 @@ def _take_from(wrong: Solution, quantity: str, right: Solution) -> Array | None:
 
 
 def _scale_inertial(scene: Scene, command: Command) -> Iterator[Mistake]:
-    """Inertial forces in another unit than the loads they are added to: forces and torque are linear in each."""
+    """Scale the inertial forces against the loads they are added to: forces and torque are linear in each."""
     if command.omega_2 is None:
         return
     bare = replace(scene, loads=(), effects=())

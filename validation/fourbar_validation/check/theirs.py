@@ -143,7 +143,7 @@ def _put(table: TheirTable, name: str, unit: Unit, numbers: Array, halves: Array
 
 
 def _find_rounding(halves: Array, unit: Unit) -> Array:
-    """Half a unit of each theta_2; of a cell whose zeros were left off, that of the column."""
+    """Find half a unit of each theta_2's last digit; of a cell whose zeros were left off, that of the column."""
     least = halves.min()
     if least > 0.5 * unit.factor * 10.0**-DECIMALS * (1.0 + EPS):
         return np.zeros_like(halves)

@@ -38,7 +38,7 @@ class DriveLine(NamedTuple):
             return self.across / self.stroke
 
     def speed(self, omega: dict[int, Array]) -> Array:
-        """Rate of the stroke at angular velocities of bars 1 to 4, m/s: each arm swings across itself."""
+        """Compute the rate of the stroke at angular velocities of bars 1 to 4, m/s: each arm swings across itself."""
         swung = []
         for point, arm in zip((self.drive.start, self.drive.end), self.arms, strict=True):
             velocity = 1j * omega[point.bar] * arm

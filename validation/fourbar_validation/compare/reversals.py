@@ -119,7 +119,7 @@ def _compute_speeds(solution: Solution) -> dict[int, Any]:
 
 
 def _bisect(scene: Scene, command: Command, pin: str, i: int, j: int, slip: float) -> Reversal:
-    """Halve the interval between positions i and j; there, friction in the sense of either side."""
+    """Locate the reversal between positions i and j by bisection, with friction in the sense of either side."""
 
     def look(theta_2: float, side: int, stage: str) -> Solution:
         moved = command._replace(angle=np.array([theta_2]), branch=command.branch[i : i + 1], remainder=None, time=None)

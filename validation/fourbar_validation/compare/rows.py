@@ -123,7 +123,7 @@ def make_breakdown(scene: str, engine: str, error: BaseException, part: str = ""
 
 
 def say_error(error: BaseException) -> str:
-    """Kind and message of an error, whatever its message raises."""
+    """Say kind and message of an error, whatever its message raises."""
     try:
         message = str(error)
     except BaseException as another:
@@ -132,13 +132,13 @@ def say_error(error: BaseException) -> str:
 
 
 def write_one_line(text: str) -> str:
-    """Somebody's text in one line that prints, its middle left out where it is long."""
+    """Write somebody's text in one line that prints, its middle left out where it is long."""
     line = make_plain(" ".join(text.split()))
     return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
 
 
 def make_plain(text: str) -> str:
-    """Somebody's text with every character that does not print, but for the ends of lines, written as its escape.
+    """Write every character that does not print, but for the ends of lines, as its escape.
 
     Characters that would steer a terminal or a reader are shown, not sent.
     """
@@ -150,7 +150,7 @@ FORMULA = ("=", "+", "-", "@")
 
 
 def write_cell_text(cell: str) -> str:
-    """Somebody's text as a cell that stays text in a spreadsheet: with an apostrophe before what begins a formula."""
+    """Write a cell that stays text in a spreadsheet: with an apostrophe before what begins a formula."""
     return f"'{cell}" if cell.startswith(FORMULA) and len(cell) > 1 else cell
 
 

@@ -133,13 +133,13 @@ TERMS: dict[str, Callable[[str, Scene, Solution], Array]] = {
 
 
 def _compute_drive_arms(scene: Scene) -> dict[int, float]:
-    """Distances of the ends of a linear drive from the first pins of their bars, m."""
+    """Compute the distances of the ends of a linear drive from the first pins of their bars, m."""
     ends = () if scene.drive is None else (scene.drive.start, scene.drive.end)
     return {end.bar: abs(end.distance) for end in ends}
 
 
 def _compute_arm(scene: Scene, number: int) -> float:
-    """Distance of a bar's mass centre from its first pin, m."""
+    """Compute the distance of a bar's mass centre from its first pin, m."""
     return abs(scene.linkage.bar(number).mass_centre[0])
 
 

@@ -183,7 +183,7 @@ def magnitude(values: Array) -> Array:
 
 
 def compute_difference(quantity: str, ours: Array, theirs: Array) -> Array:
-    """Angles modulo 2 pi, vectors by Euclidean norm, (n,); NaN where the shapes are not the same."""
+    """Compute differences, of angles modulo 2 pi, of vectors by Euclidean norm, (n,); NaN where the shapes differ."""
     if theirs.shape != ours.shape:
         return np.full(len(ours), np.nan)
     apart = ours - theirs

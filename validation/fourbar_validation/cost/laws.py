@@ -70,13 +70,13 @@ def write_laws(all_laws: Sequence[ErrorLaw]) -> list[str]:
 
 
 def _group(pairs: Sequence[tuple[str, str]]) -> list[str]:
-    """Quantities with the same text, together."""
+    """Group quantities with the same text."""
     texts = dict.fromkeys(text for _, text in pairs)
     return [f"{', '.join(quantity for quantity, text_of in pairs if text_of == text)}: {text}" for text in texts]
 
 
 def fit(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
-    """Slope of log y over log x by least squares, and its standard error."""
+    """Fit the slope of log y over log x by least squares; return it and its standard error."""
     from scipy.stats import linregress
 
     line = linregress(np.log(x), np.log(y))
@@ -157,7 +157,7 @@ def _measure_leap(point: CostPoint, ladder: Sequence[CostPoint], quantity: str) 
 
 
 def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:
-    """RK4's floor at a time constant of k steps goes as k^-4, whatever the timestep."""
+    """Fit RK4's floor: at a time constant of k steps it goes as k^-4, whatever the timestep."""
     ladders = ((tc, curves.get(f"RK4, pads, tc = {tc:g} h", ())) for tc in (3.0, 10.0, 30.0, 100.0))
     floors = {tc: least for tc, points in ladders if (least := find_floor(points, quantity)) is not None}
     name = "floor of RK4 in tc/h"
@@ -191,7 +191,7 @@ def list_warnings(curves: Mapping[str, Sequence[CostPoint]]) -> list[str]:
 
 
 def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
-    """Points that no other beats in both error and cost, from cheap to accurate."""
+    """Find the points that no other beats in both error and cost, from cheap to accurate."""
     front: list[CostPoint] = []
     for point in sorted(points, key=lambda p: (p.seconds_per_revolution, getattr(p, quantity))):
         if math.isfinite(getattr(point, quantity)) and (

@@ -107,7 +107,7 @@ def _choose_ladder(integrator: str) -> tuple[int, ...]:
 
 
 def _vary_default_closure(integrator: str, speed: float) -> Curve:
-    """MuJoCo's solref, solimp and solver; Euler at 2 ms is what a new user gets."""
+    """Vary MuJoCo's solref, solimp and solver around Euler at 2 ms, which a new user gets."""
     settings = replace(BEST, integrator=integrator, pad=None)
     curve = trace_steps(
         f"{integrator}, MuJoCo's defaults", settings, drives.restore_defaults, _choose_ladder(integrator)

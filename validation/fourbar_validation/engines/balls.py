@@ -123,7 +123,7 @@ def find_commanded(x: Values) -> int:
 
 
 def solve_linear(rows: list[list[Ball]], right: list[Ball]) -> list[Ball]:
-    """Solution of a linear system, rigorous; ZeroDivisionError where it is singular to working precision."""
+    """Solve a linear system rigorously; ZeroDivisionError where it is singular to working precision."""
     solution = arb_mat(rows).solve(arb_mat([[value] for value in right]))
     return [solution[k, 0] for k in range(len(right))]
 
@@ -315,7 +315,7 @@ def _solve_thirteen(
 
 
 def _put(y: Values, vectors: dict[str, Complex]) -> None:
-    """Vectors by their components."""
+    """Put vectors by their components."""
     for name, vector in vectors.items():
         y[f"{name}_x"], y[f"{name}_y"] = vector.real, vector.imag
 
@@ -402,7 +402,7 @@ def find_line(drive: LinearDrive, x: Values, w: dict[int, Complex], first_pin: d
 
 
 def compute_condition(line: BallLine, x: Values, tip: Complex, sines: dict[int, Ball]) -> Ball:
-    """|P|/L, P the speed of the stroke with (sin mu, (a/b) sin(theta_2 - theta_4), (a/c) sin(theta_2 - theta_3)).
+    """Compute |P|/L, P the stroke's speed with (sin mu, (a/b) sin(theta_2 - theta_4), (a/c) sin(theta_2 - theta_3)).
 
     L is the sum of what each end could move: r on bar 2, a + r a/b on bar 3, r a/c on bar 4, `tip` is A.
     """

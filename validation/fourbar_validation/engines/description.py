@@ -59,7 +59,7 @@ def find_centre(bar: Bar) -> tuple[float, float]:
 
 
 def about_first_pin(bar: Bar) -> float:
-    """Moment of inertia about the first pin, kg m^2."""
+    """Compute the moment of inertia about the first pin, kg m^2."""
     return find_inertia(bar) + bar.mass * find_centre(bar)[0] ** 2
 
 

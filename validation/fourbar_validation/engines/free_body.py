@@ -113,7 +113,7 @@ def _compute_places(linkage: FourBar, theta_2: Array, theta_3: Array, theta_4: A
 def _answer_positions(
     scene: Scene, commanded: int, theta_2: Array, speed: Array, acceleration: Array, theta_3: Array, theta_4: Array
 ) -> tuple[dict[str, Array], float]:
-    """Motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
+    """Compute motion, pin forces and torque at some positions, and the residual of their thirteen equations."""
     motion = move(scene.linkage, theta_2, speed, acceleration, theta_3, theta_4, commanded)
     unknowns, residual, from_jamming = balance(scene, motion)
     drive = COUPLE if scene.drive is None else LINE
@@ -282,7 +282,7 @@ def _make_right_sides(linkage: FourBar, wrenches: BodyWrenches) -> Array:
 
 
 def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
-    """Solutions, NaN where the matrix is singular, and the largest residual relative to |matrix| |x| + |right|.
+    """Solve linear systems, NaN where singular; return also the largest residual over |matrix| |x| + |right|.
 
     One step of refinement makes each equation hold to the rounding of its own terms.
     """

@@ -46,7 +46,7 @@ class Closed(NamedTuple):
 
 
 def close(linkage: FourBar, theta: Array, branch: NDArray[np.int8], bar: int = 2) -> Closed:
-    """Newton from each start in turn, for the positions at which no earlier one arrived.
+    """Close the loop by Newton's method, from the next start where no earlier one converged.
 
     Bar 2 commanded, bars 3 and 4 span the diagonal from A to O4; of bar 3 they are bars 2 and 4, of bar 4 bars 3 and 2,
     bar 2 from A to O2.

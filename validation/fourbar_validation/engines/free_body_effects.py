@@ -49,7 +49,7 @@ class BodyMotion(NamedTuple):
         return self.omega[j] - self.omega[i]
 
     def sense(self, pin: str) -> Array:
-        """Sign of the slip; where the linkage rests that of the motion about to begin."""
+        """Return the sign of the slip; at rest, that of the motion about to begin."""
         slip = self.slip(pin)
         if self.beginning is None:
             return np.sign(slip)
@@ -164,7 +164,7 @@ WRENCH_OF: dict[str, Callable[[Any, BodyMotion, BodyWrenches], None]] = {
 
 
 def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
-    """Everything that acts on the bars but pins, inertia, drive and what depends on the pin forces."""
+    """Sum all that acts on the bars but pins, inertia, drive and what depends on the pin forces."""
     wrenches = BodyWrenches(len(motion.theta_2))
     for load in scene.loads:
         apply_load(load, motion, wrenches)

@@ -39,7 +39,7 @@ class Assembled(Protocol):
         """Move to a configuration."""
 
     def gap(self) -> tuple[float, float]:
-        """B on bar 3 minus B on bar 4, or A on bar 2 minus A on bar 3, m."""
+        """Return B on bar 3 minus B on bar 4, or A on bar 2 minus A on bar 3, m."""
 
     def jacobian(self) -> Array:
         """Return the derivative of the gap, (2, 3), m."""
@@ -64,10 +64,10 @@ class EngineBars(Assembled, Protocol):
         """Measure from the ground pin of a bar, at angle 0, to a cylinder's end on it, and to that on the ground, m."""
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
-        """Motion and forces where the bars are placed, one moving so, by name; empty where a toggle leaves them 0/0."""
+        """Return motion and forces where the bars are placed, by name; empty where a toggle leaves them 0/0."""
 
     def refusal(self) -> str:
-        """Why what was answered does not count, or nothing."""
+        """Return why what was answered does not count, or nothing."""
         return ""
 
 

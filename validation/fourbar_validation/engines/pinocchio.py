@@ -57,7 +57,7 @@ class PinocchioTree(Tree):
         self.model.gravity = pin.Motion(np.array([*field, 0.0]), np.zeros(3))
 
     def place(self, q: Sequence[float]) -> None:
-        """Joint frames, Jacobian columns and points at q."""
+        """Place joint frames, Jacobian columns and points at q."""
         self.q[:] = q
         pin.computeJointJacobians(self.model, self.data, self.q)
         pin.updateFramePlacements(self.model, self.data)
@@ -75,11 +75,11 @@ class PinocchioTree(Tree):
         return np.array(pin.getFrameJacobian(self.model, self.data, self.frame[name], WORLD)[:2])
 
     def turn(self, bar: int) -> Array:
-        """Last row of the bar's frame Jacobian."""
+        """Return the last row of the bar's frame Jacobian."""
         return np.array(pin.getFrameJacobian(self.model, self.data, self.frame[f"G{bar}"], WORLD)[5])
 
     def set_motion(self, v: Array, a: Array) -> None:
-        """Forward kinematics."""
+        """Compute the forward kinematics."""
         pin.forwardKinematics(self.model, self.data, self.q, v, a)
 
     def acceleration(self, name: str) -> Array:
@@ -88,7 +88,7 @@ class PinocchioTree(Tree):
         return np.array(motion.linear[:2])
 
     def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
-        """Recursive Newton-Euler with what acts on the bars as external forces."""
+        """Compute recursive Newton-Euler with what acts on the bars as external forces."""
         self._weigh(field)
         for bar, (x, y, moment) in wrenches.items():
             force, couple = self.external_force[bar]
@@ -148,7 +148,7 @@ class ClosedTree:
         return pin.constraintDynamics(model, data, q, v, tau, self.models, self.closure_data, self.proximal).copy()
 
     def loop_force(self) -> Array:
-        """F43 of the acceleration last found, (2,), N."""
+        """Return F43 of the acceleration last found, (2,), N."""
         return np.array(self.closure_data[0].contact_force.linear[:2])
 
 

@@ -61,7 +61,7 @@ class Tree(Loaded, Protocol):
         """Return that of a point at the motion last set, (2,), m/s^2."""
 
     def needed(self, field: tuple[float, float], wrenches: dict[int, list[float]]) -> Array:
-        """Generalised forces that the motion last set asks for beyond gravity and what acts, (3,), N m."""
+        """Return the generalized forces that the motion last set needs beyond gravity and what acts, (3,), N m."""
 
     def carried(self) -> dict[int, Array]:
         """Return the force on each moving bar at its first pin, at the motion and wrenches last set, (2,), N."""
@@ -73,7 +73,7 @@ class Tree(Loaded, Protocol):
         return x, y
 
     def jacobian(self) -> Array:
-        """Difference of the two points' Jacobians."""
+        """Return the difference of the two points' Jacobians."""
         return self.point_jacobian("end3") - self.point_jacobian("end4")
 
     def positions(self) -> dict[str, Array]:
@@ -118,7 +118,7 @@ class Tree(Loaded, Protocol):
         return self.point_jacobian(f"first_pin{point.bar}") + np.outer((-y, x), self.turns[point.bar])
 
     def forces(self, loop_force: Array, drive: float) -> dict[str, Array]:
-        """F12, F32, F14 with the loop force on bar 3 at B, its opposite on bar 4, and the drive put back."""
+        """Return F12, F32, F14 with the loop force on bar 3 at B, its opposite on bar 4, and the drive put back."""
         self.push(3, loop_force, self.point("end3"))
         self.push(4, -loop_force, self.point("end4"))
         self.work(drive)
@@ -126,7 +126,7 @@ class Tree(Loaded, Protocol):
         return {"F12": on[2], "F32": -on[3], "F14": on[4]}
 
     def move(self, bar: int, speed: float, acceleration: float) -> Values:
-        """Velocities, accelerations and forces where the tree is placed; nothing where a toggle leaves them 0/0."""
+        """Return velocities, accelerations and forces where the tree is placed; nothing where they are 0/0."""
         jacobian, commanded = self.jacobian(), self.turns[bar]
         try:
             v = solve_closed(jacobian, speed, commanded)
@@ -177,7 +177,7 @@ def solve_closed(jacobian: Array, rate: float, turn: Array = BAR_2, x: float = 0
 
 
 def solve_multipliers(jacobian: Array, turn: Array, needed: Array) -> Array:
-    """[lambda; T] where [J^T turn] [lambda; T] = tau, (3,); LinAlgError where no torque on that bar balances tau.
+    """Solve [J^T turn] [lambda; T] = tau, (3,); LinAlgError where no torque on that bar balances tau.
 
     By Cramer's rule: of bar 2 the determinant is that of `solve_closed` to the last digit: there are forces wherever
     there are speeds, as far as rounding leaves them digits; elimination may find the matrix singular there.

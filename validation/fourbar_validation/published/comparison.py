@@ -35,7 +35,7 @@ def is_explained(figure: PublishedFigure) -> bool:
 
 
 def explain_difference(figure: PublishedFigure) -> str:
-    """Why a figure differs, in a phrase."""
+    """Explain in a phrase why a figure differs."""
     if not figure.errata or not set(figure.errata) <= set(ERRATA):
         return "no erratum explains this"
     steps = tuple(name for name, _, _ in STEPS if name in ERRATA)

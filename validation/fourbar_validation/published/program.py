@@ -64,7 +64,7 @@ def to_degrees(angle: float) -> float:
 
 
 def split_components(r: float, angle: float) -> tuple[float, float]:
-    """Components."""
+    """Split a vector into its components."""
     return r * math.cos(angle), r * math.sin(angle)
 
 
@@ -90,7 +90,7 @@ def make_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
 
 
 def compute_motion(theta_2: Array, branch: int = 1) -> fourbar.Solution:
-    """Position to accelerations of the model mechanism by our formulas, SI."""
+    """Compute position to accelerations of the model mechanism by our formulas, SI."""
     return fourbar.solve(make_scene(theta_2, branch), "acceleration")
 
 
@@ -104,7 +104,7 @@ def compute_right_unknowns() -> dict[str, float]:
 
 
 def compute_inertia(bar: int, about_long_axis: bool = False) -> float:
-    """I_G of bar 3 or 4, kg cm^2: m (L^2 + w^2)/12, or m w^2/12 as the thesis has it."""
+    """Compute I_G of bar 3 or 4, kg cm^2: m (L^2 + w^2)/12, or m w^2/12 as the thesis has it."""
     across = 0.0 if about_long_axis else LENGTHS[bar - 1] ** 2
     return MASSES[bar] * (across + WIDTH**2) / 12.0
 
@@ -134,7 +134,7 @@ class Kinematics:
 
 
 def make_equations(errors: ProgramErrors, inertias: tuple[float, float] | None = None) -> tuple[Array, Array]:
-    """Matrix and right side of section 5.7 at theta_2 = 135 deg, N and N cm.
+    """Make matrix and right side of section 5.7 at theta_2 = 135 deg, N and N cm.
 
     sum F = m A and sum M_G = I alpha of bars 2, 3, 4; F32 = -F23 and F34 = -F43.
 

@@ -60,7 +60,7 @@ def list_thesis_figures() -> Iterator[PublishedFigure]:
 
 
 def list_positions() -> Iterator[PublishedFigure]:
-    """Section 2.4's table: theta_3 and theta_4 of both roots at 281 positions."""
+    """List section 2.4's table: theta_3 and theta_4 of both roots at 281 positions."""
     rows = list(csv.DictReader((DATA / "positions.csv").read_text(encoding="utf-8").splitlines()))
     theta_2 = np.radians([float(row["theta2_deg"]) for row in rows])
     for branch, third, fourth in ((1, "theta3_1", "theta4_2"), (-1, "theta3_2", "theta4_1")):
@@ -76,7 +76,7 @@ def list_positions() -> Iterator[PublishedFigure]:
 
 
 def list_half_angle_constants() -> Iterator[PublishedFigure]:
-    """Section 2.4 at theta_2 = 90 deg: k1 cos + k2 sin + k3 + e^2 = 0 and A t^2 + B t + C = 0, t = tan(theta/2)."""
+    """List section 2.4 at theta_2 = 90 deg: k1 cos + k2 sin + k3 + e^2 = 0, A t^2 + B t + C = 0, t = tan(theta/2)."""
     theta_2 = math.radians(90.0)
     x, y = a * math.cos(theta_2) + d * math.cos(THETA_1), a * math.sin(theta_2) + d * math.sin(THETA_1)
     roots = {branch: compute_motion(np.array([theta_2]), branch) for branch in (1, -1)}
@@ -106,7 +106,7 @@ def list_simulation_window() -> Iterator[PublishedFigure]:
 
 
 def list_limits() -> Iterator[PublishedFigure]:
-    """Table 3.2: cosines whose existence decides, and the limit positions that do exist."""
+    """List table 3.2: cosines whose existence decides, and the limit positions that do exist."""
     linkage = make_scene(THETA_2).linkage
     output, dead_centre = (limit_positions(linkage, bar) for bar in (4, 2))
     cosines = {
@@ -176,7 +176,7 @@ def list_slips(k: Kinematics) -> dict[str, tuple[tuple[str, ...], float]]:
 
 
 def list_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
-    """Section 4.12, and the manual's table of the program's 17 digits."""
+    """List section 4.12, and the manual's table of the program's 17 digits."""
     ours, slips = compute_our_kinematics(k), list_slips(k)
     by_hand = {"R23_j": (("12",), compute_cut_arm(k, 6)), "R43_j": (("12",), -compute_cut_arm(k, 6))}
     for name, text in read_printed()["published"]["section_4_12_hand"].items():
@@ -189,7 +189,7 @@ def list_kinematics(k: Kinematics) -> Iterator[PublishedFigure]:
 
 
 def list_constants(k: Kinematics) -> Iterator[PublishedFigure]:
-    """Section 5.7: inertias, right sides and moment arms of the 13 equations, and the matrix as printed."""
+    """List section 5.7: inertias, right sides and moment arms of the 13 equations, and the matrix as printed."""
     source = read_printed()
     inertias = source["inputs"]["inertia_kg_cm2_printed"]
     yield PublishedFigure("5.7 inertias", "I_G2", inertias["I_G2"], INERTIA_2)

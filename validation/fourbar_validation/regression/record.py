@@ -103,7 +103,7 @@ def _hash_own(kept: Mapping[str, Any]) -> str:
 
 
 def _require_whole(tables: Mapping[str, Mapping[str, Any]], folder: Path, read: str, key: str) -> None:
-    """InputError that names the first table of a folder that is not what its record says."""
+    """Raise an InputError that names the first table of a folder that is not what its record says."""
     present = {name for name in TABLES if (folder / name).is_file()}
     for name in sorted({*tables, *present, read}):
         path = folder / name
@@ -150,7 +150,7 @@ class Recorded:
         yield from self._read(read_column(self.table, column))
 
     def times(self) -> Iterator[tuple[str, list[tuple[str, float]]]]:
-        """Scene by scene, each engine's time over the formulas' there; none where they were not kept."""
+        """Return each engine's time over that of the formulas, scene by scene; none where they were not kept."""
         table = self.table.parent / TIMINGS
         if not table.is_file():
             return

@@ -72,7 +72,7 @@ def _shorten(old: str, new: str) -> str:
 
 
 def find_renamed(old: Mapping[str, Description], new: Mapping[str, Description]) -> dict[str, str]:
-    """Old name to new name of the scenes that state the same under a name that the other run does not have."""
+    """Find the scenes that state the same under a name that the other run does not have: old name to new name."""
     names: dict[str, list[str]] = {}
     for name in sorted(new.keys() - old.keys(), reverse=True):
         names.setdefault(repr(sorted(new[name].items())), []).append(name)

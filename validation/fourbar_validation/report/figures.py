@@ -38,7 +38,7 @@ SUBSCRIPT = str.maketrans("234", "₂₃₄")
 
 
 def draw_scene_figure(record: Record) -> str | None:
-    """SVGs of the linkage and, for a sweep, of the answers; None where nothing assembles."""
+    """Draw the linkage and, for a sweep, the answers as SVGs; None where nothing assembles."""
     solution = record.solution
     if record.scene is None or solution is None or not np.any(solution.status_code == OK):
         return None
@@ -65,7 +65,7 @@ def _draw_linkage(name: str, scene: Scene, solution: Solution) -> str:
 
 
 def _draw_answers(record: Record, solution: Solution) -> str:
-    """One SVG per quantity: values above, errors of the simulation and of the exact engines on axes of their own."""
+    """Draw one SVG per quantity: values, and errors of the simulation and of the exact engines on axes of their own."""
     answers = [answer for answer in record.answers if answer.refusal is None and answer.quantities]
     drive = COUPLE.value if solution.drive is None else LINE.value
     shown = (drive, "F32") if solution.F32 is not None else ANGLES
@@ -151,7 +151,7 @@ def _draw_errors(axes: "Axes", quantity: str, record: Record, solution: Solution
 
 
 def find_worst_of_segments(error: Array, phase: float) -> np.ndarray[Any, np.dtype[np.intp]]:
-    """Index of the largest error in each of STRETCHES stretches; `phase` in [0, 1) shifts where they begin.
+    """Find the index of the largest error in each of STRETCHES stretches; `phase` in [0, 1) shifts where they begin.
 
     What is not finite is left out: the table says that it fails.
     """
@@ -195,7 +195,7 @@ def _choose_base(solution: Solution, command: Command | None) -> Array:
 
 
 def _limit_to_bulk(axes: "Axes", values: Array) -> None:
-    """Near a pole the curve leaves the picture; the axis follows the other 96 % of the positions."""
+    """Limit the axis to 96 % of the positions; near a pole the curve leaves the picture."""
     low, high = np.nanpercentile(values, [2.0, 98.0])
     span = high - low
     if span > 0.0 and (np.nanmax(values) > high + 3 * span or np.nanmin(values) < low - 3 * span):

@@ -154,5 +154,5 @@ def _make_view(scene: Record, first_line: int, pictures: Mapping[str, str]) -> S
 
 
 def _list_engines(rows: Any) -> list[str]:
-    """Engines by name, the formulas (their identities) last."""
+    """List the engines by name, the formulas (their identities) last."""
     return sorted({row.engine for row in rows}, key=lambda name: (name == "formulas", name))

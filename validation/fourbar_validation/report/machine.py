@@ -22,7 +22,7 @@ BUILT = (".so", ".pyd", ".dylib", ".py")
 
 
 def list_versions() -> dict[str, str]:
-    """Version of Python and of every library that decides a number; "not installed" where missing."""
+    """List the versions of Python and of every library that decides a number; "not installed" where missing."""
     versions = {"python": platform.python_version()}
     for name, package in DISTRIBUTIONS.items():
         try:
@@ -34,7 +34,7 @@ def list_versions() -> dict[str, str]:
 
 
 def name_machine() -> str:
-    """Processor, number of cores and system, in one line."""
+    """Name processor, number of cores and system in one line."""
     return f"{_find_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}"
 
 
@@ -54,7 +54,7 @@ def _find_processor() -> str:
 
 
 def find_kernels() -> dict[str, str]:
-    """Kernel of the BLAS and vector instructions that NumPy took: with others the last digits are others."""
+    """Find the BLAS kernel and vector instructions that NumPy took: with others the last digits differ."""
     import numpy as np
 
     config: dict[str, Any] = np.show_config(mode="dicts")  # type: ignore[assignment]
@@ -65,7 +65,7 @@ def find_kernels() -> dict[str, str]:
 
 
 def find_blas() -> str:
-    """Kernel that NumPy's OpenBLAS took for this processor, such as "openblas SkylakeX"; nothing for another BLAS."""
+    """Find the kernel that NumPy's OpenBLAS took, such as "openblas SkylakeX"; nothing for another BLAS."""
     import numpy as np
 
     folder = Path(np.__file__).parents[1] / "numpy.libs"  # Windows looks for no symbol in what a library loads

@@ -60,7 +60,7 @@ class Record:
         )
 
     def kept_all(self) -> dict[str, Any]:
-        """Everything that is kept, in lists and dictionaries, the rows sorted."""
+        """Return everything that is kept, in lists and dictionaries, the rows sorted."""
         kept = asdict(replace(self, rows=[]))
         for name in ("scene", "solution", "answers", "jumps"):
             del kept[name]

@@ -41,7 +41,7 @@ def render(package: str, name: str, /, **what: object) -> str:
 
 
 def write_cell(text: object) -> str:
-    """Text that can neither end a table cell of Markdown nor start markup."""
+    """Write text that can neither end a table cell of Markdown nor start markup."""
     shown = " ".join(make_plain(str(text)).split())
     for mark in "\\|`*_[]<>#":
         shown = shown.replace(mark, f"\\{mark}")
@@ -61,7 +61,7 @@ def write_number(value: float) -> str:
 
 
 def count_or_size(value: float) -> str:
-    """Three significant digits, as a person writes them: 628, 0.125, 3.10e-09; a dash where there is no number."""
+    """Write three significant digits: 628, 0.125, 3.10e-09; a dash where there is no number."""
     if math.isnan(value):
         return "-"
     if value == 0.0 or (float(value).is_integer() and abs(value) < PLAIN[1]):

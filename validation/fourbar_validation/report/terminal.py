@@ -120,5 +120,5 @@ def make_table(headings: Sequence[str], rows: Iterable[Sequence[str]], words: in
 
 
 def write_short(value: float) -> str:
-    """Two digits: the table fits 80 columns, results.csv has them all."""
+    """Write two digits: the table fits 80 columns, and results.csv has them all."""
     return "-" if math.isnan(value) else f"{value:.1e}"

@@ -38,7 +38,7 @@ CHANGE = tuple(10.0**-k for k in range(1, 9))
 
 
 def draw_linkage(kind: DrawnType, seed: int) -> Lengths:
-    """Random lengths of a type, from its seed alone."""
+    """Draw random lengths of a type, from its seed alone."""
     return draw_lengths(np.random.default_rng([seed, list(DrawnType).index(kind)]), kind)
 
 
@@ -275,7 +275,7 @@ def drive_thesis_to_limits(*, steps: int = 120) -> Scenes:
 
 
 def released(*, durations: tuple[float, ...] = (10.0, 100.0), steps: int = 100) -> Scenes:
-    """IFToMM benchmark A02 with one window: 1 m, 1 kg links, upright, first pin at 1 m/s, gravity 9.81."""
+    """Release IFToMM benchmark A02 with one window: 1 m, 1 kg links, upright, first pin at 1 m/s, gravity 9.81."""
     bar = Bar(1.0, 1.0)
     linkage = FourBar(1.0, bar, bar, bar)
     for duration in durations:

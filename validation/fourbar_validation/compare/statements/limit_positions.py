@@ -214,7 +214,7 @@ class Stated(NamedTuple):
 
 
 def compare_ranges(stated: Stated, engine: Adapter) -> Iterator[Finding]:
-    """Ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
+    """Compare ranges, limits and full turns of every moving bar, the range of a sweep, and the change points."""
     for bar, tried in stated.trials.items():
         closes = require_answer(engine, tried.scene, tried.command).assembled
         assert closes is not None
@@ -297,7 +297,7 @@ def _check_dead_centres(stated: Stated, bar: int, seen: Seen) -> Iterator[Findin
 
 
 def check_through(linkage: FourBar, engine: Adapter) -> Iterator[Finding]:
-    """Through a change point two motions go on: the smooth one is that whose speeds the engine finds unbroken.
+    """Check the path through a change point: the smooth motion is that whose speeds the engine finds continuous.
 
     Every change point, in both senses and from both branches, with a position on the point itself and without.
     """

@@ -143,7 +143,7 @@ def _compute_to_singular(scene: Scene, theta_2: Array, branch: Array) -> Array:
 
 
 def _find_ends(linkage: FourBar) -> tuple[tuple[float, float, float], ...]:
-    """Least and greatest angle between bars 3 and 4, theta_2 there, and what the angle is where they are collinear."""
+    """Find the least and greatest angle between bars 3 and 4, theta_2 there, and the angle where they are collinear."""
     extremes = transmission.transmission_extremes(linkage)
     return (extremes.least, extremes.theta_2_least, 0.0), (extremes.greatest, extremes.theta_2_greatest, math.pi)
 

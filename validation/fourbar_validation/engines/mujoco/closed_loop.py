@@ -60,7 +60,7 @@ class ClosedLoop(Assembled):
         self._jac = np.zeros((3, self.model.nv))
 
     def gap(self) -> tuple[float, float]:
-        """B on bar 3 minus B on bar 4, m."""
+        """Return B on bar 3 minus B on bar 4, m."""
         x = self.data.site_xpos[self.site["B3"]] - self.data.site_xpos[self.site["B4"]]
         return (float(x[0]), float(x[1]))
 
@@ -100,7 +100,7 @@ class ClosedLoop(Assembled):
         self.data.qvel[:3] = solve_closed(self.jacobian()[:, :3], speed, self.drive_column(bar))
 
     def forward(self) -> None:
-        """Everything at the present state: after a Runge-Kutta step some fields are still of the step before."""
+        """Evaluate the present state: after a Runge-Kutta step some fields are still of the step before."""
         mujoco.mj_forward(self.model, self.data)
         mujoco.mj_rnePostConstraint(self.model, self.data)
 
@@ -128,7 +128,7 @@ class ClosedLoop(Assembled):
         return 0.0 if self.drive is None else float(self.data.actuator_force[self.drive] / self.model.dof_armature[O2])
 
     def crank_torque(self) -> float:
-        """T2: what the flywheel gives the crank, and the motor next to it, N m."""
+        """Return T2: what the flywheel gives the crank, and the motor next to it, N m."""
         flywheel = -self.model.dof_armature[O2] * self.data.qacc[O2]
         motor = 0.0 if self.drive is None else self.data.actuator_force[self.drive]
         return float(flywheel + motor)
@@ -145,12 +145,12 @@ class ClosedLoop(Assembled):
         return float(self.data.qpos[TURNED_BY[bar]].sum())
 
     def line(self) -> Array:
-        """Vector from the cylinder's one site to the other, (2,), m."""
+        """Return the vector from the cylinder's one site to the other, (2,), m."""
         start, end = (self.data.site_xpos[self.site[end]] for end in ENDS)
         return np.asarray((end - start)[:2])
 
     def stroke(self) -> float:
-        """Distance of the cylinder's sites, m."""
+        """Return the distance of the cylinder's sites, m."""
         return float(np.hypot(*self.line()))
 
     def drive_drift(self, drive_bar: int | None) -> float:

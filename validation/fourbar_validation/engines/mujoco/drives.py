@@ -90,7 +90,7 @@ class WheelEquality(Driven):
     """A joint equality to a kinematic wheel: a second, heavy body that turns at omega next to the linkage."""
 
     def __init__(self, mjcf: str, omega: float, softness: float = 1.0) -> None:
-        """`softness`: factor on dof_invweight0, how soft the equality is, edited after compile; 1: plain MJCF."""
+        """Set `softness`, a factor on dof_invweight0 that is edited after compile; 1: plain MJCF."""
         super().__init__(mjcf, omega)
         self.model.dof_invweight0[:] *= softness
         self.row = 3  # the closure takes three rows, the joint equality the next

@@ -64,7 +64,7 @@ class MujocoTree(Tree):
         self.ready(scene, list_acting(scene, self))
 
     def place(self, q: Sequence[float]) -> None:
-        """Bodies, sites and the axes of the Jacobians at q."""
+        """Place bodies, sites and the axes of the Jacobians at q."""
         self.data.qpos[:] = q
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
@@ -83,7 +83,7 @@ class MujocoTree(Tree):
         return self._jac[:2].copy()
 
     def turn(self, bar: int) -> Array:
-        """Last row of the body's rotational Jacobian."""
+        """Return the last row of the body's rotational Jacobian."""
         mujoco.mj_jacBody(self.model, self.data, None, self._jac, self.body[bar])
         return np.array(self._jac[2])
 
@@ -93,7 +93,7 @@ class MujocoTree(Tree):
         mujoco.mj_comVel(self.model, self.data)
 
     def acceleration(self, name: str) -> Array:
-        """J a + (dJ/dt) v of a site."""
+        """Return J a + (dJ/dt) v of a site."""
         site, body = self.site[name], self.body[int(name[-1])]
         mujoco.mj_jacSite(self.model, self.data, self._jac, None, site)
         mujoco.mj_jacDot(self.model, self.data, self._dot, None, self.data.site_xpos[site], body)

@@ -161,7 +161,7 @@ class ResidualMonitor:
         return _Motion(gap, jacobian @ v, jerk, a_B, jacobian, drive, needed, answer)
 
     def _compute_pins(self, loop_force: Array, drive: float) -> dict[str, Array]:
-        """F12, F32, F14: what carries the bars on the open tree, and the loop force put back."""
+        """Compute F12, F32, F14: what carries the bars on the open tree, and the loop force put back."""
         bars, d = self.bars, self.bars.data
         if self.drive_bar is None:  # its line crosses the pins, a couple does not
             d.ctrl[bars.ram] = drive

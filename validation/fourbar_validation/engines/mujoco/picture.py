@@ -21,7 +21,7 @@ BACKENDS = ("egl", "osmesa") if sys.platform == "linux" else ("glfw",)
 
 
 def render_pictures(texts: dict[str, str]) -> tuple[dict[str, str], str]:
-    """Base64 PNGs of MJCF texts at their keyframes, and the reason where there are none."""
+    """Render MJCF texts at their keyframes as base64 PNGs; return also the reason where there are none."""
     if not texts:
         return {}, ""
     if len(texts) > MOST:

@@ -69,7 +69,7 @@ class Steady:
         return self.run.time(float(self.theta_2[index]))
 
     def speed(self, turned: float, seconds: float) -> float:
-        """|omega_2| that is due after a turn (rad) and a time: by the angle turned."""
+        """Return |omega_2| that is due after a turn (rad) and a time: by the angle turned."""
         return math.sqrt(max(self.run.omega**2 + 2.0 * self.run.alpha * turned, 0.0))
 
 
@@ -121,7 +121,7 @@ MotionSegment = Steady | Lawful
 
 
 def find_extremes(law: Law) -> tuple[float, float]:
-    """Greatest |omega_2| and |alpha_2| of a law: what flywheel and closure are laid out for."""
+    """Find the greatest |omega_2| and |alpha_2| of a law, for which flywheel and closure are laid out."""
     _, omega, alpha = law.at(np.linspace(law.time[0], law.time[-1], LOOKED_AT))
     return float(np.abs(omega).max()), float(np.abs(alpha).max())
 
@@ -188,7 +188,7 @@ class SimulatedRun:
         self.stepper = Stepper(loop.model, loop.data, timestep)
 
     def progress(self) -> float:
-        """Angle or stroke of what moves as commanded."""
+        """Return the angle or stroke of what moves as commanded."""
         return self.loop.stroke() if (bar := self.motion_segment.bar) is None else self.loop.angle(bar)
 
     def to(self, index: int) -> None:
@@ -376,7 +376,7 @@ def receive_forces(loop: ClosedLoop, supplied: dict[str, ActuatorForce]) -> Clos
 
 @contextmanager
 def supply_forces(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
-    """MuJoCo takes these forces as long as this lasts; its callbacks are of the whole process."""
+    """Supply forces to MuJoCo as long as this lasts; its callbacks are of the whole process."""
     if not supplied:
         yield
         return

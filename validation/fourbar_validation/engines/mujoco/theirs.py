@@ -200,11 +200,11 @@ class UserLoop(Assembled):
         return {"A": line[2], "B": line[2] + line[3], "O4": line[1], "B4": line[1] + line[4]}
 
     def speeds(self, omega_2: float) -> Array:
-        """Joint speeds that keep the gap closed where the model is placed, (3,)."""
+        """Compute the joint speeds that keep the gap closed where the model is placed, (3,)."""
         return np.asarray(self.to_joints @ solve_closed(self.jacobian(), omega_2))
 
     def ask(self, q: Array, v: Array, alpha_2: float) -> Values:
-        """Everything at a state at which the crank accelerates at alpha_2, the driven bar's couple solved for."""
+        """Evaluate a state at which the crank accelerates at alpha_2, and solve for the driven bar's couple."""
         data, drive = self.data, self.scene.drive_bar
         active = data.eq_active.copy()
         mujoco.mj_resetData(self.model, data)
@@ -235,7 +235,7 @@ class UserLoop(Assembled):
         return values | self._read_forces()
 
     def _read_forces(self) -> dict[str, Array]:
-        """F12, F32, F43, F14 in the plane; NaN at a cut pin that no connect or weld holds."""
+        """Read F12, F32, F43, F14 in the plane; NaN at a cut pin that no connect or weld holds."""
         data, topology = self.data, self.topology
         on: dict[tuple[int, int], Array] = {}
         for pin in topology.hinge:

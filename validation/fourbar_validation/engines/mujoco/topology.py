@@ -233,7 +233,7 @@ class Topology:
         return child, parent
 
     def qpos(self, x: Sequence[float]) -> Array:
-        """Joint positions at (theta_2, theta_3 - theta_2, theta_4)."""
+        """Return the joint positions at (theta_2, theta_3 - theta_2, theta_4)."""
         q = self._rest.copy()
         turned = self.to_joints @ (np.asarray(x) - self._rest_angles)
         for joint in self.hinge.values():

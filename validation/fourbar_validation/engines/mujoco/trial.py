@@ -187,7 +187,7 @@ class TrialSetup:
         trial.steps_per_revolution = max(trial.steps_per_revolution, 2.0 * np.pi / motion_segment.fastest / timestep)
 
     def seconds_per_step(self, settings: Settings, build: Build | None = None) -> Callable[[int], float]:
-        """CPU seconds of a number of steps from the start of the longest segment; each call starts there again."""
+        """Measure CPU seconds of steps from the start of the longest segment, where each call starts again."""
         segment = max(self.segments, key=len)
         timestep = self.motion_segment(segment).run.timestep(settings)
         loop = (build or _keep_text)(self.text(settings, timestep), self.omega)

@@ -94,7 +94,7 @@ def _find_beyond(theta_2: Array, values: Array, bound: Extreme, sign: float, *, 
 
 
 def _require_conditioned(scene: Scene) -> None:
-    """NotAskedError where bars 3 and 4 come near to one line within the interval, not at its ends."""
+    """Raise NotAskedError where bars 3 and 4 come near to one line within the interval, not at its ends."""
     around = np.linspace(0.0, 2.0 * np.pi, POSITIONS)
     answer = ask_free_bodies(replace(scene, motion=Motion(around, None, branch=scene.motion.branch), tolerances=()))
     assert answer.assembled is not None
