@@ -62,10 +62,10 @@ def strict(text: str) -> dict[str, object]:
     return document
 
 
-def same(found: object, array: np.ndarray) -> bool:
+def same(printed: object, array: np.ndarray) -> bool:
     """Bit-equal, with null for NaN."""
     expected = np.where(np.isfinite(array), array, np.nan)
-    return np.array_equal(np.array(found, dtype=float), expected, equal_nan=True)
+    return np.array_equal(np.array(printed, dtype=float), expected, equal_nan=True)
 
 
 @pytest.mark.parametrize("name", ["thesis", "drag_link"])
@@ -159,8 +159,8 @@ def test_csv_has_the_same_numbers(run: Fourbar) -> None:
     assert (code, err, len(rows)) == (HOLDS, "", 361)
     for quantity in solution.evaluated():
         names = [f"{quantity}_x", f"{quantity}_y"] if quantity in VECTORS else [quantity]
-        found = np.array([[float(row[name]) for name in names] for row in rows])
-        assert np.array_equal(found, getattr(solution, quantity).reshape(found.shape)), quantity
+        printed = np.array([[float(row[name]) for name in names] for row in rows])
+        assert np.array_equal(printed, getattr(solution, quantity).reshape(printed.shape)), quantity
     assert {row["status"] for row in rows} == {"ok"} and {row["drive_bar"] for row in rows} == {"2"}
 
 
@@ -318,8 +318,8 @@ def test_a_length_that_is_written_to_a_file_has_a_unit(tmp_path: Path, run: Four
 def test_classify_says_what_turns_and_how_far(run: Fourbar) -> None:
     """Numbers by the law of cosines in the triangles that the bars make where two of them are in line."""
 
-    def angle(opposite: float, one: float, other: float) -> float:
-        return math.degrees(math.acos((one**2 + other**2 - opposite**2) / (2.0 * one * other)))
+    def angle(opposite: float, first: float, second: float) -> float:
+        return math.degrees(math.acos((first**2 + second**2 - opposite**2) / (2.0 * first * second)))
 
     d, a, b, c = 0.3, 0.1, 0.25, 0.22
     lines = run("classify", d, a, b, c)[1].splitlines()
@@ -412,9 +412,9 @@ def test_what_goes_wrong_is_one_line_and_a_status(
 
     monkeypatch.setattr(Case, "of", broken)
     monkeypatch.delenv("FOURBAR_TRACEBACK", raising=False)
-    found, out, err = run("analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out")
+    exit_status, out, err = run("analyze", MODELS / "thesis.toml", "--json", "-o", tmp_path / "out")
     # after an interrupt click ends the line that the terminal has started with ^C
-    assert (found, out, err.strip().count("\n")) == (code, "", 0) and not list(tmp_path.iterdir())
+    assert (exit_status, out, err.strip().count("\n")) == (code, "", 0) and not list(tmp_path.iterdir())
     if isinstance(error, RuntimeError):
         monkeypatch.setenv("FOURBAR_TRACEBACK", "1")
         with pytest.raises(RuntimeError):
