@@ -192,15 +192,15 @@ def test_a_hundred_requests_at_once_are_answered_and_of_a_drag_only_the_latest(b
 
 def test_error_bars_follow_and_every_page_sees_the_change(bench) -> None:
     async def ask(made: Workbench, address: str) -> None:
-        one, other = await page(address), await page(address)
-        await told(one, {"do": "hello"})
-        about = await told(one, {"do": "set", "path": ["lengths", "input"], "value": "4 in"})
+        first_page, second_page = await page(address), await page(address)
+        await told(first_page, {"do": "hello"})
+        about = await told(first_page, {"do": "set", "path": ["lengths", "input"], "value": "4 in"})
         assert not about["settled"] and "torque_error" not in str(about["columns"])
-        for line in (one, other):
+        for line in (first_page, second_page):
             about = await settled(line)
             assert '"4 in"' in about["text"] and "torque_error" in str(about["columns"]) and about["saved"] is False
             assert "  torque   peak" in "".join(about["data"]["summary"])
-        assert "refused" in await told(other, {"do": "set", "path": ["lengths", "input"], "value": "9 ft"})
+        assert "refused" in await told(second_page, {"do": "set", "path": ["lengths", "input"], "value": "9 ft"})
 
     session = bench(ask)
     assert session.state_file.exists()  # it is not saved
@@ -210,9 +210,9 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench) -> None:
 def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch) -> None:
     collect, changed, finished = server.collect_tolerances, threading.Event(), []
 
-    def watched(*given):
+    def watched(*arguments):
         changed.wait(20)
-        finished.append(collect(*given))
+        finished.append(collect(*arguments))
         return finished[-1]
 
     async def ask(made: Workbench, address: str) -> None:
@@ -418,9 +418,9 @@ def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_proc
     with start(path, BROWSER=f"{browser} %s") as process:
         address = process.stdout.readline().strip()
         wait_until(seen.exists)
-        (given,) = seen.read_text().split()
-        redirect = Path(given.removeprefix("file://"))
-        assert given.startswith("file://") and address.split("/")[3] not in given
+        (opened_url,) = seen.read_text().split()
+        redirect = Path(opened_url.removeprefix("file://"))
+        assert opened_url.startswith("file://") and address.split("/")[3] not in opened_url
         assert redirect.stat().st_mode & 0o777 == 0o600 and f'url={address}"' in redirect.read_text().replace("0; ", "")
         process.send_signal(2)
         process.communicate(timeout=20)

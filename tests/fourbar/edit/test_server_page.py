@@ -48,10 +48,10 @@ MODELS = Path(__file__).parents[3] / "models"
 
 def wait_for(driver, expression: str):
     deadline = time.monotonic() + WAIT
-    while not (found := driver.execute_script(f"return {expression};")):
-        assert time.monotonic() < deadline, f"{expression} stays {found!r}"
+    while not (value := driver.execute_script(f"return {expression};")):
+        assert time.monotonic() < deadline, f"{expression} stays {value!r}"
         time.sleep(0.02)
-    return found
+    return value
 
 
 def open_scene(driver, address: str) -> None:

@@ -71,8 +71,8 @@ def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(pa
 def test_each_part_that_is_offered_is_one_that_the_file_takes() -> None:
     names = {"points": "P", "tolerances": "lengths.input"}
     for part in list_offers()["parts"]:
-        document, at = SceneDocument(CRANK_ROCKER.read_text()), part["at"]
-        place = [names[at[0]] if step == "" else step for step in at]
+        document, steps = SceneDocument(CRANK_ROCKER.read_text()), part["at"]
+        place = [names[steps[0]] if step == "" else step for step in steps]
         if place[-1] == "law":
             document.remove(["motion", "theta_2"])
             document.remove(["motion", "omega_2"])
@@ -151,9 +151,9 @@ def dragged(session: Session, what, to: complex, **more) -> dict:
 
 def at_50(session: Session) -> fourbar.Solution:
     scene = session.now.scene
-    where = fourbar.command(scene)
-    at = where._replace(angle=np.array([math.radians(50.0)]), branch=where.branch[:1])
-    return fourbar.solve(scene, at=at)
+    command = fourbar.command(scene)
+    at_50_deg = command._replace(angle=np.array([math.radians(50.0)]), branch=command.branch[:1])
+    return fourbar.solve(scene, at=at_50_deg)
 
 
 def test_what_is_dragged_stands_where_it_was_dragged_to(session: Session) -> None:
@@ -207,15 +207,15 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_in_either_frame_and_a_nega
 ) -> None:
     load = f'[[loads]]\nbar = 3\nforce = ["{size}", "10 deg"]\nat = ["20 mm", "0 deg"]\nframe = "{frame}"\n'
     session.do({"do": "text", "text": session.now.text + load})
-    at = ["loads", len(session.now.scene.loads) - 1]
+    load_path = ["loads", len(session.now.scene.loads) - 1]
     to = 0.13 + 0.11j
-    dragged(session, [*at, "at"], to)
+    dragged(session, [*load_path, "at"], to)
     s, load = at_50(session), session.now.scene.loads[-1]
     turned = float(s.theta_3[0]) if frame == "bar" else 0.0
     foot = complex(*s.G3[0]) + load.at[0] * np.exp(1j * (load.at[1] + turned))
     assert foot == pytest.approx(to, abs=2 * PIXEL)
     arrow = 0.05 * np.exp(0.7j)
-    dragged(session, [*at, "force"], foot + arrow, stretch=2.0)
+    dragged(session, [*load_path, "force"], foot + arrow, stretch=2.0)
     force = session.now.scene.loads[-1].force
     assert force[0] == pytest.approx(2.0 * float(size.split(maxsplit=1)[0]), rel=0.02)
     pulls = force[0] * np.exp(1j * (force[1] + turned))  # the direction in which it acts
@@ -242,8 +242,8 @@ def test_a_place_by_coordinates_is_dragged_and_stays_so_until_it_is_restated(ses
         assert "refused" not in session.do({"do": "restate", "path": path, "by": by})
         entry = session.now.plain["loads"][path[1]]["at"]
         assert isinstance(entry, kind)
-        at = session.now.scene.loads[-1].at
-        assert at == pytest.approx(load.at, rel=1e-5)
+        point = session.now.scene.loads[-1].at
+        assert point == pytest.approx(load.at, rel=1e-5)
     for nonsense in ({"path": path, "by": "z"}, {"path": ["lengths"], "by": "xy"}, {"path": ["no"], "by": "xy"}):
         assert "refused" in session.do({"do": "restate"} | nonsense)
 
@@ -290,9 +290,9 @@ def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(tmp_path: Path
     assert not session.do({"do": "hello"})["fresh"] and session.do({"do": "hello"})["units"] == "as the file"
     assert session.units["N"][0] == "lbf"
     A, B, O4 = (0.0254 * complex(*pin) for pin in pins[1:])
-    where = fourbar.command(scene)
-    at = where._replace(angle=np.array([np.angle(A)]), branch=where.branch[:1])
-    s = fourbar.solve(scene, "position", at=at)
+    command = fourbar.command(scene)
+    as_drawn = command._replace(angle=np.array([np.angle(A)]), branch=command.branch[:1])
+    s = fourbar.solve(scene, "position", at=as_drawn)
     assert [complex(*s.A[0]), complex(*s.B[0])] == pytest.approx([A, B], abs=1e-6)
     assert scene.linkage.ground * np.exp(1j * scene.linkage.ground_angle) == pytest.approx(O4, abs=1e-6)
     assert fourbar.solve(scene).assembled.any()
