@@ -26,8 +26,8 @@ LAST_DIGITS = 64 * 2.0**-52
 
 def alone(*effects: object, omega_2: float = 0.0, theta_2: object = None, **changes: object) -> Scene:
     """Massless in effect: static, so that only the effects act."""
-    where = np.linspace(0.2, 6.0, 9) if theta_2 is None else theta_2
-    return crank_rocker(motion=Motion(where, omega_2), loads=(), effects=effects, **changes)  # type: ignore[arg-type]
+    angles = np.linspace(0.2, 6.0, 9) if theta_2 is None else theta_2
+    return crank_rocker(motion=Motion(angles, omega_2), loads=(), effects=effects, **changes)  # type: ignore[arg-type]
 
 
 def potential_torque(scene: Scene, energy: object) -> np.ndarray:
@@ -101,8 +101,8 @@ def test_a_flywheel_is_inertia_of_the_bar(bar: int, name: str) -> None:
     heavier = replace(scene.linkage, **{name: replace(plain, inertia=plain.moment_of_inertia + 0.02)})
     with_wheel, with_bar = solve(scene), solve(replace(scene, linkage=heavier, effects=(Gravity(),)))
     for quantity in ("torque", "F12", "F32", "F43", "F14"):
-        one, other = getattr(with_wheel, quantity), getattr(with_bar, quantity)
-        assert np.abs(one - other).max() <= LAST_DIGITS * np.abs(other).max(), quantity
+        by_wheel, by_bar = getattr(with_wheel, quantity), getattr(with_bar, quantity)
+        assert np.abs(by_wheel - by_bar).max() <= LAST_DIGITS * np.abs(by_bar).max(), quantity
 
 
 def test_one_cone_has_one_none_or_two_solutions() -> None:
@@ -122,11 +122,11 @@ def test_one_cone_has_one_none_or_two_solutions() -> None:
         ((1.0, 0.0), (1.0 - 2.0**-20, 0.0)): (ONE, 2.0**20, 2.0**-20),
     }
     for (F, C), (number, x, far) in cases.items():
-        found = solve_sliding(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
-        assert found.number[0] == number, (F, C)
-        assert found.x[0, 0] == pytest.approx(x, rel=1e-15, nan_ok=True), (F, C)
+        sliding = solve_sliding(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
+        assert sliding.number[0] == number, (F, C)
+        assert sliding.x[0, 0] == pytest.approx(x, rel=1e-15, nan_ok=True), (F, C)
         if far is not None:
-            assert found.from_jamming[0] == pytest.approx(far, rel=LAST_DIGITS), (F, C)
+            assert sliding.from_jamming[0] == pytest.approx(far, rel=LAST_DIGITS), (F, C)
 
 
 def test_several_cones_one_of_which_is_known() -> None:
@@ -134,13 +134,13 @@ def test_several_cones_one_of_which_is_known() -> None:
     for c1, c2, number in ((0.5, 0.3, ONE), (2.0, 0.3, NONE), (-2.0, 0.3, MANY), (-2.0, -3.0, MANY)):
         F = np.array([[[1.0, 0.0], [2.0, 0.0]]] * 2)
         C = np.array([[[[c1, 0.0], [0.0, 0.0]], [[0.0, 0.0], [c2, 0.0]]]] * 2)
-        found = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
-        assert list(found.number) == [number, ONE]
+        sliding = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
+        assert list(sliding.number) == [number, ONE]
         if number != NONE:
-            assert found.x[0] == pytest.approx([1.0 / (1.0 - c1), 2.0 / (1.0 - c2)], rel=1e-12)
+            assert sliding.x[0] == pytest.approx([1.0 / (1.0 - c1), 2.0 / (1.0 - c2)], rel=1e-12)
             # both slopes are 1 - k c where F + C x keeps the sense of F
-            assert found.from_jamming[0] == pytest.approx(min(1.0, 1.0 - c1, 1.0 - c2), rel=1e-12)
-        assert found.x[1] == pytest.approx([0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)], rel=1e-12)
+            assert sliding.from_jamming[0] == pytest.approx(min(1.0, 1.0 - c1, 1.0 - c2), rel=1e-12)
+        assert sliding.x[1] == pytest.approx([0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)], rel=1e-12)
 
 
 def test_jamming_is_a_status_and_leaves_no_force() -> None:
@@ -180,18 +180,18 @@ def test_pin_load_friction_needs_the_pin_forces() -> None:
 
 def test_a_table_is_linear_between_its_points_and_periodic() -> None:
     table = Table((1.0, 2.0, 1.0 + 2 * math.pi), (0.0, 4.0, 0.0))
-    at = np.array([1.0, 1.25, 2.0, 1.5 - 2 * math.pi, 1.25 + 6 * math.pi])
-    assert table.at(at) == pytest.approx([0.0, 1.0, 4.0, 2.0, 1.0], abs=1e-14)
-    for theta_2, factor in zip(at.tolist(), table.at(at), strict=True):
+    angles = np.array([1.0, 1.25, 2.0, 1.5 - 2 * math.pi, 1.25 + 6 * math.pi])
+    assert table.at(angles) == pytest.approx([0.0, 1.0, 4.0, 2.0, 1.0], abs=1e-14)
+    for theta_2, factor in zip(angles.tolist(), table.at(angles), strict=True):
         assert look_up(table, theta_2) == pytest.approx(factor, abs=1e-14)
 
 
 def test_a_load_over_theta_2_is_the_load_times_its_factor() -> None:
     load = Load(4, (3.0, 0.7), (0.05, 1.0), 0.2)
     table = Table((0.0, math.pi, 2 * math.pi), (1.0, 3.0, 1.0))
-    where = np.array([math.pi / 2])
-    tabled = solve(alone(theta_2=where)), solve(replace(alone(theta_2=where), loads=(replace(load, table=table),)))
-    twice = replace(alone(theta_2=where), loads=(replace(load, force=(6.0, 0.7), moment=0.4),))
+    angle = np.array([math.pi / 2])
+    tabled = solve(alone(theta_2=angle)), solve(replace(alone(theta_2=angle), loads=(replace(load, table=table),)))
+    twice = replace(alone(theta_2=angle), loads=(replace(load, force=(6.0, 0.7), moment=0.4),))
     assert tabled[1].torque == pytest.approx(solve(twice).torque, rel=1e-14)
 
 
@@ -227,11 +227,11 @@ def test_speed_and_acceleration_are_the_slopes_of_the_law(ends: str) -> None:
 
 def test_each_position_of_a_law_is_that_motion_alone() -> None:
     law = Law((0.0, 0.2, 0.5, 1.0), (0.0, 1.0, 2.5, 2 * math.pi), 12, "periodic")
-    whole = solve(crank_rocker(motion=Motion(law=law)))
-    assert whole.torque is not None and whole.omega_2 is not None and whole.alpha_2 is not None
+    along_law = solve(crank_rocker(motion=Motion(law=law)))
+    assert along_law.torque is not None and along_law.omega_2 is not None and along_law.alpha_2 is not None
     for i in (0, 5, 11):
-        here = Motion(float(whole.theta_2[i]), float(whole.omega_2[i]), float(whole.alpha_2[i]))
-        assert solve(crank_rocker(motion=here)).torque[0] == pytest.approx(whole.torque[i], rel=1e-13)  # type: ignore[index]
+        here = Motion(float(along_law.theta_2[i]), float(along_law.omega_2[i]), float(along_law.alpha_2[i]))
+        assert solve(crank_rocker(motion=here)).torque[0] == pytest.approx(along_law.torque[i], rel=1e-13)  # type: ignore[index]
 
 
 HERE = SpringEnd(2, 0.1, 0.0), SpringEnd(4, 0.2, 0.0)

@@ -31,21 +31,21 @@ STEP = 1e-5
 WIDE, SHORT, KITE = (0.3, 0.1, 0.25, 0.22), (0.05, 0.3, 0.28, 0.31), (0.2, 0.3, 0.24, 0.33)
 
 
-def ends(one: int, other: int) -> fourbar.LinearDrive:
-    return fourbar.LinearDrive(SpringEnd(one, 0.17, -1.1), SpringEnd(other, 0.09, 0.7))
+def ends(start_bar: int, end_bar: int) -> fourbar.LinearDrive:
+    return fourbar.LinearDrive(SpringEnd(start_bar, 0.17, -1.1), SpringEnd(end_bar, 0.09, 0.7))
 
 
-def driven(one: int, other: int, **changes: Any) -> fourbar.Scene:
-    return crank_rocker(drive=ends(one, other), **changes)
+def driven(start_bar: int, end_bar: int, **changes: Any) -> fourbar.Scene:
+    return crank_rocker(drive=ends(start_bar, end_bar), **changes)
 
 
 @pytest.mark.parametrize("lengths", [WIDE, SHORT, KITE])
-@pytest.mark.parametrize(("one", "other"), PAIRS)
+@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
 def test_forces_are_those_of_thirteen_equations_in_balls_within_their_error_bars(
-    one: int, other: int, lengths: tuple[float, ...]
+    start_bar: int, end_bar: int, lengths: tuple[float, ...]
 ) -> None:
     d, *moving = lengths
-    scene = driven(one, other)
+    scene = driven(start_bar, end_bar)
     bars = [replace(bar, length=length) for bar, length in zip(scene.linkage.moving, moving, strict=True)]
     scene = replace(scene, linkage=fourbar.FourBar(d, *bars, 0.2))
     for branch in (1, -1):
@@ -69,16 +69,16 @@ def compare_with_balls(scene: fourbar.Scene, s: fourbar.Solution, ok: np.ndarray
     return exact
 
 
-@pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(one: int, other: int) -> None:
+@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(start_bar: int, end_bar: int) -> None:
     """At rest nothing grows without end there but for a line that has no lever on bars 3 and 4 in line, bar 2's."""
     link = fourbar.uniform(0.2, 0.48, 0.55, 0.2)
     near = fourbar.Motion(fourbar.FromLimit(1, 1e-10), 0.0)
-    scene = fourbar.Scene(link, near, effects=(fourbar.Gravity(),), drive=ends(one, other))
+    scene = fourbar.Scene(link, near, effects=(fourbar.Gravity(),), drive=ends(start_bar, end_bar))
     s = fourbar.solve(scene, "error")
     assert s.status == ["ok"] and s.condition[0] < 1e-4
     compare_with_balls(scene, s, s.status_code == 0)
-    if (one, other) != (1, 2):
+    if (start_bar, end_bar) != (1, 2):
         assert s.drive_force_error[0] < 1e-13 * abs(s.drive_force[0])
         largest = max(np.hypot(*getattr(s, name)[0]) for name in PIN_FORCES)
         assert s.force_error[0] < 1e-13 * largest  # of bars 3 and 4, so nearly in line, 1e-11 would be left
@@ -104,35 +104,40 @@ def test_from_the_ground_to_a_bar_it_is_the_torque_over_its_lever(bar: int) -> N
     np.testing.assert_allclose(start + s.stroke[:, None] * s.drive_line, foot + arm, atol=1e-15)
 
 
-@pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(one: int, other: int) -> None:
-    s, torque = fourbar.solve(driven(one, other)), fourbar.solve(crank_rocker())
+@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+def test_its_power_is_that_of_the_torque_and_its_line_has_no_sense(start_bar: int, end_bar: int) -> None:
+    s, torque = fourbar.solve(driven(start_bar, end_bar)), fourbar.solve(crank_rocker())
     np.testing.assert_allclose(s.power, torque.power, rtol=0, atol=ROUND_OFF * np.abs(torque.power).max())
-    back = fourbar.solve(crank_rocker(drive=fourbar.LinearDrive(ends(one, other).end, ends(one, other).start)))
+    back = fourbar.solve(
+        crank_rocker(drive=fourbar.LinearDrive(ends(start_bar, end_bar).end, ends(start_bar, end_bar).start))
+    )
     for name in ("drive_force", "stroke", "stroke_speed", "drive_condition", "F12", "F43"):
         np.testing.assert_allclose(getattr(back, name), getattr(s, name), rtol=1e-12, atol=1e-12)
     np.testing.assert_array_equal(back.drive_line, -s.drive_line)
     assert s.torque is None and s.drive_bar is None and torque.drive_force is None and torque.stroke is None
 
 
-@pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(one: int, other: int) -> None:
+@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+def test_the_condition_is_the_slope_of_the_stroke_over_what_its_ends_could_move(start_bar: int, end_bar: int) -> None:
     """In [0, 1] for linkages of every type; ds/dtheta_2 here from differences of the stroke."""
-    rng = np.random.default_rng(one + 10 * other)
+    rng = np.random.default_rng(start_bar + 10 * end_bar)
     seen = 0
     for _ in range(40):
         d, a, b, c = rng.uniform(0.1, 1.0, 4)
         if max(d, a, b, c) * 2 >= d + a + b + c:
             continue
-        at = rng.uniform(0.05, 0.6, 2), rng.uniform(-3.0, 3.0, 2)
-        drive = fourbar.LinearDrive(SpringEnd(one, at[0][0], at[1][0]), SpringEnd(other, at[0][1], at[1][1]))
+        polar = rng.uniform(0.05, 0.6, 2), rng.uniform(-3.0, 3.0, 2)
+        drive = fourbar.LinearDrive(
+            SpringEnd(start_bar, polar[0][0], polar[1][0]), SpringEnd(end_bar, polar[0][1], polar[1][1])
+        )
         theta_2 = rng.uniform(0.0, 6.0)
-        own = fourbar.Motion(theta_2 + STEP * np.array([0.0, 1.0, -1.0]), 1.0, branch=int(rng.choice([1, -1])))
-        s = fourbar.solve(fourbar.Scene(fourbar.uniform(d, a, b, c), own, drive=drive))
+        motion = fourbar.Motion(theta_2 + STEP * np.array([0.0, 1.0, -1.0]), 1.0, branch=int(rng.choice([1, -1])))
+        s = fourbar.solve(fourbar.Scene(fourbar.uniform(d, a, b, c), motion, drive=drive))
         if s.status != ["ok"] * 3 or s.condition[0] < 0.1:
             continue
         most = sum(
-            {1: 0.0, 2: r, 3: a + r * a / b, 4: r * a / c}[bar] for bar, r in zip((one, other), at[0], strict=True)
+            {1: 0.0, 2: r, 3: a + r * a / b, 4: r * a / c}[bar]
+            for bar, r in zip((start_bar, end_bar), polar[0], strict=True)
         )
         slope = (s.stroke[1] - s.stroke[2]) / (2.0 * STEP)
         assert abs(s.stroke_speed[0] - slope) < DIFFERENCES * most / s.condition[0] ** 3
@@ -228,18 +233,18 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies() -> None:
         fourbar.vary(scene, {"drive.from.bar": [2]})
 
 
-@pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_derivatives_by_its_ends_are_those_of_differences(one: int, other: int) -> None:
-    scene = driven(one, other, motion=fourbar.Motion(np.array([0.4, 2.0, 4.5]), 10.0, 5.0))
-    found = fourbar.sensitivity(scene)
+@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+def test_derivatives_by_its_ends_are_those_of_differences(start_bar: int, end_bar: int) -> None:
+    scene = driven(start_bar, end_bar, motion=fourbar.Motion(np.array([0.4, 2.0, 4.5]), 10.0, 5.0))
+    slopes = fourbar.sensitivity(scene)
     for key in ("drive.from.at.0", "drive.from.at.1", "drive.to.at.0", "drive.to.at.1", "lengths.coupler"):
-        value = found.numbers[list(found.keys).index(key)]
+        value = slopes.numbers[list(slopes.keys).index(key)]
         s = fourbar.solve(fourbar.vary(scene, {key: value + STEP * np.array([-1.0, 1.0])}))
         for name in ("drive_force", "stroke", "power", "F43", "drive_condition"):
             slope = (getattr(s, name)[1] - getattr(s, name)[0]) / (2.0 * STEP)
             size = np.abs(slope).max() + np.abs(getattr(s, name)).max() / 0.1
             # the truncation grows with the cube of what divides
-            assert np.abs(found.of(name, key) - slope).max() < DIFFERENCES / s.drive_condition.min() ** 3 * size, (
+            assert np.abs(slopes.of(name, key) - slope).max() < DIFFERENCES / s.drive_condition.min() ** 3 * size, (
                 name,
                 key,
             )
@@ -252,17 +257,17 @@ def test_extremes_hold_every_sample() -> None:
     scene = crank_rocker(linkage=link, loads=(), motion=motion, drive=across)
     with pytest.raises(fourbar.InputError, match="quantity = 'torque'"):
         fourbar.extremes(scene, ["torque"])
-    found = fourbar.extremes(scene, ["drive_force"])
-    ((low, high),) = found.parts
+    bounds = fourbar.extremes(scene, ["drive_force"])
+    ((low, high),) = bounds.parts
     s = fourbar.solve(replace(scene, motion=fourbar.Motion(np.linspace(low, high, 2001), 3.0)))
-    least, greatest = found.least["drive_force"], found.greatest["drive_force"]
+    least, greatest = bounds.least["drive_force"], bounds.greatest["drive_force"]
     assert least.low <= s.drive_force.min() <= least.high + 1e-3 * abs(least.high)
     assert greatest.low - 1e-3 * abs(greatest.low) <= s.drive_force.max() <= greatest.high
 
 
-@pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_the_frame_bears_what_changes_the_momentum_of_the_bars(one: int, other: int) -> None:
-    scene = driven(one, other, loads=(), effects=())
+@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+def test_the_frame_bears_what_changes_the_momentum_of_the_bars(start_bar: int, end_bar: int) -> None:
+    scene = driven(start_bar, end_bar, loads=(), effects=())
     s = fourbar.solve(scene)
     force, moment = np.zeros((61, 2)), np.zeros(61)
     for number in (2, 3, 4):
@@ -283,12 +288,12 @@ def test_the_frame_bears_what_changes_the_momentum_of_the_bars(one: int, other: 
     assert duty.peak_speed == np.abs(s.stroke_speed).max() and entry["units"]["peak_speed"] == "m/s"
 
 
-@pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(one: int, other: int) -> None:
+@pytest.mark.parametrize(("start_bar", "end_bar"), PAIRS)
+def test_friction_that_depends_on_pin_forces_takes_its_power_from_the_drive(start_bar: int, end_bar: int) -> None:
     """P = power without friction + sum of mu r |F| |slip|, with the pin forces that the drive itself makes."""
     pins = {"O2": (0.1, 0.004), "A": (0.15, 0.005), "B": (0.2, 0.003), "O4": (0.1, 0.006)}
     motion = fourbar.Motion(np.array([0.4, 1.3, 2.0, 4.5]), 10.0, 5.0)
-    scene = driven(one, other, motion=motion)
+    scene = driven(start_bar, end_bar, motion=motion)
     bare, s = (
         fourbar.solve(scene),
         fourbar.solve(

@@ -55,9 +55,9 @@ def test_a_spring_with_both_ends_in_one_pin_has_no_direction(name: str, pin: str
 
 def test_a_spring_whose_ends_meet_once_loses_that_position_alone() -> None:
     spring = Spring(SpringEnd(1, 0.1, 0.5), SpringEnd(2, 0.1, 0.0), 200.0, 0.05)
-    at = [0.3, 0.5, 0.5 + 1e-9, 0.7]
+    theta_2 = [0.3, 0.5, 0.5 + 1e-9, 0.7]
     scenes = [
-        Scene(linkage("crank-rocker"), Motion(at, 8.0), effects=effects)
+        Scene(linkage("crank-rocker"), Motion(theta_2, 8.0), effects=effects)
         for effects in ((Springs((spring,)),), (PinFriction.at(O2=(0.2, 0.01)), Springs((spring,))))
     ]
     for scene in scenes:
@@ -74,8 +74,8 @@ def continuous(scene: Scene, pin: str) -> np.ndarray:
     angle |= {3: solution.theta_3, 4: solution.theta_4}
     i, j = PINS[pin]
     between = angle[j] - angle[i]
-    known = np.isfinite(between)
-    between[known] = np.unwrap(between[known])
+    finite = np.isfinite(between)
+    between[finite] = np.unwrap(between[finite])
     return between
 
 
