@@ -65,8 +65,8 @@ def test_error_bars_are_of_the_size_of_the_error(name: str, kind: str, monkeypat
     scene = SCENES[name]
     if kind == "pairs of doubles":
         monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
-    at = command(scene)
-    ours, exact = fourbar.solve(scene, "error"), BallArithmetic().answer(scene, at)
+    commanded = command(scene)
+    ours, exact = fourbar.solve(scene, "error"), BallArithmetic().answer(scene, commanded)
     for bar, quantities in (("torque_error", ("torque",)), ("force_error", PIN_FORCES)):
         width, values = getattr(ours, bar), [getattr(ours, q) for q in quantities]
         error = np.max(
@@ -98,20 +98,20 @@ def test_a_run_judges_the_bars_where_each_spring_is_nearest_to_its_rest(monkeypa
         effects=(Springs((spring,)), Torsion.at(B=(0.5, 0.7, 0.0))),
         points=ends,
     )
-    whole = fourbar.solve(scene)
+    swept = fourbar.solve(scene)
     away = [
-        np.hypot(*(whole.points["Q"] - whole.points["P"]).T) - 0.2,
-        whole.theta_4 - whole.theta_3 - 0.7,
-        whole.theta_2 - 2.0,
+        np.hypot(*(swept.points["Q"] - swept.points["P"]).T) - 0.2,
+        swept.theta_4 - swept.theta_3 - 0.7,
+        swept.theta_2 - 2.0,
     ]
     seen: list[np.ndarray] = []
     true = fourbar.solve
     question = Question("", scene, command(scene))
     assert question.solution is not None
-    monkeypatch.setattr(printed, "solve", lambda *given, at: seen.append(at.theta_2) or true(*given, at=at))
+    monkeypatch.setattr(printed, "solve", lambda *args, at: seen.append(at.theta_2) or true(*args, at=at))
     rows = list(printed.check_error_bars(question))
     assert {row.verdict for row in rows} == {"agrees"}
-    assert {whole.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])
+    assert {swept.theta_2[np.argmin(np.abs(gap))] for gap in away} <= set(seen[0])
 
 
 def test_a_bar_is_of_the_motion_that_begins_to_one_side() -> None:

@@ -133,17 +133,17 @@ def forces_by_energy(theta: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 
 def test_a_release_is_computed_once_and_solved_as_any_command() -> None:
-    released, whole = fourbar.release(SWING), solve(SWING, "force")
+    released, solution = fourbar.release(SWING), solve(SWING, "force")
     again = solve(SWING, "force", at=released.command)
-    for name in whole.evaluated():
-        np.testing.assert_array_equal(getattr(again, name), getattr(whole, name), err_msg=name)
-    np.testing.assert_array_equal(released.time, whole.time)
-    np.testing.assert_array_equal(released.theta_2, whole.theta_2)
-    np.testing.assert_allclose(released.omega_2, whole.omega_2, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(released.alpha_2, whole.alpha_2, rtol=0.0, atol=1e-9)
+    for name in solution.evaluated():
+        np.testing.assert_array_equal(getattr(again, name), getattr(solution, name), err_msg=name)
+    np.testing.assert_array_equal(released.time, solution.time)
+    np.testing.assert_array_equal(released.theta_2, solution.theta_2)
+    np.testing.assert_allclose(released.omega_2, solution.omega_2, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(released.alpha_2, solution.alpha_2, rtol=0.0, atol=1e-9)
     some = np.array([3, 70, 4])  # positions of both independent angles, in an order of their own
     few = solve(SWING, "force", at=released.command.part(some))
-    np.testing.assert_array_equal(few.F43, whole.F43[some])
+    np.testing.assert_array_equal(few.F43, solution.F43[some])
 
 
 @pytest.mark.parametrize(
@@ -166,13 +166,13 @@ def test_pin_forces_pass_a_limit_position_smoothly(monkeypatch: pytest.MonkeyPat
     dense = halted.stopped_at + np.concatenate([-distances[::-1], [0.0], distances])
     times = np.unique(np.concatenate([evenly, dense]))
     true = free_motion.integrate
-    monkeypatch.setattr(free_motion, "integrate", lambda *given, **how: true(*given[:-1], times, **how))
+    monkeypatch.setattr(free_motion, "integrate", lambda *args, **how: true(*args[:-1], times, **how))
     s = solve(SWING, "force")
     assert set(s.status) == {"ok"} and np.array_equal(s.time, times)
     assert set(s.branch) == {1, -1} and np.abs(s.sin_mu).min() < 1e-12
     assert not np.any(s.torque)
     theta = np.stack([s.theta_2, s.theta_3, s.theta_4], axis=1)
-    expected = np.array([forces_by_energy(each, theta[0]) for each in theta])
+    expected = np.array([forces_by_energy(angles, theta[0]) for angles in theta])
     size = np.max(np.hypot(expected[..., 0], expected[..., 1]))
     F = np.stack([getattr(s, name) for name in PINS], axis=1)
     assert np.abs(F - expected).max() <= BY_ENERGY * size

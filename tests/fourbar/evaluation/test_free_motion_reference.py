@@ -112,25 +112,25 @@ def motion(kind: str, number: int) -> Released:
     branch, omega_2, follow = int(rng.choice([-1, 1])), float(rng.uniform(-5.0, 5.0)), bool(rng.random() < 0.6)
     while True:
         theta_2 = float(rng.uniform(-3.0, 3.0))
-        at = fourbar.scene.Command(np.array([theta_2]), np.array([branch], dtype=np.int8), None, 0.0)
-        if fourbar.solve(fourbar.Scene(linkage), at=at).condition[0] > 0.3:
+        command = fourbar.scene.Command(np.array([theta_2]), np.array([branch], dtype=np.int8), None, 0.0)
+        if fourbar.solve(fourbar.Scene(linkage), at=command).condition[0] > 0.3:
             return Released(linkage, tuple(terms), theta_2, omega_2, branch, follow)
 
 
-def ours(of: Released, nudge: Sequence[float] = (0.0, 0.0)) -> OurMotion:
+def ours(case: Released, nudge: Sequence[float] = (0.0, 0.0)) -> OurMotion:
     """The motion of the formulas."""
-    start = (of.theta_2 + nudge[0], of.omega_2 + nudge[1])
-    return integrate(of.linkage, of.terms, *start, of.branch, TIMES, follow=of.follow)
+    start = (case.theta_2 + nudge[0], case.omega_2 + nudge[1])
+    return integrate(case.linkage, case.terms, *start, case.branch, TIMES, follow=case.follow)
 
 
-def amplification(of: Released) -> float:
+def amplification(case: Released) -> float:
     """Largest change of theta_2 over that of the start, by finite differences."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(free_motion, "RELATIVE", LOOSE)
         patch.setattr(free_motion, "ABSOLUTE", LOOSE)
-        base = ours(of)
+        base = ours(case)
         speed = float(np.abs(base.command.omega_2).max())
-        moved = [ours(of, nudge) for nudge in ((NUDGE, 0.0), (0.0, NUDGE * speed))]
+        moved = [ours(case, nudge) for nudge in ((NUDGE, 0.0), (0.0, NUDGE * speed))]
     n = min(len(m.command.time) for m in (base, *moved))
     return max(float(np.abs(m.command.theta_2[:n] - base.command.theta_2[:n]).max()) for m in moved) / NUDGE
 
@@ -157,8 +157,8 @@ MANY = [(kind, number) for kind in KINDS for number in range(int(os.environ.get(
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(("kind", "number"), list(dict.fromkeys([*SHOWN, *MANY])))
 def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
-    of = motion(kind, number)
-    m, theirs = ours(of), released(*of[:5], TIMES, follow=of.follow)
+    case = motion(kind, number)
+    m, theirs = ours(case), released(*case[:5], TIMES, follow=case.follow)
     shown = SHOWN.get((kind, number))
     promised, amplified = PROMISED, 0.0
     n = len(theirs.theta_2)
@@ -168,7 +168,7 @@ def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
         off.append(abs(m.stopped_at - theirs.stopped_at) * float(np.abs(m.command.omega_2).max()))
     worst = float(np.max(off))  # NaN where one is
     if worst > PROMISED or shown == AMPLIFIES:  # three more motions, only where they decide
-        amplified = amplification(of)
+        amplified = amplification(case)
         promised *= max(1.0, amplified / AMPLIFIED)
     assert worst <= promised
     sure = np.abs(theirs.sine) > SURE
@@ -176,7 +176,7 @@ def test_nine_digits_over_five_seconds(kind: str, number: int) -> None:
     assert (m.stopped_at is None) is (theirs.stopped_at is None)
     if shown is not None:
         passed = theirs.limits > 0, theirs.change_points > 0
-        kinds = [not any(passed), any(passed) and not of.follow, *(of.follow and one for one in passed)]
+        kinds = [not any(passed), any(passed) and not case.follow, *(case.follow and one for one in passed)]
         assert [*kinds, amplified > AMPLIFIED][shown]
 
 
