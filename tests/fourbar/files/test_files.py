@@ -51,8 +51,8 @@ def test_the_named_mechanisms_are_among_the_models() -> None:
 @pytest.mark.parametrize(("name", "torque"), [("thesis", 3.0930935923), ("thesis_printed_inertias", 3.0933077994)])
 def test_the_thesis_scenes_reach_the_figures(name: str, torque: float) -> None:
     scene = load(next(path for path in MODELS if path.stem == name))
-    there = replace(scene, motion=scene.motion.replace(angle=math.radians(135.0)))
-    solution = fourbar.solve(there)
+    at_135 = replace(scene, motion=scene.motion.replace(angle=math.radians(135.0)))
+    solution = fourbar.solve(at_135)
     assert solution.torque == pytest.approx(torque, rel=0.0, abs=PRINTED / 10)
     if name == "thesis":
         forces = {

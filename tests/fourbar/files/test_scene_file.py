@@ -283,14 +283,14 @@ def test_mutated_files_end_in_a_scene_or_in_one_line() -> None:
     for _ in range(2000):
         text = list(GOOD)
         for _ in range(random.randint(1, 2)):
-            at = random.randrange(len(text))
+            offset = random.randrange(len(text))
             action = random.randrange(4)
             if action == 0:
-                del text[at : at + random.randint(1, 12)]
+                del text[offset : offset + random.randint(1, 12)]
             elif action == 1:
-                text[at:at] = random.choice(pieces)
+                text[offset:offset] = random.choice(pieces)
             elif action == 2:
-                text[at] = chr(random.randrange(32, 0x250))
+                text[offset] = chr(random.randrange(32, 0x250))
             else:
                 digits = [index for index, letter in enumerate(text) if letter.isdecimal()]
                 text[random.choice(digits)] = random.choice("0123456789.e-")
