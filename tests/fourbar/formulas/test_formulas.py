@@ -90,16 +90,16 @@ def hard_doubles(seed: int, count: int) -> list[tuple[float, float, float, float
         significand = float(rng.choice(tight)) if rng.random() < 0.4 else rng.uniform(1.0, 2.0)
         return float(significand * 2.0 ** int(rng.integers(-60, 5) if rng.random() < 0.5 else rng.integers(-3, 3)))
 
-    found = []
-    while len(found) < count:
+    quadruples = []
+    while len(quadruples) < count:
         p, q, r = one(), one(), one()
         s = float(Fraction(p) + Fraction(q) - Fraction(r))
-        if len(found) % 3 == 0:
+        if len(quadruples) % 3 == 0:
             r, s = max(p, q), min(p, q)
         s *= 1.0 + int(rng.integers(-2, 3)) * 2.0**-52
         if s > 0.0:
-            found.append((p, q, r, s))
-    return found
+            quadruples.append((p, q, r, s))
+    return quadruples
 
 
 @pytest.mark.slow
@@ -110,9 +110,9 @@ def test_a_difference_of_two_sums_is_zero_where_it_is_zero_and_nowhere_else() ->
     plain = [tuple(row) for row in np.random.default_rng(2).random((5000, 4))]
     for p, q, r, s in [small, *plain, *hard_doubles(1, 20_000)]:
         exact = Fraction(p) + Fraction(q) - Fraction(r) - Fraction(s)
-        found = Fraction(exact_difference(p, q, r, s))
+        difference = Fraction(exact_difference(p, q, r, s))
         zeros += exact == 0
-        assert abs(found - exact) <= THREE_SUMS * abs(exact), (p, q, r, s)
+        assert abs(difference - exact) <= THREE_SUMS * abs(exact), (p, q, r, s)
         total, rest = split_sum(p, q)
         assert total == p + q and Fraction(total) + Fraction(rest) == Fraction(p) + Fraction(q)
     assert zeros > 1000
@@ -125,9 +125,9 @@ def test_the_constants_of_the_loop_vanish_at_change_points_alone() -> None:
     for p, q, r, s in hard_doubles(3, 5000):
         for lengths in ((p, q, r, s), (p, r, q, s), (p, r, s, q)):
             d, a, b, c = map(Fraction, lengths)
-            found = loop(*lengths)
+            constants = loop(*lengths)
             for k, (value, exact) in enumerate(
-                ((found.E1, (b + c) ** 2 - (a + d) ** 2), (found.E2, (d - a) ** 2 - (b - c) ** 2))
+                ((constants.E1, (b + c) ** 2 - (a + d) ** 2), (constants.E2, (d - a) ** 2 - (b - c) ** 2))
             ):
                 zeros[k] += exact == 0
                 assert (value == 0.0) == (exact == 0)
@@ -146,9 +146,9 @@ def test_pairs_stay_parallel_on_one_side_of_the_change_points_alone() -> None:
         ((0.3, 0.3, 0.1, 0.1), False, False),
         ((0.3, 0.1, 0.25, 0.22), False, False),
     ):
-        found = loop(*lengths)
+        bars = loop(*lengths)
         for branch, first, second in ((1, ahead, back), (-1, back, ahead)):
-            pairs = find_parallel_pairs(found, half_angle(found, psi), branch)
+            pairs = find_parallel_pairs(bars, half_angle(bars, psi), branch)
             assert [pair.tolist() for pair in pairs] == [first if together else neither, second if folded else neither]
 
 
@@ -165,7 +165,7 @@ def test_read_in_theta_4_the_linkage_lies_and_moves_the_same() -> None:
     """By the chain rule: h2 = 1/h4, h3 becomes h3/h4, and so on for the second ones."""
     compared = 0
     for drawn in random_positions(31, 300, 0.2):
-        moving, at, k = read_from_the_output(drawn)
+        moving, position, k = read_from_the_output(drawn)
         other_sine = abs(float((moving.position.u2 * moving.position.u3.conjugate()).imag[0]))
         if other_sine < 0.2:
             continue
@@ -173,10 +173,10 @@ def test_read_in_theta_4_the_linkage_lies_and_moves_the_same() -> None:
         size = (max(drawn.bars.lengths) / min(drawn.bars.lengths)) ** 2
         allowed = FROM_EITHER_END * size / (drawn.sine * other_sine)
         for name in ("u1", "u2", "u3", "u4", "sin_mu", "diagonal"):
-            assert abs(getattr(at, name) - getattr(moving.position, name)) <= allowed, name
+            assert abs(getattr(position, name) - getattr(moving.position, name)) <= allowed, name
         mine = moving.k
         grown = size * (1.0 + abs(mine.h3) + 1.0 / abs(mine.h4)) ** 3 / (drawn.sine * other_sine) ** 2
-        for found, expected in (
+        for coefficient, expected in (
             (k.h2, 1.0 / mine.h4),
             (k.h3, mine.h3 / mine.h4),
             (k.h4, 1.0),
@@ -186,7 +186,7 @@ def test_read_in_theta_4_the_linkage_lies_and_moves_the_same() -> None:
             (k.dh3, (mine.dh3 * mine.h4 - mine.h3 * mine.dh4) / mine.h4**3),
             (k.dh4, 0.0),
         ):
-            assert abs(found - expected) <= allowed * grown
+            assert abs(coefficient - expected) <= allowed * grown
     assert compared > 150
 
 
@@ -196,11 +196,11 @@ def test_read_in_theta_4_the_input_stands_at_its_limit() -> None:
     for limit in limit_positions(bars):
         from_output = prepare_path(loop(*bars.lengths), bars.ground_angle, 4)
         sign = math.copysign(1.0, math.sin(limit.theta_3 - limit.theta_2))
-        at, k = from_output.motion(
+        position, k = from_output.motion(
             from_output.position(limit.theta_4, from_output.half_angle(limit.theta_4), sign), sign
         )
-        assert math.remainder(float(np.angle(at.u2)) - limit.theta_2, math.tau) == pytest.approx(0.0, abs=8.0 * U)
-        assert abs(at.sin_mu) <= 16.0 * U and abs(k.h2) <= 32.0 * U
+        assert math.remainder(float(np.angle(position.u2)) - limit.theta_2, math.tau) == pytest.approx(0.0, abs=8.0 * U)
+        assert abs(position.sin_mu) <= 16.0 * U and abs(k.h2) <= 32.0 * U
         assert np.isfinite(k).all() and k.h4 == 1.0 and abs(k.h43) > 0.1 and abs(k.dh2) > 0.1
 
 
@@ -208,11 +208,11 @@ def test_read_in_theta_4_a_parallelogram_stays_parallel_exactly() -> None:
     from_output = prepare_path(loop(0.3, 0.1, 0.3, 0.1), 0.0, 4)
     theta_4 = np.array([1e-9, 0.5, 3.0])
     sign = -1.0  # of sin(theta_3 - theta_2): the coupler lies as the ground
-    at, k = from_output.motion(from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign)
-    assert at.u2 == pytest.approx(np.exp(1j * theta_4), abs=4.0 * U)
-    assert at.u3 == pytest.approx(np.ones(3), abs=4.0 * U)
-    for found, expected in ((k.h2, 1.0), (k.h3, 0.0), (k.dh2, 0.0), (k.dh3, 0.0)):
-        assert np.array_equal(found, np.full(3, expected))
+    position, k = from_output.motion(from_output.position(theta_4, from_output.half_angle(theta_4), sign), sign)
+    assert position.u2 == pytest.approx(np.exp(1j * theta_4), abs=4.0 * U)
+    assert position.u3 == pytest.approx(np.ones(3), abs=4.0 * U)
+    for coefficient, expected in ((k.h2, 1.0), (k.h3, 0.0), (k.dh2, 0.0), (k.dh3, 0.0)):
+        assert np.array_equal(coefficient, np.full(3, expected))
 
 
 @pytest.mark.parametrize("lengths", [(0.3, 0.1, 0.25, 0.22), (0.3, 0.1, 0.3, 0.1), (0.2, 0.3, 0.3, 0.2)])
@@ -223,17 +223,21 @@ def test_the_sine_of_the_drive_is_that_of_the_two_bars_not_driven(lengths: tuple
     for bar, branch in itertools.product((2, 4), (1.0, -1.0)):
         reading = prepare_path(loop(*lengths), 0.4, bar)
         with np.errstate(invalid="ignore"):  # read from the output the loop does not close at every angle
-            at, _ = reading.motion(reading.position(angles, reading.half_angle(angles), branch), branch)
-        closed = np.isfinite(at.sin_mu)
+            position, _ = reading.motion(reading.position(angles, reading.half_angle(angles), branch), branch)
+        closed = np.isfinite(position.sin_mu)
         assert closed.any()
-        for drive_bar, (u, v) in {2: (at.u3, at.u4), 3: (at.u2, at.u4), 4: (at.u2, at.u3)}.items():
+        for drive_bar, (u, v) in {
+            2: (position.u3, position.u4),
+            3: (position.u2, position.u4),
+            4: (position.u2, position.u3),
+        }.items():
             with np.errstate(invalid="ignore"):
-                found = reading.drive_sine(at, drive_bar)
-            assert found[closed] == pytest.approx(cross(u, v)[closed], abs=32.0 * U)
+                sine = reading.drive_sine(position, drive_bar)
+            assert sine[closed] == pytest.approx(cross(u, v)[closed], abs=32.0 * U)
             if bar == 2 and lengths in STAY_PARALLEL:
                 parallel = (u == v) | (u == -v)
                 assert parallel.any() == (drive_bar == STAY_PARALLEL[lengths])
-                assert (found[parallel] == 0.0).all()
+                assert (sine[parallel] == 0.0).all()
     plain = close_loop(loop(*lengths), u1, np.exp(1j), half_angle(loop(*lengths), 0.6), 1.0)
     assert plain.diagonal == pytest.approx(d * u1 - a * np.exp(1j), abs=8.0 * U)
 
@@ -269,30 +273,37 @@ def everything(d: Any, a: Any, b: Any, c: Any, theta_1: Any, q: Any, branch: Any
     lengths = loop(d, a, b, c)
     from_output = prepare_path(lengths, theta_1, bar)
     half = from_output.half_angle(q)
-    at, k = from_output.motion(from_output.position(q, half, branch), branch)
+    position, k = from_output.motion(from_output.position(q, half, branch), branch)
     moving = rates(k, 2.0, -3.0)
-    here = State(lengths, theta_1, q, at, k, 2.0, moving)
+    here = State(lengths, theta_1, q, position, k, 2.0, moving)
     bodies = Body(0.2, 0.01, 0.3 * a + 0.01j), Body(0.5, 0.02, 0.6 * b - 0.02j), Body(0.4, 0.03, 0.5 * c + 0j)
-    w, mass_at_A = inertia_wrenches(a, bodies, at, moving)
-    inertial = sum(inertia(a, bodies, at, k)) * -3.0 + half_slope(a, bodies, at, k) * 4.0
-    values = {**half._asdict(), **k._asdict(), **moving._asdict(), "u3": at.u3, "u4": at.u4, "sin_mu": at.sin_mu}
-    values |= {"sine_A": cross(at.u2, at.u3), "sine_24": cross(at.u2, at.u4)}
+    w, mass_at_A = inertia_wrenches(a, bodies, position, moving)
+    inertial = sum(inertia(a, bodies, position, k)) * -3.0 + half_slope(a, bodies, position, k) * 4.0
+    values = {
+        **half._asdict(),
+        **k._asdict(),
+        **moving._asdict(),
+        "u3": position.u3,
+        "u4": position.u4,
+        "sin_mu": position.sin_mu,
+    }
+    values |= {"sine_A": cross(position.u2, position.u3), "sine_24": cross(position.u2, position.u4)}
     for k_th in MOVING_BARS:
         values[f"G{k_th}"] = here.point(k_th, bodies[k_th - 2].z)
         values[f"a_G{k_th}"] = here.acceleration(k_th, bodies[k_th - 2].z)
         values[f"T{k_th}"] = driving_torque(k[k_th - 2], inertial, 0.5)
-        pins = pin_forces(lengths, at, k_th, drive_sine(at, k_th), w, mass_at_A, 0.25)
+        pins = pin_forces(lengths, position, k_th, drive_sine(position, k_th), w, mass_at_A, 0.25)
         values |= {f"{name} of drive {k_th}": value for name, value in pins._asdict().items()}
     return values
 
 
-def plainly(number: type, *given: Any) -> dict[str, Any]:
+def plainly(number: type, *arguments: Any) -> dict[str, Any]:
     """Everything in one kind of number; where Python's own refuse to divide by zero `solve` takes NumPy's too."""
     try:
-        return everything(*given)
+        return everything(*arguments)
     except ZeroDivisionError:
         assert number is float
-        return everything(*map(np.float64, given[:-2]), *given[-2:])
+        return everything(*map(np.float64, arguments[:-2]), *arguments[-2:])
 
 
 @pytest.mark.parametrize("bar", MOVING_BARS)
@@ -321,18 +332,18 @@ def test_numbers_arrays_and_many_linkages_at_once_are_the_same_formulas(theta_1:
                 [plainly(number, *map(number, lengths), number(theta_1), number(angle), branch, bar) for angle in q]
                 for lengths in LINKAGES
             ]
-            assert {np.ndim(value) for row in alone for each in row for value in each.values()} == {0}
-            others.append({name: [[each[name] for each in row] for row in alone] for name in at_once})
+            assert {np.ndim(value) for row in alone for answer in row for value in answer.values()} == {0}
+            others.append({name: [[answer[name] for answer in row] for row in alone] for name in at_once})
     regular = np.min([np.abs(at_once[name]) for name in ("sin_mu", "sine_A", "sine_24")], axis=0) > 0.1
     assert 15 < regular.sum() < regular.size
-    for other in others:
+    for answers in others:
         for name, value in at_once.items():
-            found = np.broadcast_to(other[name], shape)
+            broadcast = np.broadcast_to(answers[name], shape)
             if name in OF_REAL_NUMBERS:
-                assert np.array_equal(found, value, equal_nan=True), name
+                assert np.array_equal(broadcast, value, equal_nan=True), name
             else:
                 allowed = FUSED * np.abs(value[regular]).max()
-                assert (np.abs(found[regular] - value[regular]) <= allowed).all(), name
+                assert (np.abs(broadcast[regular] - value[regular]) <= allowed).all(), name
 
 
 def five(bars: FourBar, psi: mp.mpf) -> list[mp.mpf]:
@@ -347,12 +358,12 @@ def test_the_half_angle_in_many_digits_is_rounded_once() -> None:
         for drawn in random_positions(41, 60):
             bars, theta_2 = drawn.bars, float(drawn.theta_2[0])
             expected = five(bars, mp.mpf(theta_2) - mp.mpf(bars.ground_angle))
-            for found, exact in zip(exact_half_angle(bars, theta_2), expected, strict=True):
-                assert abs(found - exact) <= U * abs(exact)
+            for ours, exact in zip(exact_half_angle(bars, theta_2), expected, strict=True):
+                assert abs(ours - exact) <= U * abs(exact)
             offset = mp.mpf("1e-25") * theta_2
             expected = five(bars, mp.mpf(theta_2) + offset - mp.mpf(bars.ground_angle))
-            for found, exact in zip(exact_half_angle(bars, theta_2, offset), expected, strict=True):
-                assert abs(found - exact) <= U * abs(exact)
+            for ours, exact in zip(exact_half_angle(bars, theta_2, offset), expected, strict=True):
+                assert abs(ours - exact) <= U * abs(exact)
 
 
 def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle() -> None:
@@ -364,17 +375,17 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle() -> None:
     with mp.workdps(200):
         for lengths in [*LINKAGES.tolist(), (0.4, 0.397, 0.003, 0.002)]:
             bars = uniform(*lengths)
-            found = half_angle(loop(*bars.lengths), psi)
+            half = half_angle(loop(*bars.lengths), psi)
             d, a, b, c, E1, E2 = loop(*bars.lengths)
             for i, angle in enumerate(psi):
                 ss, kk, sk, outer, inner = five(bars, mp.mpf(float(angle)))
-                for ours, exact in ((found.ss, ss), (found.kk, kk), (found.sk, sk)):
+                for ours, exact in ((half.ss, ss), (half.kk, kk), (half.sk, sk)):
                     assert abs(ours[i] - exact) <= TANGENT * abs(exact)
                 of_outer, of_inner = abs(E1) + 4 * a * d * kk, abs(E2) + 4 * a * d * ss
                 # one is what the other leaves of 4 b c, where that has fewer digits to lose
                 for ours, exact, terms, of_other in (
-                    (found.outer, outer, of_outer, of_inner),
-                    (found.inner, inner, of_inner, of_outer),
+                    (half.outer, outer, of_outer, of_inner),
+                    (half.inner, inner, of_inner, of_outer),
                 ):
                     assert abs(ours[i] - exact) <= TANGENT * min(terms, 4 * b * c + of_other)
 
@@ -410,18 +421,18 @@ def test_an_offset_from_a_limit_in_many_digits(bars: FourBar, stretched: bool, s
             assert abs(limit - first) < 1e-15 * math.pi
             assert abs(mp.mpf(theta_2) + remainder - meant) <= DIGITS_LEFT * size
             expected = five(bars, meant - mp.mpf(bars.ground_angle))
-            found = exact_half_angle(bars, theta_2, remainder)
-            for ours, exact in zip(found, expected, strict=True):
+            half = exact_half_angle(bars, theta_2, remainder)
+            for ours, exact in zip(half, expected, strict=True):
                 assert abs(ours - exact) <= (1.0 + DIGITS_LEFT) * U * abs(exact)
             # beyond the limit nothing closes, however near: stretched bars stop it going on, folded ones going back
-            assert (found.outer if stretched else found.inner) * (-offset if stretched else offset) > 0.0
+            assert (half.outer if stretched else half.inner) * (-offset if stretched else offset) > 0.0
 
 
 def test_a_limit_position_itself_closes_in_many_digits() -> None:
     bars = FourBar(0.5, Bar(0.4), Bar(0.3), Bar(0.25), 0.2)
     for limit in limit_positions(bars):
-        found = exact_half_angle(bars, limit.theta_2, limit_remainder(bars, limit.theta_2, limit.theta_2, 0.0))
-        assert found.outer == 0.0 < found.inner
+        half = exact_half_angle(bars, limit.theta_2, limit_remainder(bars, limit.theta_2, limit.theta_2, 0.0))
+        assert half.outer == 0.0 < half.inner
 
 
 def test_bars_that_miss_by_the_rounding_of_their_lengths_touch() -> None:
@@ -439,8 +450,8 @@ def test_positions_decided_in_many_digits_replace_their_own_alone() -> None:
     bars, theta_2 = uniform(0.3, 0.1, 0.25, 0.22), np.linspace(0.1, 6.0, 7)
     half = half_angle(loop(*bars.lengths), theta_2)
     for offset in (None, mp.mpf("1e-3")):
-        found = decide_half_angles(bars, 1.0, half, np.array([1, 4]), theta_2, offset)
-        for name, before, after in zip(half._fields, half, found, strict=True):
+        decided = decide_half_angles(bars, 1.0, half, np.array([1, 4]), theta_2, offset)
+        for name, before, after in zip(half._fields, half, decided, strict=True):
             exact = [float(getattr(exact_half_angle(bars, float(angle), offset), name)) for angle in theta_2]
             assert after[[1, 4]].tolist() == [exact[1], exact[4]]
             assert np.array_equal(np.delete(after, [1, 4]), np.delete(before, [1, 4]))
@@ -455,9 +466,9 @@ def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(bar: in
 
     theta_2 = np.linspace(0.1, 6.0, 13)
     lengths = loop(0.3, 0.1, 0.25, 0.22)
-    at = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), branch)
-    found = drive_sine_of_triangle(lengths, at, bar)
-    assert np.allclose(found, drive_sine(at, bar), rtol=0.0, atol=16.0 * U)
+    position = close_loop(lengths, 1.0, direction(theta_2), half_angle(lengths, theta_2), branch)
+    sine = drive_sine_of_triangle(lengths, position, bar)
+    assert np.allclose(sine, drive_sine(position, bar), rtol=0.0, atol=16.0 * U)
     with mp.workdps(60):
         d, a, b, c = map(mpf, (2.0**-14, 1.5, 0.75, 1.25))
         D = d - a * mp.expj(mpf(0.7))
@@ -467,8 +478,8 @@ def test_the_sine_of_the_drive_by_the_triangle_is_that_of_the_directions(bar: in
         u = u if bar == 4 else (b * u - D) / c
         exact = float((mp.conj(mp.expj(mpf(0.7))) * u).imag)
     short = loop(2.0**-14, 1.5, 0.75, 1.25)
-    at = close_loop(short, 1.0, direction(0.7), half_angle(short, 0.7), branch)
-    assert drive_sine_of_triangle(short, at, bar) == pytest.approx(exact, rel=16.0 * U)
+    position = close_loop(short, 1.0, direction(0.7), half_angle(short, 0.7), branch)
+    assert drive_sine_of_triangle(short, position, bar) == pytest.approx(exact, rel=16.0 * U)
 
 
 def test_a_state_holds_what_it_was_made_from() -> None:
@@ -490,5 +501,5 @@ def test_the_factor_that_changes_less_gives_the_other_its_digits() -> None:
             e2 = (d - a) ** 2 + 4 * a * d * mp.sin(mp.mpf(psi) / 2) ** 2
             exact = ((b + c) ** 2 - e2, e2 - (b - c) ** 2)
         changes = float(4 * a * d * abs(mp.sin(psi)) * psi)  # with the last digit of psi
-        for found, factor in zip((half.outer, half.inner), exact, strict=True):
-            assert abs(factor - float(found)) <= PRODUCTS * (float(4 * b * c) + changes)
+        for ours, factor in zip((half.outer, half.inner), exact, strict=True):
+            assert abs(factor - float(ours)) <= PRODUCTS * (float(4 * b * c) + changes)

@@ -44,8 +44,8 @@ def test_a_function_keeps_the_digits_of_a_pair(function: Callable[..., Pair], re
     with mp.workdps(60):
         x, y = draw(1), draw(2)
         expected = [reference(mp.mpc(a), mp.mpc(b)) for a, b in zip(exact(x), exact(y), strict=True)]
-        for found, wanted in zip(exact(function(x, y)), expected, strict=True):
-            assert abs(found - wanted) <= DIGITS * max(abs(wanted), 0.1)
+        for ours, wanted in zip(exact(function(x, y)), expected, strict=True):
+            assert abs(ours - wanted) <= DIGITS * max(abs(wanted), 0.1)
 
 
 def test_what_is_no_number_stays_none_and_a_comparison_sees_the_last_digit() -> None:

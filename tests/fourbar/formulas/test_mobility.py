@@ -47,12 +47,12 @@ def linkage(d: float, a: float, b: float, c: float, theta_1: float = 0.0) -> Fou
 def random_linkages(seed: int, count: int) -> list[FourBar]:
     """Random lengths and theta_1; a third of them integers, which makes change points common."""
     rng = np.random.default_rng(seed)
-    found: list[FourBar] = []
-    while len(found) < count:
-        lengths = rng.integers(1, 7, 4).astype(float) if len(found) % 3 == 0 else rng.uniform(0.1, 1.0, 4)
+    linkages: list[FourBar] = []
+    while len(linkages) < count:
+        lengths = rng.integers(1, 7, 4).astype(float) if len(linkages) % 3 == 0 else rng.uniform(0.1, 1.0, 4)
         if 2.0 * lengths.max() < lengths.sum():
-            found.append(linkage(*lengths.tolist(), theta_1=float(rng.uniform(-math.pi, math.pi))))
-    return found
+            linkages.append(linkage(*lengths.tolist(), theta_1=float(rng.uniform(-math.pi, math.pi))))
+    return linkages
 
 
 def closes(bars: FourBar, theta_2: np.ndarray) -> np.ndarray:
@@ -95,9 +95,9 @@ def test_thesis_limits_of_the_output() -> None:
     assert sorted((math.degrees(limit.theta_4) + 180.0) % 360.0 for limit in limits) == pytest.approx(
         [24.842683784424707, 65.15731621557532], abs=PRINTED_8
     )
-    found = classify(THESIS)
-    assert (found.code, found.barker, found.longest) == ("RRR3", 7, 3)
-    assert found.surplus == pytest.approx(-0.07)
+    classification = classify(THESIS)
+    assert (classification.code, classification.barker, classification.longest) == ("RRR3", 7, 3)
+    assert classification.surplus == pytest.approx(-0.07)
 
 
 @pytest.mark.parametrize(
@@ -123,9 +123,9 @@ def test_thesis_limits_of_the_output() -> None:
 )
 def test_barker_classes(lengths: tuple[float, ...], barker: int, code: str) -> None:
     for scale in (1.0, 1e-9, 1e9, 1e300):
-        found = classify(linkage(*(scale * length for length in lengths)))
-        assert (found.barker, found.code) == (barker, code)
-    assert (found.surplus == 0.0) == (barker >= 9)
+        classification = classify(linkage(*(scale * length for length in lengths)))
+        assert (classification.barker, classification.code) == (barker, code)
+    assert (classification.surplus == 0.0) == (barker >= 9)
 
 
 def test_two_equal_pairs_have_their_names() -> None:
@@ -188,23 +188,23 @@ def test_positions_that_a_motion_connects_have_one_circuit_and_those_that_do_not
 def exact_psi(bars: FourBar, bar: int, stretched: bool) -> mp.mpf:
     """The limit's angle from the ground by the law of cosines in 50 digits."""
     d, *moving = (mp.mpf(length) for length in bars.lengths)
-    own = moving.pop(bar - 2)
+    bar_length = moving.pop(bar - 2)
     e = moving[0] + moving[1] if stretched else moving[0] - moving[1]
-    return mp.acos((d * d + own * own - e * e) / (2 * d * own))
+    return mp.acos((d * d + bar_length * bar_length - e * e) / (2 * d * bar_length))
 
 
 def nearly_special(seed: int, count: int) -> list[FourBar]:
     """Linkages whose surplus or rest of the longest bar is 1e-14..1e-1 of their size."""
     rng = np.random.default_rng(seed)
-    found: list[FourBar] = []
-    while len(found) < count:
+    linkages: list[FourBar] = []
+    while len(linkages) < count:
         p, q, s = rng.uniform(0.1, 1.0, 3)
         gap = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-14, -1))
-        longest = p + q - s + gap if len(found) % 2 else p + q + s - abs(gap)
+        longest = p + q - s + gap if len(linkages) % 2 else p + q + s - abs(gap)
         lengths = rng.permutation([p, q, s, longest])
         if (lengths > 0.02).all() and 2.0 * lengths.max() < lengths.sum():
-            found.append(linkage(*lengths.tolist(), theta_1=0.0))
-    return found
+            linkages.append(linkage(*lengths.tolist(), theta_1=0.0))
+    return linkages
 
 
 def test_limits_keep_their_digits_near_special_linkages() -> None:
@@ -260,8 +260,8 @@ def test_swing_is_what_a_scan_of_the_output_finds() -> None:
         theta_4 = [np.unwrap(angle(bars, theta_2, branch, 4)) for branch in branches]
         if len(theta_4) == 2:  # both branches start from the same limit position
             theta_4[1] += 2 * math.pi * round((theta_4[0][0] - theta_4[1][0]) / (2 * math.pi))
-        found = max(x.max() for x in theta_4) - min(x.min() for x in theta_4)
-        assert found == pytest.approx(swing(bars), abs=SCAN_STEP), bars.lengths
+        scanned = max(x.max() for x in theta_4) - min(x.min() for x in theta_4)
+        assert scanned == pytest.approx(swing(bars), abs=SCAN_STEP), bars.lengths
     assert seen >= {"GCCC", "GCRR", "GRCR", "GRRC", "RRR1", "RRR2", "RRR3", "RRR4"}
 
 
@@ -288,8 +288,8 @@ def test_time_ratio_is_the_time_of_both_strokes() -> None:
     bars = uniform(3.0, 1.0, 2.5, 2.2)
     n = 200_000
     theta_2 = (np.arange(n) + 0.5) * (2 * math.pi / n)
-    at = compute_state(bars, theta_2, 1).position
-    ahead = np.count_nonzero(np.sin(theta_2 - np.angle(at.u3)) * at.sin_mu > 0.0)  # omega_4 > 0
+    position = compute_state(bars, theta_2, 1).position
+    ahead = np.count_nonzero(np.sin(theta_2 - np.angle(position.u3)) * position.sin_mu > 0.0)  # omega_4 > 0
     ratio = max(ahead, n - ahead) / min(ahead, n - ahead)
     assert time_ratio(bars) == pytest.approx(ratio, rel=8.0 / n)  # both ends counted to one step
     assert time_ratio(uniform(1, 3, 2.5, 3.2)) is None

@@ -23,12 +23,12 @@ def linkage(theta_1: float = 0.4, lengths: tuple[float, ...] = LENGTHS) -> fourb
     return fourbar.FourBar(ground, *map(fourbar.Bar, moving), ground_angle=theta_1)
 
 
-def angle(at: State, bar: int) -> np.ndarray:
-    return np.angle(at.direction(bar))
+def angle(state: State, bar: int) -> np.ndarray:
+    return np.angle(state.direction(bar))
 
 
-def assembled(at: State) -> np.ndarray:
-    return (at.position.half.outer >= 0.0) & (at.position.half.inner >= 0.0)
+def assembled(state: State) -> np.ndarray:
+    return (state.position.half.outer >= 0.0) & (state.position.half.inner >= 0.0)
 
 
 def test_positions_that_cannot_close_are_nan_and_say_so() -> None:
@@ -167,8 +167,10 @@ def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch: int, the
 def test_near_parallel_bars_mu_is_the_angle_of_the_input_to_the_last_bit() -> None:
     """Bars 3 and 4 of a parallelogram lie as its ground and input do: so does the angle between them."""
     link = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    at = compute_state(link, np.linspace(0.01, 3.1, 200), 1).position
-    assert np.array_equal(at.sin_mu, at.u2.imag) and np.array_equal(dot(at.u3, at.u4), at.u2.real)
+    position = compute_state(link, np.linspace(0.01, 3.1, 200), 1).position
+    assert np.array_equal(position.sin_mu, position.u2.imag) and np.array_equal(
+        dot(position.u3, position.u4), position.u2.real
+    )
     # 8 EPS has no digit left, the next double has
     assert find_singular(compute_state(link, np.array([8.0 * EPS, 8.0 * EPS * (1.0 + EPS)]), 1).position).tolist() == [
         True,
@@ -187,7 +189,7 @@ def test_short_ground_and_input_leave_no_digit_of_mu() -> None:
         assert assembled(moving).all() and np.array_equal(find_singular(moving.position), e / b <= 8.0 * EPS)
         assert np.array_equal(np.isnan(moving.omega(3)), find_singular(moving.position))
         status = fourbar.solve(fourbar.Scene(link, fourbar.Motion(psi, 2.0))).status
-        assert [each == "singular" for each in status] == find_singular(moving.position).tolist()
+        assert [word == "singular" for word in status] == find_singular(moving.position).tolist()
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 1.2, -2.9])
@@ -199,13 +201,13 @@ def test_angles_alone_are_those_of_the_whole_position(
     """The same angles, statuses and gaps, a limit and A on O4 among them; to the roundings of an angle."""
     link = linkage(theta_1, lengths)
     theta_2 = theta_1 + np.concatenate([np.linspace(-7.0, 7.0, 57), [0.0, np.pi, 1e-9]])
-    at = fourbar.scene.Command(theta_2, np.full(theta_2.shape, branch, np.int8), None, 0.0)
-    whole = fourbar.solve(fourbar.Scene(link), "position", at=at)
+    command = fourbar.scene.Command(theta_2, np.full(theta_2.shape, branch, np.int8), None, 0.0)
+    positions = fourbar.solve(fourbar.Scene(link), "position", at=command)
     alone = fourbar.solve(
-        fourbar.Scene(link), at=at, out={"theta_3": np.empty(theta_2.shape), "theta_4": np.empty(theta_2.shape)}
+        fourbar.Scene(link), at=command, out={"theta_3": np.empty(theta_2.shape), "theta_4": np.empty(theta_2.shape)}
     )
-    assert alone.status == whole.status
+    assert alone.status == positions.status
     for name in ("theta_3", "theta_4"):
-        ours, theirs = getattr(alone, name), getattr(whole, name)
+        ours, theirs = getattr(alone, name), getattr(positions, name)
         assert np.array_equal(np.isnan(ours), np.isnan(theirs))
         assert np.nanmax(np.abs(np.remainder(ours - theirs + np.pi, 2.0 * np.pi) - np.pi)) <= 1e-15 * 32

@@ -22,10 +22,12 @@ PRINTED = 5e-14
 """Relative: the thesis's case recomputed in doubles elsewhere, printed to 16 digits."""
 
 
-def make_bodies(case: fourbar.Scene, at: fourbar.scene.Command) -> FreeBodies:
+def make_bodies(case: fourbar.Scene, command: fourbar.scene.Command) -> FreeBodies:
     """The right-hand sides of the thirteen equations from the kinematics, under gravity alone."""
-    s = fourbar.solve(case, "acceleration", at=at)
-    gravity = np.array(next((each.vector for each in case.effects if isinstance(each, fourbar.Gravity)), (0.0, 0.0)))
+    s = fourbar.solve(case, "acceleration", at=command)
+    gravity = np.array(
+        next((effect.vector for effect in case.effects if isinstance(effect, fourbar.Gravity)), (0.0, 0.0))
+    )
     first = {2: np.zeros_like(s.A), 3: s.A, 4: np.full_like(s.A, (case.linkage.ground, 0.0))}
     second = {2: s.A, 3: s.B, 4: s.B}
     bars = {k: case.linkage.bar(k) for k in MOVING_BARS}
@@ -100,10 +102,10 @@ def test_bars_without_mass_or_inertia(bodies: tuple[tuple[float, float], ...], a
     """Mass and inertia of 0 and of 1, where a term may be left out: the thirteen equations leave none out."""
     bars = (fourbar.Bar(x, *body, (0.4 * x, 0.3)) for x, body in zip((0.1, 0.25, 0.22), bodies, strict=True))
     link, motion = fourbar.FourBar(0.3, *bars), fourbar.Motion(0.0, 10.0)
-    at = fourbar.scene.Command(np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, alpha)
+    command = fourbar.scene.Command(np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, alpha)
     for effects in ((), (fourbar.Gravity(),)):
         case = fourbar.Scene(link, motion, drive_bar, effects=effects)
-        compare_with_thirteen(make_bodies(case, at), fourbar.solve(case, at=at))
+        compare_with_thirteen(make_bodies(case, command), fourbar.solve(case, at=command))
 
 
 def compare_with_thirteen(bodies: FreeBodies, s: fourbar.Solution) -> None:
@@ -122,16 +124,16 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
 ) -> None:
     """With the couples mu r |F| of the forces found, the thirteen equations give these forces again."""
     case = fourbar.Scene(make_example().linkage, fourbar.Motion(0.0, 10.0), drive_bar, effects=(fourbar.Gravity(),))
-    at = fourbar.scene.Command(np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, 0.0)
+    command = fourbar.scene.Command(np.linspace(0.1, 6.0, 13), np.ones(13, np.int8), 10.0, 0.0)
     friction = fourbar.PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
-    s, bodies = fourbar.solve(replace(case, effects=(*case.effects, friction)), at=at), make_bodies(case, at)
+    s, bodies = fourbar.solve(replace(case, effects=(*case.effects, friction)), at=command), make_bodies(case, command)
     rate = {1: 0.0, 2: s.omega_2, 3: s.omega_3, 4: s.omega_4}
     for pin in pins:
         i, j = PINS[pin]
         couple = 0.1 * 0.02 * np.hypot(*getattr(s, PIN_FORCE[pin]).T) * np.sign(rate[j] - rate[i])
-        for bar, of in ((i, 1.0), (j, -1.0)):
+        for bar, sign in ((i, 1.0), (j, -1.0)):
             if bar != 1:
-                bodies.inertia_moment[bar][:] -= of * couple
+                bodies.inertia_moment[bar][:] -= sign * couple
     largest = max(np.max(np.hypot(*getattr(s, name).T)) for name in PIN_FORCE.values())
     assert s.friction_residual is not None and np.max(s.friction_residual) <= 8.0 * EPS * 0.1 * 0.02 * largest
     compare_with_thirteen(bodies, s)
@@ -186,11 +188,11 @@ def test_bars_without_mass_hold_a_load_where_the_input_turns_back() -> None:
 
 def test_written_into_given_arrays() -> None:
     case = scene(2)
-    whole = fourbar.solve(case)
+    solution = fourbar.solve(case)
     out = {"torque": np.empty(31), "F43": np.empty((31, 2))}
     part = fourbar.solve(case, out=out)
-    assert part.torque is out["torque"] and np.array_equal(out["torque"], whole.torque)  # type: ignore[arg-type]
-    assert np.array_equal(out["F43"], whole.F43)  # type: ignore[arg-type]
+    assert part.torque is out["torque"] and np.array_equal(out["torque"], solution.torque)  # type: ignore[arg-type]
+    assert np.array_equal(out["F43"], solution.F43)  # type: ignore[arg-type]
     assert part.F12 is None and part.theta_3 is None
     with pytest.raises(fourbar.InputError, match=r"out\.torque"):
         fourbar.solve(case, out={"torque": np.empty(30)})

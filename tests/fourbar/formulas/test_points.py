@@ -41,8 +41,8 @@ class Drawn(NamedTuple):
 def random_positions(seed: int, count: int, least_sine: float = 0.05) -> list[Drawn]:
     """One regular position each of random linkages, on a random branch."""
     rng = np.random.default_rng(seed)
-    found: list[Drawn] = []
-    while len(found) < count:
+    positions: list[Drawn] = []
+    while len(positions) < count:
         d, a, b, c = rng.uniform(0.1, 1.0, 4).tolist()
         if 2.0 * max(d, a, b, c) > d + a + b + c - 0.01:
             continue
@@ -50,8 +50,8 @@ def random_positions(seed: int, count: int, least_sine: float = 0.05) -> list[Dr
         start, stop = find_intervals(bars)[-1]
         drawn = Drawn(bars, rng.uniform(start, stop, 1), int(rng.choice([-1, 1])))
         if drawn.sine > least_sine:
-            found.append(drawn)
-    return found
+            positions.append(drawn)
+    return positions
 
 
 class Exact:
@@ -113,7 +113,8 @@ def test_directions_and_bar_coefficients_are_those_of_the_loop(positions: list[D
                 theta = exact.angle(bar, theta_2)
                 assert abs(complex(moving.direction(bar)[0]) - mp.expj(theta)) <= FIRST * EPS * size / sine
                 slopes[bar], bend = (
-                    mp.diff(lambda x, e=exact, b=bar, at=theta: _near(e.angle(b, x), at), theta_2, n) for n in (1, 2)
+                    mp.diff(lambda x, e=exact, b=bar, about=theta: _near(e.angle(b, x), about), theta_2, n)
+                    for n in (1, 2)
                 )
                 assert abs(first[0] - slopes[bar]) <= FIRST * EPS * size**2 / sine**2
                 assert abs(second[0] - bend) <= SECOND * EPS * size**3 / sine**4
@@ -129,11 +130,11 @@ def _near(angle: mp.mpf, about: mp.mpf) -> mp.mpf:
 def test_point_coefficients_are_derivatives() -> None:
     with mp.workdps(50):
         for drawn in random_positions(12, 40):
-            exact, at, sine = Exact(drawn), mp.mpf(float(drawn.theta_2[0])), drawn.sine
-            found = point_coefficients(*drawn, 3, 0.3 - 0.2j)
+            exact, theta_2, sine = Exact(drawn), mp.mpf(float(drawn.theta_2[0])), drawn.sine
+            coefficients = point_coefficients(*drawn, 3, 0.3 - 0.2j)
             size = 1.0 + drawn.bars.input.length / min(drawn.bars.lengths)
-            for n, value, roundings in ((1, found.first, FIRST), (2, found.second, SECOND)):
-                derivative = mp.diff(lambda angle, e=exact: e.point(angle, 0.3, -0.2), at, n)
+            for n, value, roundings in ((1, coefficients.first, FIRST), (2, coefficients.second, SECOND)):
+                derivative = mp.diff(lambda angle, e=exact: e.point(angle, 0.3, -0.2), theta_2, n)
                 error = abs(mp.mpc(value[0]) - derivative)
                 assert error <= roundings * EPS * size ** (n + 1) / sine ** (2 * n)
 
@@ -230,10 +231,10 @@ def _off_sextic(bars: FourBar, point: np.ndarray, along: float, across: float) -
 
 def test_symmetric_circuits_draw_mirror_images() -> None:
     bars = FourBar(3.0, Bar(2.5), Bar(1.0), Bar(2.2))
-    one, other = (coupler_curve(bars, 0.5, 0.0, circuit) for circuit in (0, 1))
-    assert (one.y > 0.0).mean() > 0.5 > (other.y > 0.0).mean()
-    for x, y in ((one.x[10], -one.y[10]), (one.x[200], -one.y[200])):
-        assert np.hypot(other.x - x, other.y - y).min() < 1e-12
+    circuit_0, circuit_1 = (coupler_curve(bars, 0.5, 0.0, circuit) for circuit in (0, 1))
+    assert (circuit_0.y > 0.0).mean() > 0.5 > (circuit_1.y > 0.0).mean()
+    for x, y in ((circuit_0.x[10], -circuit_0.y[10]), (circuit_0.x[200], -circuit_0.y[200])):
+        assert np.hypot(circuit_1.x - x, circuit_1.y - y).min() < 1e-12
 
 
 def test_a_curve_with_one_change_point_takes_two_turns() -> None:

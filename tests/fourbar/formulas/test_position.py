@@ -42,9 +42,9 @@ def differences(lengths: tuple[float, ...], psi: float, branch: int) -> list[mpf
 
     with mp.workdps(90):
         step = mpf(10) ** -STEP
-        before, at, after = (angles(mpf(psi) + k * step) for k in (-1, 0, 1))
+        before, middle, after = (angles(mpf(psi) + k * step) for k in (-1, 0, 1))
         first = [(y - x) / (2 * step) for x, y in zip(before, after, strict=True)]
-        return first + [(x - 2 * y + z) / step**2 for x, y, z in zip(before, at, after, strict=True)]
+        return first + [(x - 2 * y + z) / step**2 for x, y, z in zip(before, middle, after, strict=True)]
 
 
 @pytest.mark.parametrize(("lengths", "psi", "branch"), SHORT)
@@ -54,10 +54,10 @@ def test_coefficients_keep_their_digits_where_the_diagonal_is_short(
     k = compute_state(uniform(*lengths), psi, branch).k
     h3, h4, dh3, dh4 = differences(lengths, psi, branch)
     size = FEW_ROUNDINGS * (1 + abs(h3) + abs(h4))
-    for found, exact in ((k.h3, h3), (k.h4, h4), (k.h23, 1 - h3), (k.h43, h4 - h3)):
-        assert abs(exact - float(found)) < size
-    for found, exact in ((k.dh3, dh3), (k.dh4, dh4)):
-        assert abs(exact - float(found)) < size / abs(psi)
+    for coefficient, exact in ((k.h3, h3), (k.h4, h4), (k.h23, 1 - h3), (k.h43, h4 - h3)):
+        assert abs(exact - float(coefficient)) < size
+    for coefficient, exact in ((k.dh3, dh3), (k.dh4, dh4)):
+        assert abs(exact - float(coefficient)) < size / abs(psi)
 
 
 @pytest.mark.parametrize("theta_1", [0.0, 0.4])
@@ -68,14 +68,14 @@ def test_small_sines_of_coupler_and_output_keep_their_digits(
     bars, half = loop(*lengths), half_angle(loop(*lengths), psi)
     u1 = complex(np.exp(1j * theta_1))
     plain = close_loop(bars, u1, direction(psi) * u1, half, branch)
-    found = take_sines_of_rates(bars, plain, coefficients(bars, plain))
+    corrected = take_sines_of_rates(bars, plain, coefficients(bars, plain))
     with mp.workdps(50):
         d, a, b, c = map(mpf, lengths)
         A = a * mp.expj(mpf(psi))
         e = abs(d - A)
         B = A + b * ((d - A) / e) * mp.expj(branch * mp.acos((b * b + e * e - c * c) / (2 * b * e)))
         exact = (B - A) / b, (B - d) / c
-    for ours, theirs, before in zip((found.u3, found.u4), exact, (plain.u3, plain.u4), strict=True):
+    for ours, theirs, before in zip((corrected.u3, corrected.u4), exact, (plain.u3, plain.u4), strict=True):
         apart = abs(mp.mpc(ours) - theirs * mp.mpc(u1))
         assert apart < FEW_ROUNDINGS / abs(psi) and abs(ours - before) < FEW_ROUNDINGS / abs(psi)
         if theta_1 == 0.0:
@@ -84,8 +84,8 @@ def test_small_sines_of_coupler_and_output_keep_their_digits(
 
 def test_small_sines_are_those_of_the_triangle_elsewhere() -> None:
     bars, half = loop(0.3, 0.1, 0.25, 0.22), half_angle(loop(0.3, 0.1, 0.25, 0.22), 1.0)
-    at = close_loop(bars, 1.0 + 0.0j, direction(1.0), half, 1)
-    assert take_sines_of_rates(bars, at, coefficients(bars, at)) is at
+    position = close_loop(bars, 1.0 + 0.0j, direction(1.0), half, 1)
+    assert take_sines_of_rates(bars, position, coefficients(bars, position)) is position
 
 
 def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre() -> None:
@@ -93,18 +93,18 @@ def test_moment_of_the_coupler_about_B_is_that_of_its_inertia_at_the_mass_centre
     three = Body(0.7, 0.02, 0.11 + 0.07j)
     arm = s.point(3, three.z) - s.point(4, s.lengths.c)
     expected = -three.I * s.alpha(3) - three.m * cross(arm, s.acceleration(3, three.z))
-    found = coupler_about_B(s.lengths, three, s.position, s.moving, drive_sine(s.position, 4))
-    assert np.allclose(found, expected, rtol=0.0, atol=64 * FEW_ROUNDINGS)
+    moment = coupler_about_B(s.lengths, three, s.position, s.moving, drive_sine(s.position, 4))
+    assert np.allclose(moment, expected, rtol=0.0, atol=64 * FEW_ROUNDINGS)
 
 
 @pytest.mark.parametrize(("lengths", "branch"), [((3.0, 1.0, 3.0, 1.0), 1), ((3.0, 1.0, 1.0, 3.0), -1)])
 def test_bars_that_stay_parallel_turn_as_one(lengths: tuple[float, ...], branch: int) -> None:
     bars, theta_2 = loop(*lengths), np.array([1e-12, 0.7, -0.7, 2.0])
     half = half_angle(bars, theta_2)
-    at = close_loop(bars, 1.0 + 0.0j, direction(theta_2), half, branch)
+    position = close_loop(bars, 1.0 + 0.0j, direction(theta_2), half, branch)
     first, second = find_parallel_pairs(bars, half, branch)
     assert np.any(first | second) and not np.all(first | second)
-    k = coefficients(bars, at)
+    k = coefficients(bars, position)
     exact = put_parallel_pairs(k, first, second)
     assert set(exact.h23[first]) <= {1.0} and set(exact.h23[second]) <= {0.0}  # however near the change point
     assert set(exact.h43[first]) <= {1.0} and set(exact.h43[second]) <= {-1.0}
@@ -119,20 +119,20 @@ def two_readings() -> tuple[State, State]:
     lengths, theta_4 = by_2.lengths, np.angle(by_2.position.u4)
     reading = prepare_path(lengths, 0.0, 4)
     sign = np.sign(drive_sine(by_2.position, 4))
-    at, k = reading.motion(reading.position(theta_4, reading.half_angle(theta_4), sign), sign)
-    return by_2, State(lengths, 0.0, by_2.theta_2, at, k, 1.0, rates(k, 1.0, 0.0))
+    position, k = reading.motion(reading.position(theta_4, reading.half_angle(theta_4), sign), sign)
+    return by_2, State(lengths, 0.0, by_2.theta_2, position, k, 1.0, rates(k, 1.0, 0.0))
 
 
 def test_grounds_at_several_angles_are_those_of_each() -> None:
     bars, theta_2 = uniform(0.3, 0.1, 0.25, 0.22), np.array([0.4, 1.0, 4.0])
     lengths, theta_1 = loop(*bars.lengths), np.array([[0.0], [0.4], [1.0]])
     many = prepare_path(Loop(*(length + 0.0 * theta_1 for length in lengths)), theta_1)
-    found = many.position(theta_2, many.half_angle(theta_2), 1)
+    positions = many.position(theta_2, many.half_angle(theta_2), 1)
     for row, angle in enumerate(theta_1[:, 0]):
         one = prepare_path(lengths, float(angle))
         alone = one.position(theta_2, one.half_angle(theta_2), 1)
-        assert np.allclose(found.u2[row], alone.u2, rtol=0.0, atol=FEW_ROUNDINGS)
-        assert np.allclose(found.u2[row], np.exp(1j * theta_2), rtol=0.0, atol=FEW_ROUNDINGS)
+        assert np.allclose(positions.u2[row], alone.u2, rtol=0.0, atol=FEW_ROUNDINGS)
+        assert np.allclose(positions.u2[row], np.exp(1j * theta_2), rtol=0.0, atol=FEW_ROUNDINGS)
 
 
 @pytest.mark.parametrize("pin", ["O2", "A", "B", "O4"])

@@ -54,10 +54,10 @@ def random_case(rng: np.random.Generator) -> tuple[fourbar.FourBar, tuple, Comma
     return linkage, terms, Command(rng.uniform(-3, 3, 40), branch, omega, alpha)
 
 
-def some_of(at: Command, where: np.ndarray) -> Command:
-    """The positions of a command at which `where` is true."""
-    omega, alpha = (np.broadcast_to(x, at.theta_2.shape)[where] for x in (at.omega_2, at.alpha_2))
-    return at._replace(angle=at.theta_2[where], branch=at.branch[where], speed=omega, acceleration=alpha)
+def some_of(command: Command, mask: np.ndarray) -> Command:
+    """The positions of a command at which `mask` is true."""
+    omega, alpha = (np.broadcast_to(x, command.theta_2.shape)[mask] for x in (command.omega_2, command.alpha_2))
+    return command._replace(angle=command.theta_2[mask], branch=command.branch[mask], speed=omega, acceleration=alpha)
 
 
 @pytest.mark.slow
@@ -66,11 +66,11 @@ def test_torque_and_pin_forces_agree_with_the_thirteen_equations(drive: int) -> 
     rng = np.random.default_rng(drive)
     compared = 0
     for _ in range(80):
-        linkage, terms, at = random_case(rng)
+        linkage, terms, command = random_case(rng)
         scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), drive, terms[:3], terms[3:])
-        ok = solve(scene, "force", at=at).status_code == 0
-        at = some_of(at, ok)
-        s, theirs = solve(scene, "force", at=at), solve_thirteen_equations(scene, at)
+        ok = solve(scene, "force", at=command).status_code == 0
+        command = some_of(command, ok)
+        s, theirs = solve(scene, "force", at=command), solve_thirteen_equations(scene, command)
         assert s.torque is not None and s.drive_condition is not None
         force = sum(np.hypot(*theirs[name].T) for name in PINS)
         worth = K * EPS / (s.condition**2 * s.drive_condition)
@@ -111,8 +111,8 @@ def test_where_the_loop_closes_is_known_at_the_last_digits_of_a_limit() -> None:
         linkage, _, _ = random_case(np.random.default_rng(seed))
         for limit in limit_positions(linkage):
             angles = limit.theta_2 + np.arange(-4, 5) * np.spacing(limit.theta_2)
-            at = Command(angles, np.ones(9, dtype=np.int8), None, 0.0)
-            ours = solve(fourbar.Scene(linkage), at=at).assembled
+            command = Command(angles, np.ones(9, dtype=np.int8), None, 0.0)
+            ours = solve(fourbar.Scene(linkage), at=command).assembled
             with mp.workdps(50):
                 d, a, b, c = (mp.mpf(length) for length in linkage.lengths)
                 for angle, assembled in zip(angles.tolist(), ours.tolist(), strict=True):
@@ -150,11 +150,11 @@ def test_free_acceleration_of_sympy() -> None:
     for theta_1 in (0.0, np.pi):
         linkage = fourbar.FourBar(0.13, linkage.input, linkage.coupler, linkage.output, theta_1)
         for branch in (1, -1):
-            at = state_of(linkage, relative[0], branch)
-            if abs(np.angle(at.position.u3 / at.position.u2) - relative[1]) < 1e-8:
+            state = state_of(linkage, relative[0], branch)
+            if abs(np.angle(state.position.u3 / state.position.u2) - relative[1]) < 1e-8:
                 alpha = free_acceleration(linkage, relative[0], rate, branch)
-                alpha_3 = at.k.h3 * alpha + at.k.dh3 * rate**2
-                assert abs(at.k.h3 * rate - rate - -0.17963733938852067) < 1e-9
+                alpha_3 = state.k.h3 * alpha + state.k.dh3 * rate**2
+                assert abs(state.k.h3 * rate - rate - -0.17963733938852067) < 1e-9
                 assert abs(alpha - 0.00487581) < 0.5e-8
                 assert abs(alpha_3 - alpha - -0.01990181) < 0.5e-8
                 return
@@ -168,8 +168,8 @@ def test_statics_of_motiongenesis() -> None:
 
     def held(angle: float, branch: int) -> tuple[float, float, float]:
         """The torque that holds it at rest, and theta_3, theta_4."""
-        at = state_of(linkage, angle, branch).position
-        theta_3, theta_4 = float(np.angle(at.u3)), float(np.angle(at.u4))
+        position = state_of(linkage, angle, branch).position
+        theta_3, theta_4 = float(np.angle(position.u3)), float(np.angle(position.u4))
         loads = (fourbar.Load(3, (200.0, np.pi / 2), (1.0, theta_3)),)
         motion = fourbar.Motion(angle, 0.0, branch=branch)
         s = solve(fourbar.Scene(linkage, motion, 2, loads, (fourbar.Gravity(9.81, 0.0),)), "force")
@@ -239,13 +239,13 @@ def test_equivalent_inertia_is_that_of_the_kinetic_energy(lengths: tuple[float, 
     half = backwards.half_angle(q)
     for sign in (1.0, -1.0):
         with np.errstate(invalid="ignore"):  # of bars that stay parallel, whose coefficients are put in
-            at, k = backwards.motion(backwards.position(q, half, sign), sign)
-        same = ok & (np.abs(at.u2 - state.position.u2) < 1e-9)
-        other = State(state.lengths, linkage.ground_angle, theta_2, at, k, 1.0, rates(k, 1.0, 0.0))
+            position, k = backwards.motion(backwards.position(q, half, sign), sign)
+        same = ok & (np.abs(position.u2 - state.position.u2) < 1e-9)
+        by_theta_4 = State(state.lengths, linkage.ground_angle, theta_2, position, k, 1.0, rates(k, 1.0, 0.0))
         expected = ((slope - 2.0 * J * bend / rate) / rate**3)[same]
         size = float(np.max(np.abs(expected), initial=0.0))
-        assert np.all(np.abs(J_of(linkage, other) * rate**2 / J - 1.0)[same] <= READ_BACKWARDS / rate[same] ** 2)
-        assert slope_of(linkage, other)[same] == pytest.approx(expected, rel=1e-10, abs=1e-10 * size)
+        assert np.all(np.abs(J_of(linkage, by_theta_4) * rate**2 / J - 1.0)[same] <= READ_BACKWARDS / rate[same] ** 2)
+        assert slope_of(linkage, by_theta_4)[same] == pytest.approx(expected, rel=1e-10, abs=1e-10 * size)
         ok = ok & ~same
     assert not ok.any()
 
@@ -262,15 +262,15 @@ def test_springs_tables_and_rest_have_the_torque_of_the_thirteen_equations(drive
         fourbar.Friction.at(O2=0.1, B=0.3),
     )
     omega = np.array([0.0, 3.0, -3.0, 0.0, 1.0])
-    at = Command(np.linspace(0.2, 5.5, 5), np.ones(5, np.int8), omega, np.full(5, 4.0))
+    command = Command(np.linspace(0.2, 5.5, 5), np.ones(5, np.int8), omega, np.full(5, 4.0))
     for terms in ((loads, effects), (loads, effects[:1]), ((), ())):
         scene = fourbar.Scene(linkage, fourbar.Motion(0.0, 1.0), drive, *terms)
-        s = solve(scene, "force", at=at)
-        assert solve_thirteen_equations(scene, at)["torque"] == pytest.approx(s.torque, rel=1e-11)
+        s = solve(scene, "force", at=command)
+        assert solve_thirteen_equations(scene, command)["torque"] == pytest.approx(s.torque, rel=1e-11)
         for i in range(5):  # one by one
-            alone = solve(scene, "force", at=some_of(at, np.arange(5) == i)).torque
+            alone = solve(scene, "force", at=some_of(command, np.arange(5) == i)).torque
             assert alone[0] == pytest.approx(s.torque[i], rel=1e-13)
-    state = compute_state(scene, at)
+    state = compute_state(scene, command)
     assert Actions(state, list_bodies(linkage)).work() == (0.0, 0.0)
 
 

@@ -42,8 +42,8 @@ def test_transmission_angle_is_the_acute_angle_between_coupler_and_output() -> N
 def test_transmission_angle_keeps_its_digits_where_it_vanishes() -> None:
     psi = 10.0 ** -np.arange(1.0, 14.0)
     # in a parallelogram the angle at B is the angle of the input
-    found = transmission_angle(compute_state(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), psi, 1))
-    assert found == pytest.approx(psi, rel=8 * EPS)
+    mu = transmission_angle(compute_state(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), psi, 1))
+    assert mu == pytest.approx(psi, rel=8 * EPS)
 
 
 def test_extremes_are_those_of_a_scan() -> None:
@@ -54,24 +54,24 @@ def test_extremes_are_those_of_a_scan() -> None:
         if 2.0 * max(d, a, b, c) > d + a + b + c - 0.01:
             continue
         bars = FourBar(d, Bar(a), Bar(b), Bar(c), float(rng.uniform(-3.0, 3.0)))
-        found = transmission_extremes(bars)
-        kinds.add((found.least == 0.0, found.greatest == math.pi))
+        extremes = transmission_extremes(bars)
+        kinds.add((extremes.least == 0.0, extremes.greatest == math.pi))
         start, stop = find_intervals(bars)[0]
         theta_2 = np.linspace(start, stop, SCAN)[1:-1]
-        at = compute_state(bars, theta_2, 1).position
-        ba, bo = -b * at.u3, -c * at.u4
+        position = compute_state(bars, theta_2, 1).position
+        ba, bo = -b * position.u3, -c * position.u4
         angle = np.abs(np.angle(ba / bo))  # A-B-O4
         step = (stop - start) / (SCAN - 1)
         steep = a * d / (b * c)  # d cos(mu)/d theta_2 = -steep sin psi
-        for end, scanned in ((found.least, angle.min()), (found.greatest, angle.max())):
+        for end, scanned in ((extremes.least, angle.min()), (extremes.greatest, angle.max())):
             # mu^2/2 = steep sin psi delta at a limit; else mu'' = steep/sin mu, a whole step away at most
             at_limit = end in (0.0, math.pi)
             miss = math.sqrt(2.0 * steep * step) if at_limit else 0.5 * steep / math.sin(end) * step**2
             assert end == pytest.approx(scanned, abs=HIGHER_ORDER * miss)
-        assert found.worst == min(found.least, math.pi - found.greatest)
-        for end, where in ((found.least, found.theta_2_least), (found.greatest, found.theta_2_greatest)):
-            assert 0.0 <= where - bars.ground_angle <= math.pi * (1.0 + EPS) + 2.0 * EPS
-            e = abs(a * np.exp(1j * where) - d * np.exp(1j * bars.ground_angle))
+        assert extremes.worst == min(extremes.least, math.pi - extremes.greatest)
+        for end, theta in ((extremes.least, extremes.theta_2_least), (extremes.greatest, extremes.theta_2_greatest)):
+            assert 0.0 <= theta - bars.ground_angle <= math.pi * (1.0 + EPS) + 2.0 * EPS
+            e = abs(a * np.exp(1j * theta) - d * np.exp(1j * bars.ground_angle))
             assert e**2 == pytest.approx(b * b + c * c - 2 * b * c * math.cos(end), abs=64 * EPS)
     assert kinds == {(True, True), (True, False), (False, True), (False, False)}
 
@@ -80,13 +80,13 @@ def test_extremes_keep_their_digits_near_a_change_point() -> None:
     with mp.workdps(50):
         for gap in (1e-3, 1e-7, 1e-11, 1e-14):
             d, a, b, c = 0.3, 0.1, 0.25, 0.15 + gap
-            found = transmission_extremes(FourBar(d, Bar(a), Bar(b), Bar(c)))
+            extremes = transmission_extremes(FourBar(d, Bar(a), Bar(b), Bar(c)))
             e, b_, c_ = mp.mpf(d) + mp.mpf(a), mp.mpf(b), mp.mpf(c)
             # relative to the distance from pi, which is what is left to transmit
             exact = mp.pi - mp.acos((b_ * b_ + c_ * c_ - e * e) / (2 * b_ * c_))
-            assert abs((math.pi - found.greatest) - exact) <= 4 * EPS * math.pi
+            assert abs((math.pi - extremes.greatest) - exact) <= 4 * EPS * math.pi
             least = mp.acos((b_ * b_ + c_ * c_ - (mp.mpf(d) - mp.mpf(a)) ** 2) / (2 * b_ * c_))
-            assert abs(found.least - least) <= 8 * EPS * least
+            assert abs(extremes.least - least) <= 8 * EPS * least
 
 
 def test_speed_ratio_follows_from_the_centres_of_rotation() -> None:
@@ -150,8 +150,8 @@ def test_distance_counts_change_points_and_the_dead_centres_of_the_drive() -> No
     dead = distance_to_singular(crank, theta_2, 4, 1)
     assert np.isfinite(dead).all() and (dead >= distance_to_singular(crank, theta_2, 4)).all()
     # at a dead centre of a drive on bar 4 the output stands: the speed ratio changes its sign there
-    at = theta_2 + dead * 0.999, theta_2 + dead * 1.001, theta_2 - dead * 0.999, theta_2 - dead * 1.001
-    sign = [np.sign(speed_ratio(compute_state(crank, angle, 1))) for angle in at]
+    angles = theta_2 + dead * 0.999, theta_2 + dead * 1.001, theta_2 - dead * 0.999, theta_2 - dead * 1.001
+    sign = [np.sign(speed_ratio(compute_state(crank, angle, 1))) for angle in angles]
     assert ((sign[0] != sign[1]) | (sign[2] != sign[3])).all()
     parallelogram = FourBar(2.0, Bar(1.0), Bar(2.0), Bar(1.0), 0.5)
     assert distance_to_singular(parallelogram, np.array([0.6, 3.5, 0.5 + math.pi / 2])) == pytest.approx(
