@@ -32,8 +32,8 @@ NUMBER = r"-?[\d.]+(?:e-?\d+)?"
 def ours(scene: Scene, q: Array, v: Array, a: Array) -> Any:
     """The formulas at the simulator's own angle, speed and acceleration; the file drives bar 2 whatever the scene."""
     scene = replace(scene, drive_bar=2)
-    at = Command(np.array([q[0]]), np.array([1]), np.array([v[0]]), np.array([a[0]]))
-    return fourbar.solve(scene, "force", at=at)
+    command = Command(np.array([q[0]]), np.array([1]), np.array([v[0]]), np.array([a[0]]))
+    return fourbar.solve(scene, "force", at=command)
 
 
 def errors(scene: Scene, q: Array, v: Array, a: Array, torque: float, force: Array) -> tuple[float, float]:
@@ -325,13 +325,13 @@ def test_without_loads_every_model_is_written_and_says_how_to_start(write: Any) 
         assert "loads are left out" in text and f"puts on bar {scene.drive_bar}" in text
         stated = [float(x) for x in re.findall(rf"({NUMBER}) rad", text)][:6]
         theta_2, omega_2 = stated[0], stated[3]
-        at = Command(np.array([theta_2]), np.array([scene.motion.branch]), omega_2, 0.0)
-        s = fourbar.solve(scene, "velocity", at=at)
+        command = Command(np.array([theta_2]), np.array([scene.motion.branch]), omega_2, 0.0)
+        s = fourbar.solve(scene, "velocity", at=command)
         assert s.omega_3 is not None and s.omega_4 is not None and omega_2 == scene.motion.omega_2
         expected = [s.theta_3[0], s.theta_4[0], s.omega_3[0] - omega_2, s.omega_4[0]]
-        found = [*stated[1:3], *stated[4:]]
-        assert np.abs(np.exp(1j * np.array(found[:2])) - np.exp(1j * np.array(expected[:2]))).max() < 1e-12
-        assert found[2:] == pytest.approx(expected[2:], rel=1e-9)
+        written = [*stated[1:3], *stated[4:]]
+        assert np.abs(np.exp(1j * np.array(written[:2])) - np.exp(1j * np.array(expected[:2]))).max() < 1e-12
+        assert written[2:] == pytest.approx(expected[2:], rel=1e-9)
 
 
 KAMINO = 0.01
@@ -365,6 +365,6 @@ def test_newton_loads_the_usd_and_reads_as_the_comment_says() -> None:
     row = solver._solver_kamino.data.joints.lambda_kin_j.numpy().astype(float)[15 + 1 : 15 + 3]
     theta = 2.0 * np.arctan2(turned[:, 5], turned[:, 6])
     force = complex(*row) * cmath.exp(1j * (theta[2] + angles[1] - angles[2]))
-    at = Command(theta[:1], np.array([1]), np.array([omega_2]), np.zeros(1))
-    expected = complex(*fourbar.solve(scene, "force", at=at).F43[0])
+    command = Command(theta[:1], np.array([1]), np.array([omega_2]), np.zeros(1))
+    expected = complex(*fourbar.solve(scene, "force", at=command).F43[0])
     assert abs(force - expected) < KAMINO * abs(expected)

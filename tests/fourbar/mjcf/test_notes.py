@@ -64,7 +64,7 @@ class Opened:
 
     def comments(self) -> list[str]:
         parser = ET.XMLParser(target=ET.TreeBuilder(insert_comments=True))
-        return [str(each.text).strip() for each in ET.fromstring(self.text, parser) if each.tag is ET.Comment]
+        return [str(node.text).strip() for node in ET.fromstring(self.text, parser) if node.tag is ET.Comment]
 
     def step(self, steps: int = 20) -> None:
         mujoco.mj_step(self.model, self.data, steps)
@@ -85,13 +85,13 @@ class Opened:
         """Against the formulas at the state that was last forwarded, by the greatest value in a turn."""
         d, scene = self.data, scene or self.driven
         round_ = replace(scene, drive=None, drive_bar=2, motion=scene.motion.replace(free=None))  # without poles
-        at = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
-        expected, turn = fourbar.solve(scene, "force", at=at), fourbar.solve(round_, "force")
-        found = {}
+        command = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
+        expected, turn = fourbar.solve(scene, "force", at=command), fourbar.solve(round_, "force")
+        errors = {}
         for name, answer in answers.items():
             size = np.abs(getattr(turn, name)).max()
-            found[name] = float(np.abs(np.asarray(answer) - getattr(expected, name)[0]).max() / size)
-        return found
+            errors[name] = float(np.abs(np.asarray(answer) - getattr(expected, name)[0]).max() / size)
+        return errors
 
     def torque(self) -> float:
         armature = self.model.dof_armature[self.model.joint("O2").dofadr[0]]
@@ -100,17 +100,17 @@ class Opened:
     def at_pins(self, *, loads: bool) -> dict[str, Array]:
         """cfrc_int, with the loads that MuJoCo counts in, or without."""
         mujoco.mj_rnePostConstraint(self.model, self.data)
-        m, d, found = self.model, self.data, {}
+        m, d, forces = self.model, self.data, {}
         for name, bars in NEXT_BAR.items():
-            found[name] = d.cfrc_int[m.body(name).id][3:5].copy()
+            forces[name] = d.cfrc_int[m.body(name).id][3:5].copy()
             for index, load in enumerate(self.scene.loads, 1):
                 if not loads and load.force is not None and BAR_NAMES[load.bar] in bars:  # type: ignore[attr-defined]
                     size, angle = load.force  # type: ignore[attr-defined]
                     if load.frame == "bar":  # type: ignore[attr-defined]
                         x = d.site(f"load_{index}").xmat
                         angle += math.atan2(x[3], x[0])
-                    found[name] -= size * np.array([math.cos(angle), math.sin(angle)])
-        return {"F12": found["input"], "F32": -found["coupler"], "F14": found["output"]}
+                    forces[name] -= size * np.array([math.cos(angle), math.sin(angle)])
+        return {"F12": forces["input"], "F32": -forces["coupler"], "F14": forces["output"]}
 
 
 def opens_assembled(file: Opened) -> None:
@@ -171,7 +171,7 @@ def takes_control(file: Opened) -> None:
 
 def takes_what_is_applied(file: Opened) -> None:
     m, d = file.model, file.data
-    assert d.qvel[0] == 10.0 and all(m.actuator(each).name.startswith("load_") for each in range(m.nu))
+    assert d.qvel[0] == 10.0 and all(m.actuator(index).name.startswith("load_") for index in range(m.nu))
     d.qfrc_applied[{2: 0, 4: 2}[file.scene.drive_bar]] = 0.7
     file.step()
     file.forward()
@@ -181,8 +181,8 @@ def takes_what_is_applied(file: Opened) -> None:
 def cylinder_force(file: Opened) -> float:
     """By the formulas at the state that was last forwarded."""
     d = file.data
-    at = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
-    solution = fourbar.solve(file.scene, "force", at=at)
+    command = Command(*(np.array([x]) for x in (d.qpos[0], 1, d.qvel[0], d.qacc[0])))
+    solution = fourbar.solve(file.scene, "force", at=command)
     assert d.ten_length[file.model.tendon("cylinder").id] == pytest.approx(solution.stroke[0], rel=1e-9)
     return float(solution.drive_force[0])
 
@@ -209,7 +209,7 @@ def pushes_as_controlled(file: Opened) -> None:
 
 def pushes_as_applied(file: Opened) -> None:
     m, d = file.model, file.data
-    assert d.qvel[0] == 10.0 and all(m.actuator(each).name.startswith("load_") for each in range(m.nu))
+    assert d.qvel[0] == 10.0 and all(m.actuator(index).name.startswith("load_") for index in range(m.nu))
     file.step()
     file.forward()
     assert abs(cylinder_force(file)) < FOUND * 7.0
