@@ -35,9 +35,9 @@ def test_pins_and_mass_centres_are_points() -> None:
             Point("centre_3", 3, linkage.coupler.mass_centre),
         )
     )
-    for own, name in (("pin_A", "A"), ("pin_B", "B"), ("centre_3", "G3")):
-        for found, start in ((s.points, ""), (s.velocity, "v_"), (s.acceleration, "a_")):
-            np.testing.assert_allclose(found[own], getattr(s, start + name), rtol=1e-13, atol=1e-13)
+    for point, name in (("pin_A", "A"), ("pin_B", "B"), ("centre_3", "G3")):
+        for vectors, start in ((s.points, ""), (s.velocity, "v_"), (s.acceleration, "a_")):
+            np.testing.assert_allclose(vectors[point], getattr(s, start + name), rtol=1e-13, atol=1e-13)
 
 
 def test_velocity_and_acceleration_are_derivatives() -> None:
@@ -55,8 +55,8 @@ def test_velocity_and_acceleration_are_derivatives() -> None:
 
 
 def test_positions_alone_have_no_velocities_of_points() -> None:
-    whole = scene(*POINTS, motion=Motion(1.0))
-    s = solve(whole)
+    posed = scene(*POINTS, motion=Motion(1.0))
+    s = solve(posed)
     assert list(s.points) == [point.name for point in POINTS] and s.velocity == {} == s.acceleration
     assert json.loads(write_json(s))["v_P"] is None
     out = {"a_P": np.zeros((1, 2))}
@@ -84,11 +84,11 @@ def test_a_study_varies_them_and_lists_its_members() -> None:
     s = solve(study)
     np.testing.assert_allclose(s.points["P"][0], s.A[0], atol=1e-15)
     longer = replace(crank_rocker().linkage.coupler, length=0.26)
-    own = solve(scene(*POINTS, linkage=replace(crank_rocker().linkage, coupler=longer)))
-    np.testing.assert_array_equal(s.acceleration["P"][1], own.acceleration["P"])
+    alone = solve(scene(*POINTS, linkage=replace(crank_rocker().linkage, coupler=longer)))
+    np.testing.assert_array_equal(s.acceleration["P"][1], alone.acceleration["P"])
     frame = s.to_pandas()
     assert len(frame) == s.theta_2.size and frame["member"].tolist() == [0] * 61 + [1] * 61
-    assert np.array_equal(frame["a_P_x"].to_numpy()[61:], own.acceleration["P"][:, 0])
+    assert np.array_equal(frame["a_P_x"].to_numpy()[61:], alone.acceleration["P"][:, 0])
     assert np.shape(json.loads(write_json(s))["torque"]) == (2, 61) and "2 linkages" in s._repr_html_()  # type: ignore[attr-defined]
 
 

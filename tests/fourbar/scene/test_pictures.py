@@ -49,11 +49,11 @@ def test_a_scene_saved_elsewhere_names_the_same_file_or_says_why_not(tmp_path: P
     save(scene, tmp_path / "outer.toml")
     assert 'picture = "inner/bar.png"' in (tmp_path / "outer.toml").read_text()
     assert embedded(animate.write_page(load(tmp_path / "outer.toml")))["pictures"] == {"4": EMBEDDED}
-    other = tmp_path / "other"
-    other.mkdir()
+    elsewhere = tmp_path / "other"
+    elsewhere.mkdir()
     with pytest.raises(InputError, match=r"^bars\.output\.picture.*copy it there first[^\n]*$"):
-        save(scene, other / "scene.toml")
-    assert not list(other.iterdir())
+        save(scene, elsewhere / "scene.toml")
+    assert not list(elsewhere.iterdir())
 
 
 def test_one_given_with_the_command_takes_its_place(tmp_path: Path) -> None:

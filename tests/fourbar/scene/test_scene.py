@@ -34,17 +34,17 @@ LOADED = Scene(FourBar(0.3, *BARS, 0.4), loads=(Load(3, (10.0, 0.3), (0.05, 0.1)
 OTHERS = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
 
 
-def sine(found: Solution, bar: int) -> np.ndarray:
+def sine(solution: Solution, bar: int) -> np.ndarray:
     """Between the two moving bars besides it."""
-    one, other = (getattr(found, f"theta_{each}") for each in OTHERS[bar])
-    return np.asarray(np.sin(other - one))
+    first, second = (getattr(solution, f"theta_{number}") for number in OTHERS[bar])
+    return np.asarray(np.sin(second - first))
 
 
-def of_bar(found: Solution, bar: int) -> Command:
+def of_bar(solution: Solution, bar: int) -> Command:
     """What a bar was found to do, as a command."""
-    numbers = (np.asarray(getattr(found, f"{name}_{bar}")) for name in ("theta", "omega", "alpha"))
+    numbers = (np.asarray(getattr(solution, f"{name}_{bar}")) for name in ("theta", "omega", "alpha"))
     theta, omega, alpha = numbers
-    return Command(theta, np.where(sine(found, bar) < 0.0, -1, 1).astype(np.int8), omega, alpha, bar=bar)
+    return Command(theta, np.where(sine(solution, bar) < 0.0, -1, 1).astype(np.int8), omega, alpha, bar=bar)
 
 
 @pytest.mark.parametrize("bar", [3, 4])
@@ -57,19 +57,19 @@ def test_what_comes_out_fed_back_as_a_command_returns_itself(path: Path, bar: in
         forth = solve(scene, "force")
         back = solve(scene, "force", at=of_bar(forth, bar))
         lost = np.minimum(np.abs(sine(forth, bar)), np.abs(forth.sin_mu))
-        where = (forth.status_code == 0) & (lost > 1e-3)
-        assert (back.status_code[where] == 0).all() and np.array_equal(back.branch[where], branch + 0 * where[where])
-        compared += int(where.sum())
+        ok = (forth.status_code == 0) & (lost > 1e-3)
+        assert (back.status_code[ok] == 0).all() and np.array_equal(back.branch[ok], branch + 0 * ok[ok])
+        compared += int(ok.sum())
         turned = np.angle(np.exp(1j * (back.theta_2 - forth.theta_2)))
         size = max(scene.linkage.lengths) / min(scene.linkage.lengths)
-        assert (np.abs(turned) * lost**2)[where].max() <= RETURNED * size * U
+        assert (np.abs(turned) * lost**2)[ok].max() <= RETURNED * size * U
         drive = np.fmin(forth.drive_condition, 1.0)
         for name in ("omega_2", "omega_3", "omega_4", "alpha_2", "a_B", "F12", "F32", "F43", "F14", "torque"):
-            one, other = (getattr(s, name).reshape(len(where), -1)[where] for s in (forth, back))
-            apart = np.abs(one - other).max(axis=1) * (lost**3 * drive**2)[where]
-            allowed = RETURNED**2 * size**2 * U * np.abs(one).max()
+            sent, returned = (getattr(s, name).reshape(len(ok), -1)[ok] for s in (forth, back))
+            apart = np.abs(sent - returned).max(axis=1) * (lost**3 * drive**2)[ok]
+            allowed = RETURNED**2 * size**2 * U * np.abs(sent).max()
             if name == "alpha_2":  # told to be 0, it comes back as a difference of what speeds and bars make
-                allowed += RETURNED**2 * size**2 * U * max(np.abs(forth.alpha_4[where]).max(), 1.0)
+                allowed += RETURNED**2 * size**2 * U * max(np.abs(forth.alpha_4[ok]).max(), 1.0)
             assert (apart <= allowed).all(), name
     assert compared > 100
 
@@ -80,12 +80,12 @@ def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar: int) -> None:
     for number, angle in enumerate(find_limit_angles(rocker, bar), 1):
         assert any(abs(math.sin(0.5 * (limit[bar - 2] - angle))) < 8 * U for limit in limit_positions(rocker, bar))
         names = [f"theta_{bar}", f"omega_{bar}"]
-        found = [
+        beside = [
             solve(Scene(rocker, Motion(**dict(zip(names, (FromLimit(number, offset), 1.0), strict=True)))), "velocity")
             for offset in (1e-12, -1e-12)
         ]
-        assert sorted(s.status[0] for s in found) == ["not_assembled", "ok"]
-        inside = next(s for s in found if s.status == ["ok"])
+        assert sorted(s.status[0] for s in beside) == ["not_assembled", "ok"]
+        inside = next(s for s in beside if s.status == ["ok"])
         assert 1e-8 < inside.condition[0] < 1e-4  # the root of the distance
         assert abs(sine(inside, bar)[0]) == pytest.approx(inside.condition[0], rel=1e-6)
     with pytest.raises(InputError, match=rf"motion.theta_{bar}.limit = 9"):
@@ -104,20 +104,20 @@ def test_at_a_limit_of_theta_2_a_command_of_theta_4_has_motion_and_forces() -> N
         angles = limit.theta_4 + np.array([-1e-7, 0.0, 1e-7])
         motion = Motion(theta_4=angles, omega_4=2.0, alpha_4=3.0, branch=sign)
         for drive in (3, 4):
-            found = solve(replace(rocker, motion=motion, drive_bar=drive), "error")
-            assert found.status == ["ok"] * 3 and abs(found.sin_mu[1]) < 1e-14 and abs(found.omega_2[1]) < 1e-13
-            assert found.branch.tolist()[0] == -found.branch.tolist()[2]
-            assert found.condition[1] > 0.1 and found.drive_condition[1] > 0.1
+            s = solve(replace(rocker, motion=motion, drive_bar=drive), "error")
+            assert s.status == ["ok"] * 3 and abs(s.sin_mu[1]) < 1e-14 and abs(s.omega_2[1]) < 1e-13
+            assert s.branch.tolist()[0] == -s.branch.tolist()[2]
+            assert s.condition[1] > 0.1 and s.drive_condition[1] > 0.1
             for name in ("theta_2", "alpha_2", "F12", "F32", "F43", "F14", "torque"):
-                before, at, after = getattr(found, name)
-                assert at == pytest.approx(0.5 * (before + after), rel=1e-9, abs=1e-9)
-            assert (found.torque_error < 1e-11 * np.abs(found.torque)).all()
+                before, at_limit, after = getattr(s, name)
+                assert at_limit == pytest.approx(0.5 * (before + after), rel=1e-9, abs=1e-9)
+            assert (s.torque_error < 1e-11 * np.abs(s.torque)).all()
             answer = FreeBody().answer(
                 replace(rocker, drive_bar=drive), fourbar.command(replace(rocker, motion=motion))
             )
-            assert answer.quantities["F43"] == pytest.approx(found.F43, rel=1e-11)
-        found = solve(replace(rocker, motion=motion), "error")
-        assert found.torque_error[1] > 0.01 * abs(found.torque[1]) and found.drive_condition[1] < 1e-14
+            assert answer.quantities["F43"] == pytest.approx(s.F43, rel=1e-11)
+        s = solve(replace(rocker, motion=motion), "error")
+        assert s.torque_error[1] > 0.01 * abs(s.torque[1]) and s.drive_condition[1] < 1e-14
         exact = compute_reference(replace(rocker, motion=motion, drive_bar=3), sign, limit.theta_4)
         assert exact is not None and np.isfinite(float(exact[0]["torque"].mid()))
 
@@ -158,7 +158,7 @@ def test_a_study_sensitivities_and_tolerances_take_the_keys_of_the_commanded_bar
     motion = Motion(theta_4=inside, omega_4=2.0, alpha_4=-3.0)
     scene = replace(LOADED, motion=motion)
     step = {"lengths.input": (0.1, 1e-6), "motion.theta_4": (motion.theta_4, 1e-6), "motion.omega_4": (2.0, 1e-5)}
-    found = fourbar.sensitivity(scene)
+    slopes = fourbar.sensitivity(scene)
     for key, (value, h) in step.items():
         ends = [np.atleast_2d((value + side * h) * np.ones((1, 1))) for side in (-1, 1)]
         if key == "motion.theta_4":
@@ -170,14 +170,14 @@ def test_a_study_sensitivities_and_tolerances_take_the_keys_of_the_commanded_bar
         for name in ("theta_2", "omega_2", "torque", "F43"):
             low, high = getattr(solved, name)
             slope = (high - low) / (2 * h)
-            assert found.of(name, key) == pytest.approx(slope, rel=DIFFERENCE, abs=DIFFERENCE * np.abs(slope).max())
-    assert np.array_equal(found.of("theta_4", "motion.theta_4"), [1.0, 1.0])
-    assert not found.of("theta_4", "lengths.input").any()
+            assert slopes.of(name, key) == pytest.approx(slope, rel=DIFFERENCE, abs=DIFFERENCE * np.abs(slope).max())
+    assert np.array_equal(slopes.of("theta_4", "motion.theta_4"), [1.0, 1.0])
+    assert not slopes.of("theta_4", "lengths.input").any()
     with pytest.raises(InputError, match=r"motion\.theta_4"):
         vary(scene, {"motion.theta_2": [1.0]})
     toleranced = replace(scene, tolerances=(fourbar.Tolerance("motion.omega_4", 0.01),))
     spread = fourbar.tolerances(toleranced, 64).spreads["omega_2"]
-    assert spread.worst == pytest.approx(np.abs(found.value("omega_2")) * 0.005, rel=1e-9)
+    assert spread.worst == pytest.approx(np.abs(slopes.value("omega_2")) * 0.005, rel=1e-9)
 
 
 @pytest.mark.parametrize("bar", [3, 4])
@@ -185,18 +185,20 @@ def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(bar:
     free = Free(0.4, 8)
     scene = replace(LOADED, effects=(*LOADED.effects, Viscous.at(O2=0.01)), loads=())
     start = solve(replace(scene, motion=Motion(1.2, 3.0)), "velocity")
-    at = of_bar(replace_alpha(start), bar)
-    own = {f"theta_{bar}": float(at.angle[0]), f"omega_{bar}": float(np.ravel(at.speed)[0])}
-    moved = solve(replace(scene, motion=Motion(branch=int(at.branch[0]), through="follow", free=free, **own)))
+    command = of_bar(replace_alpha(start), bar)
+    commanded = {f"theta_{bar}": float(command.angle[0]), f"omega_{bar}": float(np.ravel(command.speed)[0])}
+    moved = solve(
+        replace(scene, motion=Motion(branch=int(command.branch[0]), through="follow", free=free, **commanded))
+    )
     same = solve(replace(scene, motion=Motion(1.2, 3.0, through="follow", free=free)))
     assert len(moved) == len(same) == 9
     assert moved.theta_2 == pytest.approx(same.theta_2, abs=1e-9) and pytest.approx(same.F12, abs=1e-6) == moved.F12
 
 
-def replace_alpha(found: Solution) -> Solution:
+def replace_alpha(solution: Solution) -> Solution:
     """Give it accelerations, which a release has none of."""
-    found.alpha_2 = found.alpha_3 = found.alpha_4 = np.zeros(len(found))
-    return found
+    solution.alpha_2 = solution.alpha_3 = solution.alpha_4 = np.zeros(len(solution))
+    return solution
 
 
 def test_released_at_theta_4_it_passes_a_limit_of_theta_2_and_stops_at_its_own() -> None:
@@ -205,9 +207,9 @@ def test_released_at_theta_4_it_passes_a_limit_of_theta_2_and_stops_at_its_own()
     sign = 1 if math.sin(limit.theta_3 - limit.theta_2) > 0.0 else -1
     ahead = 1.0 if math.sin(find_limit_angles(rocker, 4)[0] - limit.theta_4) > 0.0 else -1.0
     motion = Motion(theta_4=limit.theta_4 - 0.1 * ahead, omega_4=ahead, branch=sign, free=Free(20.0, 200))
-    found = solve(Scene(rocker, motion))
-    assert found.stopped_at is not None and len(found) < 201 and set(found.branch.tolist()) == {1, -1}
-    assert min(abs(math.sin(0.5 * (found.theta_4[-1] - x))) for x in find_limit_angles(rocker, 4)) < 0.1
+    solution = solve(Scene(rocker, motion))
+    assert solution.stopped_at is not None and len(solution) < 201 and set(solution.branch.tolist()) == {1, -1}
+    assert min(abs(math.sin(0.5 * (solution.theta_4[-1] - x))) for x in find_limit_angles(rocker, 4)) < 0.1
 
 
 TWO = """
@@ -272,8 +274,8 @@ def test_a_file_of_it_reads_back_bit_for_bit(angle: object) -> None:
     text = fourbar.dump(scene)
     again = fourbar.files.loads(text)
     assert fourbar.dump(again) == text and again.motion.bar == 4 and again.motion.speed == 2.0
-    one, other = (solve(each, "velocity") for each in (scene, again))
-    assert np.array_equal(one.theta_2, other.theta_2, equal_nan=True)
+    before, after = (solve(version, "velocity") for version in (scene, again))
+    assert np.array_equal(before.theta_2, after.theta_2, equal_nan=True)
 
 
 def test_what_takes_theta_2_alone_refuses_in_one_line() -> None:
@@ -311,7 +313,7 @@ def test_springs_count_turns_along_the_commanded_angle(bar: int) -> None:
     scene = Scene(uniform(0.1, 0.3, 0.25, 0.28), Motion(np.linspace(0.2, 5.2, 26), 1.0), effects=(springs,))
     forth = solve(scene, "acceleration")
     for pin, *_ in springs.springs:
-        own = replace(scene, effects=(Torsion.at(**{pin: (0.1, 0.3, 0.0)}),))
-        wanted = solve(own, "force").status
-        assert solve(own, "force", at=of_bar(forth, bar)).status == wanted
+        one_spring = replace(scene, effects=(Torsion.at(**{pin: (0.1, 0.3, 0.0)}),))
+        wanted = solve(one_spring, "force").status
+        assert solve(one_spring, "force", at=of_bar(forth, bar)).status == wanted
         assert ("wound" in wanted) == (pin in ("O2", "O4"))
