@@ -39,8 +39,8 @@ def plain(text: str) -> str:
     return " ".join(text.split())
 
 
-def opposite(side: float, one: float, other: float) -> float:
-    return math.acos((one**2 + other**2 - side**2) / (2.0 * one * other))
+def opposite(side: float, first: float, second: float) -> float:
+    return math.acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
 @pytest.mark.parametrize("steps", (24, 360))
@@ -62,8 +62,8 @@ def test_where_the_assembly_ends_is_the_limit_of_the_commanded_bar() -> None:
     limits = fourbar.limit_positions(scene.linkage, 2)
     ends = sorted({f"{math.degrees(limit.theta_2) % 360.0:.4g}" for limit in limits})
     facts = summarize(swept := thesis(fourbar.Sweep(0.0, math.tau, 100)), fourbar.solve(swept))
-    found = [end for stretch in facts.stretches for end in stretch if end is not None]
-    assert sorted(found) == pytest.approx(sorted(limit.theta_2 % math.tau for limit in limits), abs=1e-12)
+    bounds = [end for stretch in facts.stretches for end in stretch if end is not None]
+    assert sorted(bounds) == pytest.approx(sorted(limit.theta_2 % math.tau for limit in limits), abs=1e-12)
     assert f"assembles up to theta_2 = {ends[0]} deg, and from theta_2 = {ends[1]} deg" in text
     assert "the torque grows without bound there" in text and "transmission angle: at least 0 deg" in text
     assert re.search(r"361 positions: \d+ ok, \d+ not assembled", text)
@@ -82,12 +82,14 @@ def test_peaks_and_means_are_those_of_much_finer_steps() -> None:
     cells = {line.split("  ")[1]: line[11:] for line in pins.splitlines() if line.startswith("  ")}
     for k, name in enumerate(("F12", "F32", "F43", "F14")):
         size = np.hypot(*getattr(fine, name).T)
-        peak, at, rms = (float(cells[label][12 * k : 12 * k + 12].split()[0]) for label in ("peak", "at", "RMS"))
+        peak, angle, rms = (float(cells[label][12 * k : 12 * k + 12].split()[0]) for label in ("peak", "at", "RMS"))
         mean = np.sqrt(np.mean(size[:-1] ** 2))
-        assert [peak, at, rms] == pytest.approx([size.max(), math.degrees(fine.theta_2[size.argmax()]), mean], rel=1e-3)
-    given, back = (float(x) for x in re.findall(r"(\S+) J (?:per turn given|taken back)", text))
+        assert [peak, angle, rms] == pytest.approx(
+            [size.max(), math.degrees(fine.theta_2[size.argmax()]), mean], rel=1e-3
+        )
+    supplied, back = (float(x) for x in re.findall(r"(\S+) J (?:per turn given|taken back)", text))
     energy = np.trapezoid(np.maximum(fine.power, 0.0), fine.theta_2) / 10.0
-    assert given == pytest.approx(energy, rel=6e-4) and back - given == pytest.approx(
+    assert supplied == pytest.approx(energy, rel=6e-4) and back - supplied == pytest.approx(
         -np.trapezoid(fine.power, fine.theta_2) / 10.0, abs=2e-3
     )
     assert "of these positions" not in text and "rounding changes none of these digits" in text
@@ -95,22 +97,22 @@ def test_peaks_and_means_are_those_of_much_finer_steps() -> None:
 
 
 def test_each_kind_of_motion_shows_what_it_has_and_nothing_else() -> None:
-    of = lambda **motion: block(crank_rocker(motion=fourbar.Motion(**motion)))  # noqa: E731
-    positions = of(theta_2=fourbar.Sweep(0.0, math.tau, 36))
+    block_of = lambda **motion: block(crank_rocker(motion=fourbar.Motion(**motion)))  # noqa: E731
+    positions = block_of(theta_2=fourbar.Sweep(0.0, math.tau, 36))
     assert not re.search("drive|pins|rounding", positions) and 'omega_2 = "0 rad/s" gives the static' in positions
-    one = of(theta_2=1.0, omega_2=10.0)
+    one = block_of(theta_2=1.0, omega_2=10.0)
     assert "theta_2 = 57.3 deg, theta_3 = 47.33 deg" in one and "  force    7.964 N" in one
     assert not re.search("peak|RMS|motor", one)
-    listed = of(theta_2=np.radians([10.0, 50.0, 200.0]), omega_2=10.0)
+    listed = block_of(theta_2=np.radians([10.0, 50.0, 200.0]), omega_2=10.0)
     assert "3 positions from theta_2 = 10 deg to 200 deg" in listed and "given" not in listed
     assert "(of these positions)" in listed and "peak and RMS are those of these positions" in listed
-    part = of(theta_2=fourbar.Sweep(0.5, 2.0, 50), omega_2=10.0)
+    part = block_of(theta_2=fourbar.Sweep(0.5, 2.0, 50), omega_2=10.0)
     assert "over the sweep given" in part and "input from 28.65 deg to 114.6 deg" in part
-    twice = of(theta_2=fourbar.Sweep(0.0, 2.0 * math.tau, 720), omega_2=10.0)
+    twice = block_of(theta_2=fourbar.Sweep(0.0, 2.0 * math.tau, 720), omega_2=10.0)
     assert "in 2 turns given" in twice
     law = block(crank_rocker(motion=fourbar.Motion(law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), steps=20, ends="rest"))))
     assert "by a law over 2 s" in law and "over the motion given" in law and " at t = " in law
-    released = of(theta_2=0.5, omega_2=0.0, free=fourbar.Free(0.5, 50))
+    released = block_of(theta_2=0.5, omega_2=0.0, free=fourbar.Free(0.5, 50))
     assert "released for 0.5 s, without a drive" in released and not re.search("torque|power|motor", released)
     assert re.search(r"^  at       0?\S+ s", released, re.MULTILINE)
 
@@ -186,8 +188,8 @@ def test_units_follow_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert status(["new", str(tmp_path / "a.toml"), "--lengths", "12in", "4in", "10in", "9in"]) == 0
     capsys.readouterr()
     assert status(["analyze", str(tmp_path / "a.toml")]) == 0
-    own = capsys.readouterr().out
-    assert "ground 12, input 4, coupler 10, output 9 in" in own and "lbf in" in own and "60 rpm" in own
+    imperial = capsys.readouterr().out
+    assert "ground 12, input 4, coupler 10, output 9 in" in imperial and "lbf in" in imperial and "60 rpm" in imperial
     assert status(["analyze", str(tmp_path / "a.toml"), "--units", "SI"]) == 0
     si = capsys.readouterr().out
     assert "ground 304.8" in si and "N m" in si and "6.283 rad/s" in si and "lbf" not in si

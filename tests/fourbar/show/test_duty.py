@@ -35,17 +35,17 @@ def test_shaking_is_the_momentum_that_the_bars_lose() -> None:
 def test_the_power_is_the_same_whichever_bar_is_driven() -> None:
     one, *others = (fourbar.solve(crank_rocker(drive_bar=bar)) for bar in (2, 3, 4))
     assert one.power is not None
-    for other in others:
-        assert np.abs(other.power - one.power).max() < ROUND_OFF * np.abs(one.power).max()
+    for solution in others:
+        assert np.abs(solution.power - one.power).max() < ROUND_OFF * np.abs(one.power).max()
     assert fourbar.solve(crank_rocker(), "acceleration").power is None
 
 
 def test_bearing_load() -> None:
     s = fourbar.solve(crank_rocker())
     load = np.hypot(s.F43[:-1, 0], s.F43[:-1, 1])
-    found = bearing_load(s, "B")
-    assert found.largest == load.max() and found.where == s.theta_2[load.argmax()]
-    assert abs(found.rms - np.linalg.norm(load) / np.sqrt(60)) < 1e-14 * found.rms * 60
+    bearing = bearing_load(s, "B")
+    assert bearing.largest == load.max() and bearing.where == s.theta_2[load.argmax()]
+    assert abs(bearing.rms - np.linalg.norm(load) / np.sqrt(60)) < 1e-14 * bearing.rms * 60
 
 
 def test_the_duty_of_a_motor() -> None:

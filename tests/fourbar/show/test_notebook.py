@@ -100,13 +100,13 @@ def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> 
     for line in text.splitlines():  # every commented entry is one that a scene file may have
         entry = line.removeprefix("# ")
         opened.append(entry if line != entry and ("=" in entry.split("#")[0] or entry.startswith("[")) else line)
-    whole = "\n".join(line for line in opened if not line.startswith("As many"))
-    full = files.loads(whole.replace("# As many loads", "#"))
+    uncommented = "\n".join(line for line in opened if not line.startswith("As many"))
+    full = files.loads(uncommented.replace("# As many loads", "#"))
     assert len(full.loads) == 2 and len(full.effects) == 2 and full.motion.branch == -1
 
 
 @pytest.mark.parametrize(
-    ("lengths", "named"),
+    ("lengths", "words"),
     [
         (("1 m", "2 m", "3 m", "40 m"), "never close"),
         (("1 kg", "2 m", "3 m", "4 m"), "ground"),
@@ -114,8 +114,8 @@ def test_a_new_scene_is_a_scene_and_its_comments_are_entries(tmp_path: Path) -> 
         (("1 m", "2 m", "3 m", "4"), "output.*unit is missing"),
     ],
 )
-def test_a_new_scene_of_bad_lengths_is_refused(lengths: tuple[str, ...], named: str) -> None:
-    with pytest.raises(InputError, match=named):
+def test_a_new_scene_of_bad_lengths_is_refused(lengths: tuple[str, ...], words: str) -> None:
+    with pytest.raises(InputError, match=words):
         write_new_scene(lengths)
 
 
@@ -130,9 +130,9 @@ def test_a_new_scene_never_replaces_a_file(tmp_path: Path, capsys: pytest.Captur
 
 def test_results_say_in_ten_lines_what_they_hold() -> None:
     scene = crank_rocker(tolerances=(fourbar.Tolerance("lengths.input", 1e-4),))
-    solution, found, spread = fourbar.solve(scene), fourbar.sensitivity(scene), fourbar.tolerances(scene, 64)
+    solution, slopes, spread = fourbar.solve(scene), fourbar.sensitivity(scene), fourbar.tolerances(scene, 64)
     study = fourbar.vary(scene, {"lengths.input": np.array([0.1, 0.11, 3.0])})
-    for shown in (solution, found, spread, study, fourbar.solve(study), fourbar.solve(scene, "position")):
+    for shown in (solution, slopes, spread, study, fourbar.solve(study), fourbar.solve(scene, "position")):
         text = repr(shown)
         assert 2 <= len(text.splitlines()) <= 10 and max(map(len, text.splitlines())) <= 150, text
         assert scene.title in text and "61" in text
@@ -140,41 +140,44 @@ def test_results_say_in_ten_lines_what_they_hold() -> None:
     assert "status: 122 ok, 61 not_assembled" in repr(fourbar.solve(study))
     one = fourbar.solve(fourbar.vary(fourbar.Scene(scene.linkage, fourbar.Motion(1.0)), {"lengths.input": 0.1}))
     assert "1 linkage, 1 position each" in repr(one) and "1 linkage, 1 position each" in one._repr_html_()
-    lengths = {key: number for key, number in zip(found.keys, found.numbers, strict=True) if key.startswith("lengths")}
-    own = {key: np.abs(found.of("torque", key)).max() * 0.01 * number for key, number in lengths.items()}
-    own["lengths.ground_angle"] *= math.radians(1.0) / (0.01 * lengths["lengths.ground_angle"])
-    most = max(own, key=lambda key: own[key])
-    line = next(line for line in repr(found).splitlines() if line.startswith("torque"))
-    assert f"{most} {own[most]:.3g}" in line
+    lengths = {
+        key: number for key, number in zip(slopes.keys, slopes.numbers, strict=True) if key.startswith("lengths")
+    }
+    changes = {key: np.abs(slopes.of("torque", key)).max() * 0.01 * number for key, number in lengths.items()}
+    changes["lengths.ground_angle"] *= math.radians(1.0) / (0.01 * lengths["lengths.ground_angle"])
+    most = max(changes, key=lambda key: changes[key])
+    line = next(line for line in repr(slopes).splitlines() if line.startswith("torque"))
+    assert f"{most} {changes[most]:.3g}" in line
     assert f"sigma up to {spread.spreads['torque'].deviation.max():.3g}" in repr(spread)
-    for each in (found, spread):
-        shown = each._repr_html_()
+    for outcome in (slopes, spread):
+        shown = outcome._repr_html_()
         assert (
-            shown.count("<tr>") == 8 and HOSTILE not in replace(each, scene=replace(scene, title=HOSTILE))._repr_html_()
+            shown.count("<tr>") == 8
+            and HOSTILE not in replace(outcome, scene=replace(scene, title=HOSTILE))._repr_html_()
         )
 
 
 def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names() -> None:
     pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
     scene = crank_rocker(tolerances=(fourbar.Tolerance("lengths.input", 1e-4),))
-    found, spread = fourbar.sensitivity(scene), fourbar.tolerances(scene, 64)
-    table = found.to_pandas()
-    assert len(table) == len(found.keys) * 61
+    slopes, spread = fourbar.sensitivity(scene), fourbar.tolerances(scene, 64)
+    table = slopes.to_pandas()
+    assert len(table) == len(slopes.keys) * 61
     rows = table[table["key"] == "lengths.input"]
     for name in ("torque", "F12_x", "|F12|", "|F14|", "A_y"):
-        assert np.array_equal(rows[name].to_numpy(), found.of(name, "lengths.input"))
+        assert np.array_equal(rows[name].to_numpy(), slopes.of(name, "lengths.input"))
     assert set(spread.spreads) <= set(table.columns) and all(
-        np.isfinite(found.value(name)).all() for name in spread.spreads
+        np.isfinite(slopes.value(name)).all() for name in spread.spreads
     )
     step = 1e-6
     sides = [fourbar.solve(fourbar.vary(scene, {"lengths.input": [0.1 + sign * step]})).F12[0] for sign in (1, -1)]
     slope = (np.hypot(*sides[0].T) - np.hypot(*sides[1].T)) / (2.0 * step)
-    assert found.of("|F12|", "lengths.input") == pytest.approx(slope, abs=1e-6 * np.abs(slope).max())
+    assert slopes.of("|F12|", "lengths.input") == pytest.approx(slope, abs=1e-6 * np.abs(slope).max())
     wide = spread.to_pandas()
-    own = wide[wide["quantity"] == "|F43|"]
+    of_F43 = wide[wide["quantity"] == "|F43|"]
     assert len(wide) == 61 * len(spread.spreads)
-    assert np.array_equal(own["deviation"].to_numpy(), spread.spreads["|F43|"].deviation)
-    assert np.array_equal(own["share of lengths.input"].to_numpy(), spread.spreads["|F43|"].shares[0])
+    assert np.array_equal(of_F43["deviation"].to_numpy(), spread.spreads["|F43|"].deviation)
+    assert np.array_equal(of_F43["share of lengths.input"].to_numpy(), spread.spreads["|F43|"].shares[0])
     for wrong in ("|A|", "F12_z", "|torque|", "torque_x", 3):
         with pytest.raises(InputError, match="is not known here"):
-            found.of(wrong, "lengths.input")  # type: ignore[arg-type]
+            slopes.of(wrong, "lengths.input")  # type: ignore[arg-type]

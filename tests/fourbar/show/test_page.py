@@ -44,8 +44,8 @@ def pins(driver) -> dict[str, np.ndarray]:
     script = """return Object.fromEntries(["O2", "A", "B", "O4"].map(name => {
         const e = document.getElementById("pin-" + name);
         return [name, [Number(e.getAttribute("cx")), -Number(e.getAttribute("cy"))]]; }));"""
-    found = {name: np.array(point) for name, point in driver.execute_script(script).items()}
-    return {name: point - found["O2"] for name, point in found.items()}
+    points = {name: np.array(point) for name, point in driver.execute_script(script).items()}
+    return {name: point - points["O2"] for name, point in points.items()}
 
 
 def state_of(driver, expression: str):
@@ -155,17 +155,17 @@ OUTPUT = fourbar.Motion(theta_4=fourbar.Sweep(1.75, 2.95, 40), omega_4=4.0)
 
 
 @pytest.mark.parametrize(
-    ("motion", "name", "at", "over", "pace"),
+    ("motion", "name", "place", "over", "pace"),
     [
         (STROKES, "stroke", "250.00 mm", "Over stroke", "at stroke speed = 0.2 m/s the mechanism takes 0.8 s"),
         (OUTPUT, "theta_4", "134.65°", "Over θ₄", "at ω₄ = 4 rad/s the mechanism takes 0.3 s"),
     ],
 )
-def test_another_command_is_the_axis_and_the_linkage_follows(browse, motion, name, at, over, pace) -> None:
+def test_another_command_is_the_axis_and_the_linkage_follows(browse, motion, name, place, over, pace) -> None:
     scene = crank_rocker(motion=motion, drive=DRIVE)
     driver, s = browse(animate.write_page(scene)), fourbar.solve(scene)
     driver.execute_script("go(20)")
-    assert driver.find_element("id", "theta-text").text == at
+    assert driver.find_element("id", "theta-text").text == place
     assert driver.find_element("id", "over").text == over and pace in driver.find_element("id", "pace").text
     assert not driver.find_element("id", "branch").is_displayed()
     names = ("theta_2", "theta_3", "theta_4")
@@ -246,15 +246,15 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(browse) -> No
     script = """return [...document.querySelectorAll("path.act")].map(e => [e.getAttribute("class"),
         [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)].map(
             m => [(m[1] - view.x) / view.k, (view.y - m[2]) / view.k])])"""
-    found = dict(driver.execute_script(script))
-    zigzag, arrow = found["act act-spring"], found["act act-force"]
+    acting = dict(driver.execute_script(script))
+    zigzag, arrow = acting["act act-spring"], acting["act act-force"]
     end = s.B[20] + (0.08 - 0.22) * np.array([math.cos(s.theta_4[20]), math.sin(s.theta_4[20])])
     np.testing.assert_allclose(zigzag[-1], end, atol=1e-4)
     angle = s.theta_3[20] + 1.0
     np.testing.assert_allclose(arrow[0], s.G3[20] + 0.03 * np.array([math.cos(angle), math.sin(angle)]), atol=1e-4)
     towards = np.subtract(arrow[1], arrow[0])
     assert math.atan2(towards[1], towards[0]) == pytest.approx(s.theta_3[20] + 0.5, abs=0.01)
-    assert found.keys() >= {"act act-drive", "act act-gravity"}
+    assert acting.keys() >= {"act act-drive", "act act-gravity"}
     names = 'return ["1", "3"].map(k => [parts.label[k].textContent, parts.label[k].style.display])'
     assert driver.execute_script(names) == [["1", "none"], ["3", ""]]
     driver.execute_script("toggle('show-v'); toggle('show-a')")
@@ -451,7 +451,7 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> No
     loose = (fourbar.Tolerance("lengths.input", 5e-5), fourbar.Tolerance("bars.coupler.mass", 0.001, True))
     scene = crank_rocker(tolerances=loose, points=(fourbar.Point("P", 3, (0.1, 0.2)),))
     driver = browse(animate.write_page(scene, units=fourbar.units("N.mm")), 360)
-    found = fourbar.tolerances(scene, PAGE_SAMPLES)
+    study = fourbar.tolerances(scene, PAGE_SAMPLES)
     driver.execute_script("go(20)")
     rows = {
         row.find_element("tag name", "th").text: [number(cell.text.replace("±", "")) for cell in cells]
@@ -459,12 +459,12 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(browse) -> No
         for cells in [row.find_elements("tag name", "td")]
     }
     for label, part, factor in (("torque, N mm", "torque", 1e3), ("|F₄₃|, N", "|F43|", 1.0), ("P_x, mm", "P_x", 1e3)):
-        spread = found.spreads[part]
+        spread = study.spreads[part]
         names = ("nominal", "deviation", "low", "high", "worst", "least", "greatest")
         expected = np.array([getattr(spread, name)[20] * factor for name in names])
         np.testing.assert_allclose(rows[label], expected, rtol=0, atol=SPREAD_PRINTED * spread.worst[20] * factor)
-    shares = found.spreads["torque"].shares[:, 20]
-    assert [rows[each.key][0] for each in loose] == pytest.approx(100 * shares / shares.sum(), abs=0.51)
+    shares = study.spreads["torque"].shares[:, 20]
+    assert [rows[tolerance.key][0] for tolerance in loose] == pytest.approx(100 * shares / shares.sum(), abs=0.51)
     assert state_of(driver, "document.documentElement.scrollWidth") <= 360
     box = driver.find_element("css selector", "#bands .band").rect
     assert box["height"] > 40 and box["width"] > 200

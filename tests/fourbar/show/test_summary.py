@@ -71,8 +71,8 @@ def test_dry_friction_reverses_at_the_dead_centres_whatever_the_steps(steps: int
 
 def _beside(scene: fourbar.Scene, theta_2: float, step: int) -> dict[str, float]:
     """Sizes next to an angle."""
-    at = Command(np.array([theta_2 + step * 1e-8]), np.array([1], dtype=np.int8), scene.motion.omega_2, 0.0)
-    return {name: float(size[0]) for name, size in list_sizes(fourbar.solve(scene, at=at)).items()}
+    command = Command(np.array([theta_2 + step * 1e-8]), np.array([1], dtype=np.int8), scene.motion.omega_2, 0.0)
+    return {name: float(size[0]) for name, size in list_sizes(fourbar.solve(scene, at=command)).items()}
 
 
 def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
@@ -82,8 +82,8 @@ def test_the_largest_of_coarse_steps_is_that_of_fine_ones() -> None:
     fine = list_sizes(fourbar.solve(replace(coarse, motion=coarse.motion.replace(angle=FINE))))
     for name, size in list_sizes(between.solution).items():
         assert size.max() == pytest.approx(fine[name].max(), rel=PEAK), name
-    own = np.isin(between.solution.theta_2, fourbar.solve(coarse).theta_2)
-    assert own.sum() == 25 and np.all(np.diff(between.solution.theta_2) > 0.0)
+    of_coarse = np.isin(between.solution.theta_2, fourbar.solve(coarse).theta_2)
+    assert of_coarse.sum() == 25 and np.all(np.diff(between.solution.theta_2) > 0.0)
 
 
 def test_towards_a_limit_within_the_last_step_it_grows_too() -> None:

@@ -34,18 +34,18 @@ def test_every_number_is_in_the_unit_that_is_named(capsys: pytest.CaptureFixture
         if form == "--json":
             document = json.loads(out)
             assert document["angle_unit"] == "deg" and set(document["units"]) <= set(document)
-            found = {name: (np.array(document[name], dtype=float), unit) for name, unit in document["units"].items()}
+            printed = {name: (np.array(document[name], dtype=float), unit) for name, unit in document["units"].items()}
         else:
             header, *rows = csv.reader(io.StringIO(out))
-            at = next(index for index, name in enumerate(header) if name.startswith("F12_y"))
-            assert header[at] == "F12_y [lbf]" and "torque [lbf in]" in header and "condition" in header
-            assert float(rows[90][at]) * POUND == pytest.approx(solution.F12[90, 1], rel=1e-14)  # type: ignore[index]
-    for name, (values, unit) in found.items():
+            column = next(index for index, name in enumerate(header) if name.startswith("F12_y"))
+            assert header[column] == "F12_y [lbf]" and "torque [lbf in]" in header and "condition" in header
+            assert float(rows[90][column]) * POUND == pytest.approx(solution.F12[90, 1], rel=1e-14)  # type: ignore[index]
+    for name, (values, unit) in printed.items():
         if UNITS[name] != unit or unit in ("rad/s^2", "1"):
-            own = getattr(solution, name)
-            assert np.allclose(values * IN_SI[unit], np.full_like(values, np.nan) if own is None else own,
+            expected = getattr(solution, name)
+            assert np.allclose(values * IN_SI[unit], np.full_like(values, np.nan) if expected is None else expected,
                                rtol=4e-16 * 4, atol=0.0, equal_nan=True), name  # fmt: skip
-    assert {unit for _, unit in found.values()} >= {"in", "lbf", "lbf in", "deg", "rpm", "in/s^2", "hp"}
+    assert {unit for _, unit in printed.values()} >= {"in", "lbf", "lbf in", "deg", "rpm", "in/s^2", "hp"}
 
 
 def test_a_spreadsheet_of_decimal_commas_has_magnitudes_power_and_time(capsys: pytest.CaptureFixture[str]) -> None:

@@ -81,8 +81,8 @@ def texts_shown(figure):
                     off_axis |= {tick.label1, tick.label2}
         if not axes.axison:
             off_axis |= {axes.xaxis.label, axes.yaxis.label}
-    found = figure.findobj(lambda artist: isinstance(artist, Text))
-    shown = [t for t in found if t.get_visible() and t.get_text().strip() and t not in off_axis]
+    texts = figure.findobj(lambda artist: isinstance(artist, Text))
+    shown = [t for t in texts if t.get_visible() and t.get_text().strip() and t not in off_axis]
     return [(t.get_text(), t.get_window_extent(renderer)) for t in shown]
 
 
@@ -227,9 +227,9 @@ def test_transmission_angle_marks_limits_and_dead_centres() -> None:
     expected = [(45 + s * inner + 180) % 360 for s in (1, -1)]
     assert len(marks["dead centre"]) == 1
     assert min(abs(marks["dead centre"][0] - e) for e in expected) < 1e-9
-    other = thesis(FULL_TURN)
-    other = replace(other, motion=other.motion.replace(branch=-1))
-    panel = composed(other, "transmission").axes[0]
+    crossed_scene = thesis(FULL_TURN)
+    crossed_scene = replace(crossed_scene, motion=crossed_scene.motion.replace(branch=-1))
+    panel = composed(crossed_scene, "transmission").axes[0]
     crossed = next(line.get_xdata()[0] for line in panel.lines if line.get_marker() == "D")
     assert crossed + marks["dead centre"][0] == pytest.approx(sum(expected))  # its mirror image in the ground's line
 
@@ -347,7 +347,7 @@ def test_a_position_and_dimensions_show_where_they_are_taken() -> None:
     for option, value in {"position": 1.0, "dimensions": True}.items():
         for figure in TAKERS[option]:
             if figure not in ("stroke", "energy"):  # of other scenes
-                plain, changed = (draw_figure(crank_rocker(), figure, **of) for of in ({}, {option: value}))
+                plain, changed = (draw_figure(crank_rocker(), figure, **options) for options in ({}, {option: value}))
                 assert plain._repr_svg_() != changed._repr_svg_(), (figure, option)
 
 
@@ -402,9 +402,9 @@ def test_branches_that_are_released_for_different_times_share_their_scales() -> 
     for name in ("kinematics", "energy"):
         axes = composed(scene, name, "both").axes
         half = len(axes) // 2
-        for one, other in zip(axes[:half], axes[half:], strict=True):
-            assert (one.get_xlim(), one.get_ylim()) == (other.get_xlim(), other.get_ylim())
-            assert (one.get_xlabel(), one.get_ylabel()) == (other.get_xlabel(), other.get_ylabel())
+        for panel, twin in zip(axes[:half], axes[half:], strict=True):
+            assert (panel.get_xlim(), panel.get_ylim()) == (twin.get_xlim(), twin.get_ylim())
+            assert (panel.get_xlabel(), panel.get_ylabel()) == (twin.get_xlabel(), twin.get_ylabel())
 
 
 def test_the_position_of_a_motion_through_time_is_one_that_it_passes(tmp_path: Path) -> None:
@@ -422,18 +422,18 @@ ENERGY = 1e-6
 def test_the_work_of_what_acts_is_the_kinetic_energy() -> None:
     scene = released(effects=(fourbar.Gravity(), fourbar.Viscous.at(O2=0.002, B=0.001), Flywheel(0.01, 4)))
     motion = fourbar.solve(scene)
-    found = compute_energies(scene, motion)
-    assert set(found.work) == {"loads", "gravity", "viscous"}
+    energies = compute_energies(scene, motion)
+    assert set(energies.work) == {"loads", "gravity", "viscous"}
     carried, place = (
         list_bodies(scene.linkage, scene.effects),
         compute_state(scene.linkage, motion.theta_2, motion.branch),
     )
     of_input, of_others = inertia(scene.linkage.input.length, carried, place.position, place.k)
     expected = 0.5 * (of_input + of_others) * motion.omega_2**2
-    np.testing.assert_allclose(found.kinetic, expected, rtol=1e-9, atol=1e-15)
-    assert found.kinetic.max() > 0.1
-    assert np.all(np.diff(found.work["viscous"]) <= 0.0)
-    np.testing.assert_allclose(sum(found.work.values()), found.kinetic, atol=ENERGY * found.kinetic.max())
+    np.testing.assert_allclose(energies.kinetic, expected, rtol=1e-9, atol=1e-15)
+    assert energies.kinetic.max() > 0.1
+    assert np.all(np.diff(energies.work["viscous"]) <= 0.0)
+    np.testing.assert_allclose(sum(energies.work.values()), energies.kinetic, atol=ENERGY * energies.kinetic.max())
     panel = composed(scene, "energy").axes[0]
     assert panel.get_ylabel() in ("energy (J)", "energy (mJ)")
 
@@ -451,13 +451,13 @@ def test_both_branches_are_drawn_to_one_scale(name: str) -> None:
     half = len(figure.axes) // 2
     assert half and len(figure.axes) == 2 * half
     figure.draw_without_rendering()
-    for one, other in zip(figure.axes[:half], figure.axes[half:], strict=True):
+    for panel, twin in zip(figure.axes[:half], figure.axes[half:], strict=True):
         # free bodies move their window with the bar: its width is the scale
-        ends = [np.array([axes.get_xlim(), axes.get_ylim()]) for axes in (one, other)]
-        if one.axison:
+        ends = [np.array([axes.get_xlim(), axes.get_ylim()]) for axes in (panel, twin)]
+        if panel.axison:
             np.testing.assert_allclose(ends[0], ends[1], rtol=1e-9)
         np.testing.assert_allclose(np.diff(ends[0]), np.diff(ends[1]), rtol=1e-9)
-        assert one.get_ylabel() == other.get_ylabel()
+        assert panel.get_ylabel() == twin.get_ylabel()
 
 
 @pytest.mark.slow
@@ -530,8 +530,8 @@ def test_curves_are_drawn_over_what_is_commanded(label: str) -> None:
     np.testing.assert_allclose(drawn_at[usual], s.drive_force[order][usual], rtol=2e-2, atol=2e-2)
     (linkage,) = composed(scene, "linkage").axes
     place = getattr(make_view(scene).here, name)[0]
-    at = f"stroke = {1000.0 * place:.4g} mm" if name == "stroke" else f"θ₄ = {math.degrees(place):.4g}°"
-    assert at in linkage.get_title(loc="left").replace("θ₃", "θ₄")
+    stated = f"stroke = {1000.0 * place:.4g} mm" if name == "stroke" else f"θ₄ = {math.degrees(place):.4g}°"
+    assert stated in linkage.get_title(loc="left").replace("θ₃", "θ₄")
 
 
 @pytest.mark.slow
@@ -562,7 +562,7 @@ def test_one_position_of_another_command_stands_in_its_range() -> None:
     assert shown.at == "stroke = 300 mm" and shown.here.stroke[0] == pytest.approx(0.3, rel=1e-14)
     assert places.max() < triangle[0] and places.min() > triangle[1] and len(places) == 362
     shown = make_view(commanding(fourbar.Motion(theta_4=2.0, omega_4=1.0)))
-    (low, high), *_ = (own for own in find_intervals(CRANK_ROCKER.linkage, 4) if own[0] < 2.0 + math.tau < own[1])
+    (low, high), *_ = (ends for ends in find_intervals(CRANK_ROCKER.linkage, 4) if ends[0] < 2.0 + math.tau < ends[1])
     assert shown.sweep.theta_4.min() > low and shown.sweep.theta_4.max() < high
     assert shown.at == "θ₄ = 114.6°"
 
@@ -596,6 +596,6 @@ def test_the_stroke_is_a_figure_where_it_is_not_the_axis() -> None:
     (axes,) = composed(scene, "stroke").axes
     curve, s = max(axes.lines, key=lambda line: len(line.get_xdata())), fourbar.solve(scene)
     np.testing.assert_allclose(np.interp(np.degrees(s.theta_4), *curve.get_data()), 1000.0 * s.stroke, rtol=1e-14)
-    for other in (CRANK_ROCKER, commanding(COMMANDS["stroke (mm)"])):
+    for refused in (CRANK_ROCKER, commanding(COMMANDS["stroke (mm)"])):
         with pytest.raises(InputError, match="needs a linear drive"):
-            draw_figure(other, "stroke")
+            draw_figure(refused, "stroke")

@@ -93,11 +93,13 @@ def test_nothing_at_a_pin_hides_a_bar_and_what_lies_off_a_bar_is_joined_to_it(ev
     assert len(at_crank) >= 2
     assert all(np.ptp(ring, axis=0).max() < 2.0 * factor * short.input.length for ring in at_crank)
     plates = [patch.get_xy() for patch in axes.patches if patch.get_linestyle() in (":", "dotted")]
-    at = {name: factor * getattr(shown.here, name)[0] for name in ("A", "B", "G3", "G4")}
-    assert any(np.allclose(corners, [at["A"], factor * shown.here.points["P"][0], at["B"]]) for corners in plates)
+    places = {name: factor * getattr(shown.here, name)[0] for name in ("A", "B", "G3", "G4")}
+    assert any(
+        np.allclose(corners, [places["A"], factor * shown.here.points["P"][0], places["B"]]) for corners in plates
+    )
     angle = 1.0 + shown.here.theta_3[0]
-    load = at["G3"] + factor * 0.03 * np.array([math.cos(angle), math.sin(angle)])
-    assert any(np.allclose(corners, [at["A"], load, at["B"]]) for corners in plates)
+    load = places["G3"] + factor * 0.03 * np.array([math.cos(angle), math.sin(angle)])
+    assert any(np.allclose(corners, [places["A"], load, places["B"]]) for corners in plates)
 
 
 def test_the_page_is_given_the_same_symbols(everything: Scene) -> None:
@@ -116,9 +118,9 @@ def test_the_points_of_a_scene_are_drawn_where_they_are() -> None:
     path = next(line for line in panels[0].lines if line.get_label() == "path of P")
     assert {f"path of $G_{bar}$" for bar in (2, 4)} <= {line.get_label() for line in panels[0].lines}
     assert np.allclose(path.get_xydata(), solution.points["P"], rtol=0.0, atol=1e-15)
-    for panel, own in zip(panels[1:], (solution.velocity, solution.acceleration), strict=True):
+    for panel, of_points in zip(panels[1:], (solution.velocity, solution.acceleration), strict=True):
         line = next(line for line in panel.lines if line.get_label() == "P")
-        assert np.allclose(line.get_ydata(), np.hypot(*own["P"].T), rtol=1e-15)
+        assert np.allclose(line.get_ydata(), np.hypot(*of_points["P"].T), rtol=1e-15)
     data = collect_page_data(scene, {})
     assert data["points"][0]["name"] == "P" and abs(complex(*data["points"][0]["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
 
@@ -142,13 +144,15 @@ def test_a_film_names_and_moves_what_the_plot_does(everything: Scene) -> None:
         move(7)
         figure.draw_without_rendering()
     (axes,) = figure.axes
-    named = {text.get_text() for text in axes.texts}
-    assert named >= {"$O_2$", "$A$", "2", "3", "4", "$G_2$", "$G_3$", "$G_4$", "P", "load 1", "viscous", "pin friction"}
+    texts = {text.get_text() for text in axes.texts}
+    assert texts >= {"$O_2$", "$A$", "2", "3", "4", "$G_2$", "$G_3$", "$G_4$", "P", "load 1", "viscous", "pin friction"}
     assert axes.title.get_window_extent().y0 > axes.get_legend().get_window_extent().y1
     solution = fourbar.solve(scene)
-    for arrows, at, own in zip(
+    for arrows, name, of_points in zip(
         axes.collections[-2:], ("v_A", "a_A"), (solution.velocity, solution.acceleration), strict=True
     ):
         shafts = np.column_stack([arrows.U, arrows.V])
-        scale = np.hypot(*shafts[0]) / np.hypot(*getattr(solution, at)[7])
-        assert np.allclose(shafts[[0, -1]], scale * np.array([getattr(solution, at)[7], own["P"][7]]), rtol=1e-12)
+        scale = np.hypot(*shafts[0]) / np.hypot(*getattr(solution, name)[7])
+        assert np.allclose(
+            shafts[[0, -1]], scale * np.array([getattr(solution, name)[7], of_points["P"][7]]), rtol=1e-12
+        )
