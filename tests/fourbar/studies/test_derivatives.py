@@ -36,43 +36,43 @@ def test_derivatives_are_those_of_a_50_digit_reference(drive: int) -> None:
     """By what a scene leaves out too, which the reference does not move: as where it is stated."""
     effects = (Gravity(), Viscous.at(O2=0.01, A=0.02), Friction.at(B=0.05))
     for theta_2 in ANGLES[1:3]:
-        of = scene(effects, drive, theta_2=float(theta_2))
-        judge_slopes(of, tally := Tally(), "", "numpy")
+        case = scene(effects, drive, theta_2=float(theta_2))
+        judge_slopes(case, tally := Tally(), "", "numpy")
         assert len(tally.worst) > 40 and max(tally.worst.values())[0] < 1.0
-        found = sensitivity(of)
-        assert found.status == ["ok"] and set(found.keys) == {"motion.theta_2", *list_entries(of)}
+        slopes = sensitivity(case)
+        assert slopes.status == ["ok"] and set(slopes.keys) == {"motion.theta_2", *list_entries(case)}
         bars = [replace(bar, inertia=bar.moment_of_inertia, centre=bar.mass_centre) for bar in LINK.moving]
-        stated = sensitivity(replace(of, linkage=FourBar(LINK.ground, *bars, LINK.ground_angle)))
-        for name, key in product(found.by, LEFT_OUT):
-            np.testing.assert_array_equal(found.of(name, key), stated.of(name, key))
+        stated = sensitivity(replace(case, linkage=FourBar(LINK.ground, *bars, LINK.ground_angle)))
+        for name, key in product(slopes.by, LEFT_OUT):
+            np.testing.assert_array_equal(slopes.of(name, key), stated.of(name, key))
     judge_slopes(stated.scene, tally := Tally(), "", "numpy")
     assert max(tally.worst.values())[0] < 1.0
 
 
 @pytest.mark.parametrize(("effects", "drive"), [(DRIVEN, 4), (RUBBING, 2)])
 def test_effects_that_the_reference_lacks_by_differences(effects: tuple[Any, ...], drive: int) -> None:
-    of, points = scene(effects, drive), (fourbar.Point("P", 3, (0.1, 0.4)),)
-    of = Scene(of.linkage, of.motion, drive, (*LOADS, TABLED), effects, points=points)
-    found = sensitivity(of)
-    assert found.status == ["ok"] * len(ANGLES) and {"P", "v_P", "a_P"} <= set(found.by)
-    start = {key: ANGLES if key == "motion.theta_2" else x for key, x in zip(found.keys, found.numbers, strict=True)}
+    case, points = scene(effects, drive), (fourbar.Point("P", 3, (0.1, 0.4)),)
+    case = Scene(case.linkage, case.motion, drive, (*LOADS, TABLED), effects, points=points)
+    slopes = sensitivity(case)
+    assert slopes.status == ["ok"] * len(ANGLES) and {"P", "v_P", "a_P"} <= set(slopes.by)
+    start = {key: ANGLES if key == "motion.theta_2" else x for key, x in zip(slopes.keys, slopes.numbers, strict=True)}
     steps = {key: 1e-5 * (np.max(np.abs(x)) or 1.0) for key, x in start.items()}
     study = {}
     for row, (key, x) in enumerate(start.items()):  # each key moves in its own four members
         moves = np.zeros(4 * len(start))
         moves[4 * row : 4 * row + 4] = steps[key] * np.array([-2, -1, 1, 2])
         study[key] = x + moves[:, None] if key == "motion.theta_2" else x + moves
-    solution = fourbar.solve(fourbar.vary(of, {k: v for k, v in study.items() if k not in LEFT_OUT}))
-    for name in found.by:
+    solution = fourbar.solve(fourbar.vary(case, {k: v for k, v in study.items() if k not in LEFT_OUT}))
+    for name in slopes.by:
         of_all = find_values(solution, name)
         for row, key in enumerate(start):
             if key in LEFT_OUT:
                 continue
             low, less, more, high = of_all[4 * row : 4 * row + 4]
             difference = (low - 8 * less + 8 * more - high) / (12 * steps[key])
-            scale = np.abs(found.value(name)).max() * 1e-5 / steps[key] + np.abs(difference).max()
+            scale = np.abs(slopes.value(name)).max() * 1e-5 / steps[key] + np.abs(difference).max()
             np.testing.assert_allclose(
-                found.of(name, key), difference, rtol=0, atol=OF_DIFFERENCES * scale, err_msg=f"{name} by {key}"
+                slopes.of(name, key), difference, rtol=0, atol=OF_DIFFERENCES * scale, err_msg=f"{name} by {key}"
             )
 
 
@@ -83,11 +83,11 @@ def test_where_there_is_no_derivative_a_status_says_why() -> None:
     jammed = sensitivity(scene((PinFriction.at(A=(9.0, 2.0)),), 2))
     assert set(jammed.status) <= {"jammed", "several"} and np.isnan(jammed.by["F12"]).all()
     apart = fourbar.Scene(fourbar.uniform(0.2, 0.48, 0.55, 0.2), fourbar.Motion(np.array([0.0, 1.2, np.pi]), 1.0))
-    found = sensitivity(apart)
-    assert found.status == fourbar.solve(apart).status
-    lost = np.array(found.status) != "ok"
+    slopes = sensitivity(apart)
+    assert slopes.status == fourbar.solve(apart).status
+    lost = np.array(slopes.status) != "ok"
     assert lost.any() and not lost.all()
-    for name, rows in found.by.items():
+    for name, rows in slopes.by.items():
         assert np.isnan(rows[:, lost]).all() and np.isfinite(rows[:, ~lost]).all(), name
 
 
@@ -109,10 +109,10 @@ def test_what_has_no_sensitivities(motion: dict[str, Any], word: str) -> None:
 
 
 def test_an_unknown_name_is_refused() -> None:
-    found = sensitivity(scene())
+    slopes = sensitivity(scene())
     for quantity, key in (("torque", "lengths.inptu"), ("torqe", "lengths.input")):
         with pytest.raises(fourbar.InputError, match="is not known here"):
-            found.of(quantity, key)
+            slopes.of(quantity, key)
 
 
 @pytest.mark.slow
@@ -127,8 +127,8 @@ def test_the_command_ranks_the_numbers_and_writes_them_all(capsys: pytest.Captur
     assert status(["analyze", str(models / "crank_rocker.toml"), "--sensitivity", "--json", "-o", str(out)]) == 0
     document = json.loads(out.read_text())
     assert document["schema"] == "fourbar-sensitivity/1" and document["keys"]["lengths.input"]["unit"] == "m"
-    own = sensitivity(fourbar.load(models / "crank_rocker.toml"))
-    np.testing.assert_array_equal(document["by"]["F12"]["lengths.input"], own.of("F12", "lengths.input"))
+    slopes = sensitivity(fourbar.load(models / "crank_rocker.toml"))
+    np.testing.assert_array_equal(document["by"]["F12"]["lengths.input"], slopes.of("F12", "lengths.input"))
     assert status(["analyze", str(models / "crank_rocker.toml"), "--sensitivity", "--csv"]) == 2
 
 
@@ -138,18 +138,18 @@ def test_half_a_turn_from_the_ground_the_first_derivative_is_the_ratio_of_the_sp
 ) -> None:
     """There the tangent of the half angle is 1e16, of whose slope no digit is left."""
     link = replace(LINK, ground_angle=ground_angle)
-    found = sensitivity(Scene(link, Motion(theta_2, 10.0, 3.0), effects=(Gravity(),)))
-    solution = found.solution
+    slopes = sensitivity(Scene(link, Motion(theta_2, 10.0, 3.0), effects=(Gravity(),)))
+    solution = slopes.solution
     assert solution.omega_3 is not None and solution.alpha_3 is not None
-    np.testing.assert_allclose(found.of("theta_3", "motion.theta_2"), solution.omega_3 / 10.0, rtol=1e-13)
-    turned = found.of("omega_3", "motion.theta_2") * 10.0 + found.of("omega_3", "motion.omega_2") * 3.0
+    np.testing.assert_allclose(slopes.of("theta_3", "motion.theta_2"), solution.omega_3 / 10.0, rtol=1e-13)
+    turned = slopes.of("omega_3", "motion.theta_2") * 10.0 + slopes.of("omega_3", "motion.omega_2") * 3.0
     np.testing.assert_allclose(turned, solution.alpha_3, rtol=1e-12)
-    with_ground = found.of("theta_3", "motion.theta_2") + found.of("theta_3", "lengths.ground_angle")
+    with_ground = slopes.of("theta_3", "motion.theta_2") + slopes.of("theta_3", "lengths.ground_angle")
     np.testing.assert_allclose(with_ground, 1.0, rtol=1e-13)  # a linkage turned as a whole
 
 
 def test_a_kite_whose_halves_meet_has_derivatives() -> None:
     """With a = d and b = c the product in Heron's factor has no slope either, and is a constant."""
-    found = sensitivity(Scene(fourbar.uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
-    assert found.solution.omega_3 is not None
-    np.testing.assert_allclose(found.of("theta_3", "motion.theta_2"), found.solution.omega_3 / 10.0, rtol=1e-13)
+    slopes = sensitivity(Scene(fourbar.uniform(0.3, 0.3, 0.2, 0.2), Motion(1.0, 10.0)))
+    assert slopes.solution.omega_3 is not None
+    np.testing.assert_allclose(slopes.of("theta_3", "motion.theta_2"), slopes.solution.omega_3 / 10.0, rtol=1e-13)

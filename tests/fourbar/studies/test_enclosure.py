@@ -31,44 +31,44 @@ def rocker() -> tuple[Scene, Extremes]:
 
 
 def sampled(solution: Any) -> dict[str, np.ndarray]:
-    found = {f"|{name}|": np.hypot(*np.moveaxis(getattr(solution, name), -1, 0)) for name in enclosure.PIN_FORCES}
+    forces = {f"|{name}|": np.hypot(*np.moveaxis(getattr(solution, name), -1, 0)) for name in enclosure.PIN_FORCES}
     mu = np.arctan2(np.abs(solution.sin_mu), np.abs(np.cos(solution.theta_4 - solution.theta_3)))
-    return {"torque": solution.torque, **found, "transmission": mu}
+    return {"torque": solution.torque, **forces, "transmission": mu}
 
 
-def holds(found: Extremes, samples: dict[str, np.ndarray]) -> None:
-    for name in found.least:
+def holds(bounds: Extremes, samples: dict[str, np.ndarray]) -> None:
+    for name in bounds.least:
         values = samples[name]
         size = ROUNDING * np.abs(values).max()
-        assert values.min() >= found.least[name].low - size, name
-        assert values.max() <= found.greatest[name].high + size, name
+        assert values.min() >= bounds.least[name].low - size, name
+        assert values.max() <= bounds.greatest[name].high + size, name
 
 
 @pytest.mark.slow
 def test_no_sample_lies_outside_and_the_enclosure_is_as_narrow_as_promised(rocker: tuple[Scene, Extremes]) -> None:
-    scene, found = rocker
+    scene, bounds = rocker
     theta_2 = np.linspace(0, 2 * math.pi, 20_001)
     samples = sampled(fourbar.solve(scene, at=Command(theta_2, np.ones(20_001, np.int8), 10.0, 0.0)))
-    assert set(samples) == set(enclosure.NAMES) - {"drive_force"} and found.distance == 0.0
-    holds(found, samples)
-    for name in found.least:
+    assert set(samples) == set(enclosure.NAMES) - {"drive_force"} and bounds.distance == 0.0
+    holds(bounds, samples)
+    for name in bounds.least:
         values = samples[name]
         size = np.abs(values).max()
-        for extreme, at in ((found.least[name], values.min()), (found.greatest[name], values.max())):
+        for extreme, value in ((bounds.least[name], values.min()), (bounds.greatest[name], values.max())):
             assert 0.0 <= extreme.high - extreme.low <= PROVEN * size
             dense = 1e-3 if name == "transmission" else 1e-6  # it has a corner at a right angle
-            assert extreme.low <= at + dense * size and at - dense * size <= extreme.high
+            assert extreme.low <= value + dense * size and value - dense * size <= extreme.high
 
 
 @pytest.mark.slow
 def test_poles_are_kept_away_from_and_the_drive_may_be_on_any_bar() -> None:
     scene = fourbar.load(MODELS / "thesis.toml")
-    found = extremes(scene, ["torque"])
-    assert found.distance == enclosure.DISTANCE and len(found.parts) == 3 and set(found.least) == {"torque"}
-    theta_2 = np.concatenate([np.linspace(*part, 500) for part in found.parts])
+    bounds = extremes(scene, ["torque"])
+    assert bounds.distance == enclosure.DISTANCE and len(bounds.parts) == 3 and set(bounds.least) == {"torque"}
+    theta_2 = np.concatenate([np.linspace(*part, 500) for part in bounds.parts])
     samples = sampled(fourbar.solve(scene, at=Command(theta_2, np.ones(1500, np.int8), 0.2244, 0.0)))
-    holds(found, samples)
-    assert found.greatest["torque"].high == pytest.approx(samples["torque"].max(), rel=1e-6)  # at an end
+    holds(bounds, samples)
+    assert bounds.greatest["torque"].high == pytest.approx(samples["torque"].max(), rel=1e-6)  # at an end
 
 
 @pytest.mark.slow
@@ -77,17 +77,17 @@ def test_with_tolerances_no_linkage_lies_outside(rocker: tuple[Scene, Extremes])
     linkage = scene.linkage.lengths
     widths = {f"lengths.{name}": 1e-4 * length for name, length in zip(LENGTHS, linkage, strict=True)}
     loose = replace(scene, tolerances=tuple(Tolerance(key, width) for key, width in widths.items()))
-    found = extremes(loose, ["F43"])
-    assert list(found.greatest) == ["|F43|"]
+    bounds = extremes(loose, ["F43"])
+    assert list(bounds.greatest) == ["|F43|"]
     random = np.random.default_rng(1)
     corners = random.choice([-1.0, 1.0], (4, 200)) * np.maximum(random.uniform(0, 1.0, (4, 200)), 0.5).round()
     values = {key: x + w * c for (key, w), x, c in zip(widths.items(), linkage, corners, strict=True)}
     study = fourbar.vary(scene, values | {"motion.theta_2": np.linspace(0, 2 * math.pi, 721)})
-    holds(found, sampled(fourbar.solve(study)))
-    for name in found.greatest:
-        over = found.over_estimate(name, 1)
+    holds(bounds, sampled(fourbar.solve(study)))
+    for name in bounds.greatest:
+        over = bounds.over_estimate(name, 1)
         assert over is not None and 1.0 <= over <= 1.2, name
-        assert found.nominal is not None and found.nominal.greatest[name] == nominal.greatest[name]
+        assert bounds.nominal is not None and bounds.nominal.greatest[name] == nominal.greatest[name]
 
 
 @pytest.mark.parametrize(
@@ -123,9 +123,9 @@ def test_a_pole_within_the_tolerances_is_named(monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.slow
 def test_what_only_tolerances_widen_is_not_halved_further(rocker: tuple[Scene, Extremes]) -> None:
     loose = replace(rocker[0], tolerances=(Tolerance("lengths.input", 3e-3),))
-    found = extremes(loose, ["torque"])
-    assert found.boxes < 2000  # many times that where each is halved to the end
-    over = found.over_estimate("torque", 1)
+    bounds = extremes(loose, ["torque"])
+    assert bounds.boxes < 2000  # many times that where each is halved to the end
+    over = bounds.over_estimate("torque", 1)
     assert over is not None and over > 1.5
 
 
@@ -194,8 +194,8 @@ def test_the_transmission_angle_is_that_of_the_triangle_to_the_last_digits(lengt
     ends = sorted(float(abs(x).acos()) for x in cosines)
     if cosines[0] * cosines[1] < 0:
         ends[1] = math.pi / 2
-    found = extremes(Scene(fourbar.uniform(*lengths), Motion(0.0, 1.0)), ["transmission"])
-    for end, extreme in zip(ends, (found.least["transmission"], found.greatest["transmission"]), strict=True):
+    bounds = extremes(Scene(fourbar.uniform(*lengths), Motion(0.0, 1.0)), ["transmission"])
+    for end, extreme in zip(ends, (bounds.least["transmission"], bounds.greatest["transmission"]), strict=True):
         size = 4.0 * ROUNDING
         assert extreme.low - size <= end <= extreme.high + size
         assert extreme.high - extreme.low <= PROVEN
@@ -205,9 +205,9 @@ def test_the_transmission_angle_is_that_of_the_triangle_to_the_last_digits(lengt
 @pytest.mark.parametrize("far", [50.0, 1e11, -1e15])
 def test_turns_of_the_input_change_no_bound(far: float) -> None:
     scene = Scene(fourbar.uniform(0.3, 0.1, 0.25, 0.22), Motion(0.0, 10.0), drive_bar=4)
-    near, found = extremes(scene, ["torque"]), extremes(replace(scene, motion=Motion(far, 10.0)), ["torque"])
-    assert found.greatest["torque"].high == pytest.approx(near.greatest["torque"].high, rel=2 * PROVEN)
-    assert found.boxes < 2 * near.boxes
+    near, turned = extremes(scene, ["torque"]), extremes(replace(scene, motion=Motion(far, 10.0)), ["torque"])
+    assert turned.greatest["torque"].high == pytest.approx(near.greatest["torque"].high, rel=2 * PROVEN)
+    assert turned.boxes < 2 * near.boxes
 
 
 def test_a_ground_turned_too_far_is_one_line() -> None:
@@ -220,16 +220,17 @@ def test_a_ground_turned_too_far_is_one_line() -> None:
 @pytest.mark.parametrize("size", [1e-150, 1e150])
 def test_sizes_whose_squares_doubles_do_not_hold_are_bounded(size: float) -> None:
     lengths = (0.3, 0.1, 0.25, 0.22)
-    one, found = (
-        extremes(Scene(fourbar.uniform(*(of * x for x in lengths)), Motion(0.0, 10.0)), ["F12"]) for of in (1.0, size)
+    unscaled, scaled = (
+        extremes(Scene(fourbar.uniform(*(scale * x for x in lengths)), Motion(0.0, 10.0)), ["F12"])
+        for scale in (1.0, size)
     )
-    assert found.greatest["|F12|"].high == pytest.approx(size * size * one.greatest["|F12|"].high, rel=2 * PROVEN)
+    assert scaled.greatest["|F12|"].high == pytest.approx(size * size * unscaled.greatest["|F12|"].high, rel=2 * PROVEN)
 
 
 def test_what_is_zero_everywhere_is_bounded_by_zero() -> None:
     bars = (fourbar.Bar(length) for length in (0.1, 0.25, 0.22))
-    found = extremes(Scene(fourbar.FourBar(0.3, *bars), Motion(0.0, 10.0)), ["torque", "F12"])
-    assert {end for extreme in (*found.least.values(), *found.greatest.values()) for end in extreme[:2]} == {0.0}
+    bounds = extremes(Scene(fourbar.FourBar(0.3, *bars), Motion(0.0, 10.0)), ["torque", "F12"])
+    assert {end for extreme in (*bounds.least.values(), *bounds.greatest.values()) for end in extreme[:2]} == {0.0}
 
 
 def test_a_torque_that_springs_balance_is_bounded_by_as_many_boxes_as_are_allowed(
@@ -240,13 +241,13 @@ def test_a_torque_that_springs_balance_is_bounded_by_as_many_boxes_as_are_allowe
     bars = (fourbar.Bar(0.1, 2.0, 1e-3, (0.05, 0.0)), fourbar.Bar(0.25), fourbar.Bar(0.22))
     balancing = Springs((Spring(SpringEnd(1, 0.1, 0.5 * math.pi), SpringEnd(2, 0.1, 0.0), 80.0),))
     scene = Scene(fourbar.FourBar(0.3, *bars), Motion(0.0, 10.0), 2, (), (Gravity(8.0), balancing))
-    found = extremes(scene, ["torque"])
-    assert 4 * 128 < found.boxes < 20 * 128  # over two searches
+    bounds = extremes(scene, ["torque"])
+    assert 4 * 128 < bounds.boxes < 20 * 128  # over two searches
     moment = 2.0 * 8.0 * 0.05
-    for extreme in (found.least["torque"], found.greatest["torque"]):
+    for extreme in (bounds.least["torque"], bounds.greatest["torque"]):
         assert -1e-2 * moment < extreme.low <= extreme.high < 1e-2 * moment
-    assert found.least["torque"].low < -1e-9 * moment  # not halved to the end
-    holds(found, sampled(fourbar.solve(scene, at=Command(np.linspace(0, 6, 500), np.ones(500, np.int8), 10.0, 0.0))))
+    assert bounds.least["torque"].low < -1e-9 * moment  # not halved to the end
+    holds(bounds, sampled(fourbar.solve(scene, at=Command(np.linspace(0, 6, 500), np.ones(500, np.int8), 10.0, 0.0))))
 
 
 @pytest.mark.parametrize(

@@ -36,17 +36,17 @@ def crank_as_pendulum(*effects: object, loads: tuple[Load, ...] = (), **motion: 
     return Scene(linkage, Motion(**{"theta_2": 0.7, **motion}), loads=loads, effects=effects)  # type: ignore[arg-type]
 
 
-def one(found: Equilibria, stability: str) -> Equilibrium:
-    (each,) = [each for each in found.found if each.stability == stability]
-    return each
+def one(equilibria: Equilibria, stability: str) -> Equilibrium:
+    (rest,) = [rest for rest in equilibria.found if rest.stability == stability]
+    return rest
 
 
 @pytest.mark.slow
 def test_gazebos_four_bar_hangs_at_the_frequency_of_its_pendulum() -> None:
     scene = fourbar.load(MODELS / "problems" / "gz_physics_987.toml")
-    found = equilibrium(scene)
-    assert found.proven and [round(math.degrees(each.theta_2)) for each in found.not_decided] == [0, 180]
-    (hanging,) = [each for each in found.found if abs(each.place.theta_2 - 1.5 * math.pi) < CLOSE]
+    equilibria = equilibrium(scene)
+    assert equilibria.proven and [round(math.degrees(rest.theta_2)) for rest in equilibria.not_decided] == [0, 180]
+    (hanging,) = [rest for rest in equilibria.found if abs(rest.place.theta_2 - 1.5 * math.pi) < CLOSE]
     assert (hanging.place.branch, hanging.stability, hanging.angle) == (-1, "stable", "theta_2")
     bars = scene.linkage
     swinging = sum(bar.moment_of_inertia + bar.mass * 0.25**2 for bar in (bars.input, bars.output))
@@ -59,9 +59,9 @@ def test_gazebos_four_bar_hangs_at_the_frequency_of_its_pendulum() -> None:
 
 
 def test_a_crank_with_mass_alone_is_a_pendulum() -> None:
-    found = equilibrium(crank_as_pendulum(DOWN))
-    stable, unstable = one(found, "stable"), one(found, "unstable")
-    assert found.proven and len(found.found) == 2 and not found.indifferent
+    equilibria = equilibrium(crank_as_pendulum(DOWN))
+    stable, unstable = one(equilibria, "stable"), one(equilibria, "unstable")
+    assert equilibria.proven and len(equilibria.found) == 2 and not equilibria.indifferent
     assert math.remainder(stable.place.theta_2 + math.pi / 2 + 0.3, 2 * math.pi) == pytest.approx(0.0, abs=CLOSE)
     assert math.remainder(unstable.place.theta_2 - math.pi / 2 + 0.3, 2 * math.pi) == pytest.approx(0.0, abs=CLOSE)
     J = INERTIA + M * R * R
@@ -76,7 +76,7 @@ def test_at_a_limit_of_the_input_the_output_is_the_angle() -> None:
     for limit in fourbar.limit_positions(linkage):
         beside = [limit.theta_2 + off for off in (0.01, -0.01)]  # on one side the linkage assembles
         scene = Scene(linkage, Motion(np.array(beside)), effects=(Gravity(9.81, limit.theta_4),))
-        (hanging,) = [each for each in equilibrium(scene).found if each.angle == "theta_4" and each.place.branch == 0]
+        (hanging,) = [rest for rest in equilibrium(scene).found if rest.angle == "theta_4" and rest.place.branch == 0]
         assert hanging.stability == "stable"
         assert hanging.angle == "theta_4" and hanging.place.branch == 0
         assert hanging.place.theta_4 == pytest.approx(limit.theta_4, abs=1e-10)  # theta_2 as a double: root of 2^-53
@@ -107,52 +107,52 @@ def springy(seed: int) -> Scene:
 def test_free_bodies_need_no_torque_there_and_its_slope_beside_and_have_no_other(name: str | int) -> None:
     """As a run judges it: Newton-Euler on three free bodies with their own closure, no virtual work."""
     scene = springy(name) if isinstance(name, int) else fourbar.load(MODELS / f"{name}.toml")
-    found, rows = equilibrium(scene), rows_of(scene, "equilibria")
-    assert found.proven and found.found
+    equilibria, rows = equilibrium(scene), rows_of(scene, "equilibria")
+    assert equilibria.proven and equilibria.found
     assert {row.quantity for row in rows} >= {"missed", "torque", "slope", "inertia"} and not failing(rows)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_changes_of_sign_find_what_the_proof_finds(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = equilibrium(springy(seed))
+    equilibria = equilibrium(springy(seed))
     monkeypatch.setattr(module, "_prove_zeros", lambda *_: None)
     sampled = equilibrium(springy(seed))
-    assert found.proven and not sampled.proven and len(sampled.found) == len(found.found)
-    for one_of, other in zip(found.found, sampled.found, strict=True):
-        assert (one_of.stability, one_of.place.branch) == (other.stability, other.place.branch)
-        assert one_of.place == pytest.approx(other.place, abs=1e-9)
+    assert equilibria.proven and not sampled.proven and len(sampled.found) == len(equilibria.found)
+    for rest, sampled_rest in zip(equilibria.found, sampled.found, strict=True):
+        assert (rest.stability, rest.place.branch) == (sampled_rest.stability, sampled_rest.place.branch)
+        assert rest.place == pytest.approx(sampled_rest.place, abs=1e-9)
 
 
 def test_friction_holds_a_pendulum_within_the_angle_that_it_can() -> None:
     f = 0.2
     away = math.asin(f / (M * 9.81 * R))
-    found = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=f)))
-    for each in found.found:
-        assert each.held is not None
-        ends = [math.remainder(end.theta_2 - each.place.theta_2, 2 * math.pi) for end in each.held]
+    equilibria = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=f)))
+    for rest in equilibria.found:
+        assert rest.held is not None
+        ends = [math.remainder(end.theta_2 - rest.place.theta_2, 2 * math.pi) for end in rest.held]
         assert ends == pytest.approx([-away, away], abs=1e-12)
-    assert len(found.held) == 2 and found.proven
-    assert all(one.theta_2 < other.theta_2 for one, other in found.held)
-    stays = found.moves == 0
-    Q = -M * 9.81 * R * np.cos(found.positions.theta_2 + 0.3)
-    assert (stays == (np.abs(Q) <= f)).all() and (found.moves[~stays] == np.sign(Q[~stays])).all()
-    whole = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=10.0)))
-    assert (whole.moves == 0).all() and len(whole.held) == 1 and all(each.held for each in whole.found)
+    assert len(equilibria.held) == 2 and equilibria.proven
+    assert all(lower.theta_2 < upper.theta_2 for lower, upper in equilibria.held)
+    stays = equilibria.moves == 0
+    Q = -M * 9.81 * R * np.cos(equilibria.positions.theta_2 + 0.3)
+    assert (stays == (np.abs(Q) <= f)).all() and (equilibria.moves[~stays] == np.sign(Q[~stays])).all()
+    stuck = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=10.0)))
+    assert (stuck.moves == 0).all() and len(stuck.held) == 1 and all(rest.held for rest in stuck.found)
 
 
 @pytest.mark.slow
 def test_loaded_friction_holds_up_to_where_no_torque_is_needed_to_move() -> None:
     scene = fourbar.load(MODELS / "crank_rocker.toml")
     scene = replace(scene, loads=(), effects=(DOWN, PinFriction.at(O2=(0.2, 0.01), A=(0.1, 0.01), O4=(0.2, 0.02))))
-    found = equilibrium(scene)
-    assert found.proven and len(found.held) == 2
-    for ends in found.held:
+    equilibria = equilibrium(scene)
+    assert equilibria.proven and len(equilibria.held) == 2
+    for ends in equilibria.held:
         theta = np.array([end.theta_2 for end in ends])
-        at = fourbar.scene.Command(theta, np.array([end.branch for end in ends], dtype=np.int8), 0.0, 0.0)
-        torques = fourbar.solve(scene, at=at)
+        command = fourbar.scene.Command(theta, np.array([end.branch for end in ends], dtype=np.int8), 0.0, 0.0)
+        torques = fourbar.solve(scene, at=command)
         assert torques.torque_high is not None and torques.torque_low is not None
-        size = np.abs(found.positions.torque).max()
+        size = np.abs(equilibria.positions.torque).max()
         assert min(abs(torques.torque_low[0]), abs(torques.torque_high[0])) <= 1e-9 * size
         assert min(abs(torques.torque_low[1]), abs(torques.torque_high[1])) <= 1e-9 * size
 
@@ -164,8 +164,11 @@ def test_beside_a_change_point_nothing_is_taken_for_a_rest(lengths: tuple[float,
     d, a, b, c = lengths
     for turn in (0.0, 0.3, 2.0):
         linkage = FourBar(d, Bar(a, 50.0, None, (1.2, 2.4)), Bar(b, 1.0), Bar(c, 6.0), turn)
-        found = equilibrium(Scene(linkage, Motion(1.0 + turn), effects=(Gravity(9.81, turn - 1.9),)))
-        assert found.proven and sorted(each.stability for each in found.found) == ["stable"] * 2 + ["unstable"] * 2
+        equilibria = equilibrium(Scene(linkage, Motion(1.0 + turn), effects=(Gravity(9.81, turn - 1.9),)))
+        assert (
+            equilibria.proven
+            and sorted(rest.stability for rest in equilibria.found) == ["stable"] * 2 + ["unstable"] * 2
+        )
 
 
 def test_what_has_no_answer_says_so() -> None:
@@ -186,25 +189,25 @@ def test_what_has_no_answer_says_so() -> None:
 
 
 def test_a_load_on_a_bar_that_rests_is_indifferent_in_one_way_of_moving_alone() -> None:
-    found = equilibrium(fourbar.load(MODELS / "textbook" / "gtdynamics_square.toml"))
-    assert found.proven and found.indifferent and not found.found
-    assert {end.branch for ends in found.indifferent for end in ends} & {1, -1}
+    equilibria = equilibrium(fourbar.load(MODELS / "textbook" / "gtdynamics_square.toml"))
+    assert equilibria.proven and equilibria.indifferent and not equilibria.found
+    assert {end.branch for ends in equilibria.indifferent for end in ends} & {1, -1}
 
 
 def test_a_torsion_spring_is_searched_by_signs_and_its_half_turn_is_no_equilibrium() -> None:
     scene = crank_as_pendulum(Torsion.at(O2=(2.0, 0.5, 0.0)))
-    found = equilibrium(scene)
-    (rest,) = found.found
-    assert not found.proven and rest.stability == "stable"
+    equilibria = equilibrium(scene)
+    (rest,) = equilibria.found
+    assert not equilibria.proven and rest.stability == "stable"
     assert rest.place.theta_2 == pytest.approx(0.5 + 0.2, abs=1e-9)
     assert rest.frequency == pytest.approx(math.sqrt(2.0 / (INERTIA + M * R * R)) / (2 * math.pi), rel=1e-9)
 
 
 def test_a_sweep_bounds_the_search() -> None:
     sweep = crank_as_pendulum(DOWN, theta_2=Sweep(-3.0, 1.2, 30))
-    found = equilibrium(sweep)
-    assert [each.stability for each in found.found] == ["stable"] and len(found.positions) == 31
-    assert found.found[0].place.theta_2 == pytest.approx(-math.pi / 2 - 0.3, abs=CLOSE)
+    equilibria = equilibrium(sweep)
+    assert [rest.stability for rest in equilibria.found] == ["stable"] and len(equilibria.positions) == 31
+    assert equilibria.found[0].place.theta_2 == pytest.approx(-math.pi / 2 - 0.3, abs=CLOSE)
 
 
 def crossings(time: np.ndarray, angle: np.ndarray, middle: float) -> float:
@@ -241,15 +244,15 @@ def test_released_motions_swing_at_the_frequency() -> None:
 
 def test_released_ones_begin_to_move_as_stated() -> None:
     scene = fourbar.load(MODELS / "crank_rocker.toml")
-    found = equilibrium(replace(scene, effects=(*scene.effects, Friction.at(O2=0.2))))
-    chosen = range(7, len(found.positions), 40)
+    equilibria = equilibrium(replace(scene, effects=(*scene.effects, Friction.at(O2=0.2))))
+    chosen = range(7, len(equilibria.positions), 40)
     for i in chosen:
-        motion = Motion(float(found.positions.theta_2[i]), 0.0, free=Free(1e-2, 1))
+        motion = Motion(float(equilibria.positions.theta_2[i]), 0.0, free=Free(1e-2, 1))
         released = fourbar.solve(
             replace(scene, motion=motion, effects=(*scene.effects, Friction.at(O2=0.2))), "position"
         )
-        assert np.sign(released.theta_2[1] - released.theta_2[0]) == found.moves[i]
-    assert {*found.moves[list(chosen)].tolist()} >= {0} and len(set(found.moves.tolist())) == 3
+        assert np.sign(released.theta_2[1] - released.theta_2[0]) == equilibria.moves[i]
+    assert {*equilibria.moves[list(chosen)].tolist()} >= {0} and len(set(equilibria.moves.tolist())) == 3
 
 
 @pytest.mark.slow
@@ -260,9 +263,11 @@ def test_the_command_prints_what_python_finds(tmp_path: Path, capsys: pytest.Cap
     assert "0.759439193" in text and "proven to be all" in text and "stable" in text
     assert status(["equilibrium", str(file), "--json", "-o", str(tmp_path / "rest.json")]) == 0
     kept = json.loads((tmp_path / "rest.json").read_text())
-    found = equilibrium(fourbar.load(file))
-    assert [each["place"]["theta_2"] for each in kept["equilibria"]] == [each.place.theta_2 for each in found.found]
-    assert kept["proven"] and kept["positions"]["theta_2"] == found.positions.theta_2.tolist()
+    equilibria = equilibrium(fourbar.load(file))
+    assert [rest["place"]["theta_2"] for rest in kept["equilibria"]] == [
+        rest.place.theta_2 for rest in equilibria.found
+    ]
+    assert kept["proven"] and kept["positions"]["theta_2"] == equilibria.positions.theta_2.tolist()
     friction = MODELS.parent / "tests" / "counterexamples" / "dry_friction_on_a_crank_at_rest.toml"
     assert status(["equilibrium", str(friction)]) == 0
     printed = capsys.readouterr().out
@@ -282,13 +287,13 @@ def test_the_command_prints_what_python_finds(tmp_path: Path, capsys: pytest.Cap
 @pytest.mark.parametrize("unit", [1e-9, 1e120])
 def test_no_unit_of_length_changes_an_equilibrium(unit: float) -> None:
     bars = [Bar(x * unit, M, 1e-3 * unit * unit) for x in (0.1, 0.25, 0.22)]
-    found = equilibrium(Scene(FourBar(0.3 * unit, *bars, 0.2), Motion(0.7), effects=(DOWN,)))  # type: ignore[misc]
+    equilibria = equilibrium(Scene(FourBar(0.3 * unit, *bars, 0.2), Motion(0.7), effects=(DOWN,)))  # type: ignore[misc]
     bars = [Bar(x, M, 1e-3) for x in (0.1, 0.25, 0.22)]
     same = equilibrium(Scene(FourBar(0.3, *bars, 0.2), Motion(0.7), effects=(DOWN,)))  # type: ignore[misc]
-    assert found.proven and len(found.found) == len(same.found) == 2
-    for one_of, other in zip(found.found, same.found, strict=True):
-        assert one_of.place == pytest.approx(other.place, abs=CLOSE)
-        assert one_of.slope / unit == pytest.approx(other.slope, rel=1e-9)
+    assert equilibria.proven and len(equilibria.found) == len(same.found) == 2
+    for rest, in_metres in zip(equilibria.found, same.found, strict=True):
+        assert rest.place == pytest.approx(in_metres.place, abs=CLOSE)
+        assert rest.slope / unit == pytest.approx(in_metres.slope, rel=1e-9)
 
 
 def test_a_zero_that_falls_on_a_sample_is_found_by_signs_too() -> None:
@@ -309,13 +314,13 @@ def test_another_command_has_the_equilibria_of_the_positions_that_it_passes(name
     swept = {"theta_3": (1.0, 1.25), "theta_4": (1.95, 2.4), "stroke": (0.17, 0.3)}[name]
     side: dict[str, Any] = {"side": "left"} if name == "stroke" else {"branch": -1}
     motion = Motion(**{name: Sweep(*swept, 90)}, **side)
-    own = crank_rocker(motion=motion, effects=(fourbar.Gravity(),), drive=DRIVE)
-    theta_2 = fourbar.solve(own).theta_2
-    same = replace(own, motion=Motion(Sweep(float(theta_2.min()), float(theta_2.max()), 90)))
-    found, known = equilibrium(own), equilibrium(same)
-    assert len(known.found) == len(found.found) > 0 and found.proven
-    for one, other in zip(found.found, known.found, strict=True):
-        assert one.place == pytest.approx(other.place) and one.frequency == pytest.approx(other.frequency)
-    single = replace(own, motion=Motion(**{name: swept[0]}, **side))
-    whole = replace(own, motion=Motion(float(theta_2[0])))
-    assert len(equilibrium(single).found) == len(equilibrium(whole).found) > 0
+    commanded = crank_rocker(motion=motion, effects=(fourbar.Gravity(),), drive=DRIVE)
+    theta_2 = fourbar.solve(commanded).theta_2
+    same = replace(commanded, motion=Motion(Sweep(float(theta_2.min()), float(theta_2.max()), 90)))
+    equilibria, by_input = equilibrium(commanded), equilibrium(same)
+    assert len(by_input.found) == len(equilibria.found) > 0 and equilibria.proven
+    for rest, same_rest in zip(equilibria.found, by_input.found, strict=True):
+        assert rest.place == pytest.approx(same_rest.place) and rest.frequency == pytest.approx(same_rest.frequency)
+    single = replace(commanded, motion=Motion(**{name: swept[0]}, **side))
+    single_input = replace(commanded, motion=Motion(float(theta_2[0])))
+    assert len(equilibrium(single).found) == len(equilibrium(single_input).found) > 0

@@ -109,8 +109,8 @@ def wrapped(x: Any) -> Any:
     return (x + np.pi) % (2.0 * np.pi) - np.pi
 
 
-def on_line(one: int, other: int) -> Scene:
-    line = LinearDrive(SpringEnd(one, 0.1, 1.0), SpringEnd(other, 0.1, -1.0))
+def on_line(start_bar: int, end_bar: int) -> Scene:
+    line = LinearDrive(SpringEnd(start_bar, 0.1, 1.0), SpringEnd(end_bar, 0.1, -1.0))
     return replace(LOADED, drive_bar=None, drive=line)
 
 
@@ -123,7 +123,7 @@ def on_stroke(bar: int, side: str, length: float) -> Scene:
 STROKES = {"stroke of bar 2": on_stroke(2, "left", 0.35), "stroke of bar 4": on_stroke(4, "right", 0.5)}
 SCENES = {
     **{f"bar {bar}": replace(LOADED, drive_bar=bar, motion=Motion(ANGLES, 8.0, 3.0)) for bar in (2, 3, 4)},
-    **{f"line from {one} to {other}": on_line(one, other) for one, other in ((1, 3), (1, 4), (2, 4))},
+    **{f"line from {start} to {end}": on_line(start, end) for start, end in ((1, 3), (1, 4), (2, 4))},
     "theta_3": replace(LOADED, motion=Motion(theta_3=0.6, omega_3=2.0), loads=(), drive_bar=4),
     "theta_4": replace(LOADED, motion=Motion(theta_4=2.2, omega_4=-1.0, alpha_4=2.0), loads=(), drive_bar=3),
     **STROKES,
@@ -137,11 +137,11 @@ def test_every_quantity_is_that_of_solve(library: Library, name: str) -> None:
     quantities = [quantity for quantity in EVERY if scene.drive is None or quantity != "torque"]
     quantities += [] if scene.drive is None else LINE_QUANTITIES[:4]
     f = function(scene, ["lengths.coupler", "effects.gravity.0", command_key(scene)], quantities)
-    found, solution = library.jit(f)(*map(library.array, (0.25, 9.81, scene.motion.angle))), fourbar.solve(scene)
-    assert set(found) == set(quantities)
+    values, solution = library.jit(f)(*map(library.array, (0.25, 9.81, scene.motion.angle))), fourbar.solve(scene)
+    assert set(values) == set(quantities)
     for quantity in quantities:
         theirs = of_solution(solution, quantity)
-        gap = np.reshape(found[quantity], theirs.shape) - theirs
+        gap = np.reshape(values[quantity], theirs.shape) - theirs
         gap = wrapped(gap) if quantity.startswith("theta") else gap
         assert np.abs(gap).max() <= ROUNDED * max(1.0, np.abs(theirs).max()), quantity
 
@@ -154,7 +154,7 @@ def test_a_stroke_that_the_cylinder_cannot_have_leaves_the_others_their_derivati
     scene, keys, quantities = STROKES[name], ["motion.stroke", "drive.to.at.0"], ["drive_force", "alpha_3", "condition"]
     slopes, strokes = fourbar.sensitivity(scene), np.array([0.01, scene.motion.angle, 3.0])
     f, jacobian = function(scene, keys, quantities), jacobian_of(library)
-    found = library.jit(f)(library.array(strokes), library.array(-0.12))
+    at_strokes = library.jit(f)(library.array(strokes), library.array(-0.12))
 
     def summed(x: Any) -> Any:
         values = f(x[0] + library.array(strokes), x[1] + library.array(-0.12))
@@ -162,7 +162,7 @@ def test_a_stroke_that_the_cylinder_cannot_have_leaves_the_others_their_derivati
 
     by = library.jit(jacobian(summed))(library.array([0.0, 0.0]))
     for quantity in quantities:
-        assert np.isnan(np.asarray(found[quantity])).tolist() == [True, False, True]
+        assert np.isnan(np.asarray(at_strokes[quantity])).tolist() == [True, False, True]
         exact = [slopes.of(quantity, key)[0] for key in keys]
         assert np.asarray(by[quantity]) == pytest.approx(exact, rel=ROUNDED)
 
@@ -203,8 +203,8 @@ def test_derivatives_keep_their_digits_beside_half_a_turn(library: Library, moti
     key, wanted = command_key(scene), fourbar.sensitivity(scene)
     f = function(scene, [key], ["torque", "A", "alpha_3"])
     for transform in {library.jacrev, jacobian_of(library)}:
-        found = transform(f)(library.array(motion.angle))
-        for name, slope in found.items():
+        slopes = transform(f)(library.array(motion.angle))
+        for name, slope in slopes.items():
             exact = wanted.of(name, key)[0]
             assert np.abs(np.asarray(slope) - exact).max() <= ROUNDED * np.abs(exact).max(), name
 
@@ -235,12 +235,12 @@ def test_positions_that_do_not_close_leave_the_others_their_derivatives(library:
     assert 10 < closes.sum() < 50
     assert (closes == (fourbar.solve(fourbar.vary(scene, {"motion.theta_2": angles})).status_code[0] == 0)).all()
 
-    def total(lengths: Any, at: Any) -> Any:
-        found = f(lengths[0], lengths[1], library.array(at))
-        return sum(library.xp.nansum(value**2) for value in found.values())
+    def total(lengths: Any, theta_2: Any) -> Any:
+        values = f(lengths[0], lengths[1], library.array(theta_2))
+        return sum(library.xp.nansum(value**2) for value in values.values())
 
     lengths = library.array([0.3, 0.25])
-    of_all, of_closed = (np.asarray(library.grad(total)(lengths, at)) for at in (angles, angles[closes]))
+    of_all, of_closed = (np.asarray(library.grad(total)(lengths, theta_2)) for theta_2 in (angles, angles[closes]))
     assert np.isfinite(of_all).all() and of_all == pytest.approx(of_closed, rel=1e-12)
     assert (np.asarray(library.grad(total)(library.array([3.0, 0.25]), angles)) == 0.0).all()
     assert (np.asarray(library.grad(total)(library.array([-1.0, np.nan]), angles)) == 0.0).all()
@@ -251,10 +251,10 @@ def test_mapped_over_linkages_as_vary(library: Library) -> None:
     lengths = np.linspace(0.05, 0.9, 10_000)
     solution = fourbar.solve(fourbar.vary(LOADED, {"lengths.input": lengths}))
     f = function(LOADED, ["lengths.input"], ["torque", "F43"])
-    found = library.vmap(f)(library.array(lengths))
+    mapped = library.vmap(f)(library.array(lengths))
     closes = solution.status_code[:, 0] == 0
     assert 0 < closes.sum() < len(lengths)
-    for name, value in found.items():
+    for name, value in mapped.items():
         ours, theirs = np.asarray(value), getattr(solution, name)[:, 0]
         assert (np.isfinite(ours).reshape(len(ours), -1).all(axis=1) == closes).all()
         # beside a limit each library's rounding of a sine is amplified: 1/sin^2 of the transmission angle
@@ -268,14 +268,14 @@ def test_derivatives_are_mapped_over_linkages_and_positions(library: Library) ->
     """In a table's piece too, which a transformed index looks up."""
     f = function(LOADED, ["lengths.input", "motion.theta_2"], ["torque"])
     pairs = np.array([[0.1, 0.5], [0.11, 4.0]])
-    found = library.jit(library.vmap(library.grad(lambda x: f(x[0], x[1])["torque"])))(library.array(pairs))
+    mapped = library.jit(library.vmap(library.grad(lambda x: f(x[0], x[1])["torque"])))(library.array(pairs))
     one = library.jit(library.vmap(library.grad(lambda a: f(a, 4.0)["torque"])))(library.array([0.1, 0.11]))
-    for row, (a, theta) in zip(np.asarray(found), pairs, strict=True):
+    for row, (a, theta) in zip(np.asarray(mapped), pairs, strict=True):
         linkage = replace(LOADED.linkage, input=replace(LOADED.linkage.input, length=a))
         slopes = fourbar.sensitivity(replace(LOADED, linkage=linkage, motion=Motion(theta, 8.0, 3.0)))
         exact = [slopes.of("torque", key)[0] for key in ("lengths.input", "motion.theta_2")]
         assert row == pytest.approx(exact, rel=ROUNDED)
-    assert float(one[1]) == pytest.approx(float(found[1, 0]), rel=ROUNDED)
+    assert float(one[1]) == pytest.approx(float(mapped[1, 0]), rel=ROUNDED)
 
 
 @pytest.mark.nightly
@@ -284,7 +284,7 @@ def test_numbers_of_the_scene_go_to_the_device_of_the_values() -> None:
     torch = pytest.importorskip("torch")
     pytest.importorskip("array_api_compat")
     f = function(replace(LOADED, motion=Motion(ANGLES, 8.0)), ["lengths.input"], EVERY)
-    assert {of.device.type for of in f(torch.tensor(0.1, device="meta")).values()} == {"meta"}
+    assert {value.device.type for value in f(torch.tensor(0.1, device="meta")).values()} == {"meta"}
 
 
 NO_VALUE = {
@@ -300,8 +300,8 @@ def test_where_solve_has_no_value_there_is_none(library: Library, status: str) -
     scene = NO_VALUE[status]
     assert fourbar.solve(scene).status == [status]
     for make in (float, np.array, library.array):
-        found = function(scene, ["motion.theta_2"], ["power", "theta_4", "F32"])(make(2.0))
-        assert np.isnan(float(found["power"])) and np.isfinite(float(found["theta_4"]))
+        values = function(scene, ["motion.theta_2"], ["power", "theta_4", "F32"])(make(2.0))
+        assert np.isnan(float(values["power"])) and np.isfinite(float(values["theta_4"]))
 
 
 @pytest.mark.slow
@@ -311,19 +311,19 @@ def test_a_lever_that_only_rounding_leaves_holds_nothing(library: Library) -> No
     scene = replace(LOADED, linkage=uniform(0.24491877, 0.24491877, 0.10712378, 0.10712378), motion=motion)
     assert set(fourbar.solve(scene).status) == {"no_torque"}
     f = library.jit(function(scene, ["lengths.input"], ["F43", "torque", "theta_3"]))
-    found = f(library.array(0.24491877))
-    assert np.isnan(np.asarray(found["torque"])).all() and np.isnan(np.asarray(found["F43"])).all()
-    assert np.isfinite(np.asarray(found["theta_3"])).all()
+    values = f(library.array(0.24491877))
+    assert np.isnan(np.asarray(values["torque"])).all() and np.isnan(np.asarray(values["F43"])).all()
+    assert np.isfinite(np.asarray(values["theta_3"])).all()
 
 
 @pytest.mark.slow
 def test_single_precision_stays_single(library: Library) -> None:
     f = function(LOADED, ["lengths.input", "motion.theta_2"], ["torque"])
     kind = library.xp.float32
-    found = f(library.xp.asarray(0.1, dtype=kind), library.xp.asarray(ANGLES, dtype=kind))["torque"]
-    assert found.dtype == kind
+    single = f(library.xp.asarray(0.1, dtype=kind), library.xp.asarray(ANGLES, dtype=kind))["torque"]
+    assert single.dtype == kind
     exact = f(0.1, ANGLES)["torque"]
-    assert np.abs(np.asarray(found) - exact).max() <= 1e-5 * np.abs(exact).max()  # some 80 of its roundings
+    assert np.abs(np.asarray(single) - exact).max() <= 1e-5 * np.abs(exact).max()  # some 80 of its roundings
 
 
 def test_scenes_state_the_positions_and_shapes_are_broadcast() -> None:
@@ -355,15 +355,15 @@ def test_what_cannot_be_traced_is_refused_when_the_function_is_made(key: str) ->
 
 
 @pytest.mark.parametrize(
-    ("keys", "quantities", "named"),
+    ("keys", "quantities", "key"),
     [(["lengths.inptu"], ["torque"], "lengths.inptu"), (["lengths.input"], ["torqe"], "quantities"),
      (["motion.branch"], ["torque"], "motion.branch"), ([], ["torque"], "keys"), ("lengths.input", ["torque"], "keys"),
      (["lengths.input"] * 2, ["torque"], "keys"), (["lengths.input"], ["torque_error"], "quantities")],
 )  # fmt: skip
-def test_unknown_keys_and_quantities(keys: Any, quantities: Any, named: str) -> None:
+def test_unknown_keys_and_quantities(keys: Any, quantities: Any, key: str) -> None:
     with pytest.raises(InputError) as error:
         function(LOADED, keys, quantities)
-    assert error.value.key == named and "\n" not in str(error.value)
+    assert error.value.key == key and "\n" not in str(error.value)
 
 
 class Poor:

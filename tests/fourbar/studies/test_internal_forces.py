@@ -25,54 +25,54 @@ def solved(scene: fourbar.Scene, bar: int, stations: object = None) -> object:
 def test_a_force_across_the_coupler_bends_it_as_a_beam_on_two_supports() -> None:
     """P a b/L under a load P at a from one end: sagging to the right of the bar, which is clockwise before it."""
     load = fourbar.Load(3, (8.0, math.radians(-90.0)), (0.05, math.pi), frame="bar")  # 75 mm from A
-    found = solved(fourbar.Scene(BARE, AT, loads=(load,)), 3, [0.0, 0.03, 0.08, 0.1, 0.25])
+    internal = solved(fourbar.Scene(BARE, AT, loads=(load,)), 3, [0.0, 0.03, 0.08, 0.1, 0.25])
     M = 8.0 * np.array([0.0, 0.03 * 0.175, 0.075 * 0.17, 0.075 * 0.15, 0.0]) / 0.25
-    np.testing.assert_allclose(found.M[0], M, atol=1e-14)
-    np.testing.assert_allclose(found.V[0], [5.6, 5.6, -2.4, -2.4, 0.0], atol=1e-13)
-    assert found.largest.moment[0] == pytest.approx(8.0 * 0.075 * 0.175 / 0.25) and found.uniform
-    assert found.largest.x[0] == pytest.approx(0.075)
+    np.testing.assert_allclose(internal.M[0], M, atol=1e-14)
+    np.testing.assert_allclose(internal.V[0], [5.6, 5.6, -2.4, -2.4, 0.0], atol=1e-13)
+    assert internal.largest.moment[0] == pytest.approx(8.0 * 0.075 * 0.175 / 0.25) and internal.uniform
+    assert internal.largest.x[0] == pytest.approx(0.075)
 
 
 def test_a_couple_on_the_output_jumps_where_it_acts() -> None:
     load = fourbar.Load(4, None, (0.06, math.pi), moment=3.0, frame="bar")  # 50 mm from O4
-    found = solved(fourbar.Scene(BARE, AT, loads=(load,)), 4, [0.049999, 0.05, 0.1])
-    before, at = found.M[0, :2]
-    assert before - at == pytest.approx(3.0, rel=1e-4) and found.V[0, 0] == pytest.approx(found.V[0, 2])
-    assert max(abs(before), abs(at)) == pytest.approx(abs(found.largest.moment[0]), rel=1e-4)
+    internal = solved(fourbar.Scene(BARE, AT, loads=(load,)), 4, [0.049999, 0.05, 0.1])
+    before, after = internal.M[0, :2]
+    assert before - after == pytest.approx(3.0, rel=1e-4) and internal.V[0, 0] == pytest.approx(internal.V[0, 2])
+    assert max(abs(before), abs(after)) == pytest.approx(abs(internal.largest.moment[0]), rel=1e-4)
 
 
 def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight() -> None:
     """w L^2/8 in the middle of a uniform bar on two pins, w its weight per metre across the bar."""
     linkage = replace(BARE, coupler=fourbar.Bar(0.25, 2.0))
     scene = fourbar.Scene(linkage, AT, effects=(fourbar.Gravity(9.81),))
-    found, theta = solved(scene, 3), fourbar.solve(scene).theta_3[0]
+    internal, theta = solved(scene, 3), fourbar.solve(scene).theta_3[0]
     w = 2.0 / 0.25 * 9.81 * math.cos(theta)
-    assert found.uniform and found.x[20] == pytest.approx(0.125)
-    assert found.M[0, 20] == pytest.approx(w * 0.25**2 / 8.0) == pytest.approx(found.largest.moment[0])
-    assert found.largest.x[0] == pytest.approx(0.125)
+    assert internal.uniform and internal.x[20] == pytest.approx(0.125)
+    assert internal.M[0, 20] == pytest.approx(w * 0.25**2 / 8.0) == pytest.approx(internal.largest.moment[0])
+    assert internal.largest.x[0] == pytest.approx(0.125)
     at_G = replace(linkage, coupler=fourbar.Bar(0.25, 2.0, centre=(0.125, 0.0)))
-    other = solved(replace(scene, linkage=at_G), 3)
-    assert not other.uniform and other.M[0, 20] == pytest.approx(w * 0.25**2 / 4.0)
+    concentrated = solved(replace(scene, linkage=at_G), 3)
+    assert not concentrated.uniform and concentrated.M[0, 20] == pytest.approx(w * 0.25**2 / 4.0)
 
 
 def test_a_crank_that_turns_is_pulled_by_its_own_mass() -> None:
     """N = m omega^2 (L^2 - x^2)/(2 L), and nothing bends it where nothing else acts."""
     scene = fourbar.Scene(replace(BARE, input=fourbar.Bar(0.1, 3.0)), fourbar.Motion(1.0, 20.0))
-    found = solved(scene, 2, np.linspace(0.0, 0.099, 5))
-    expected = 3.0 * 20.0**2 * (0.1**2 - found.x**2) / (2.0 * 0.1)
-    np.testing.assert_allclose(found.N[0], expected, rtol=ROUNDED)
-    assert np.abs(found.M).max() < 1e-13
+    internal = solved(scene, 2, np.linspace(0.0, 0.099, 5))
+    expected = 3.0 * 20.0**2 * (0.1**2 - internal.x**2) / (2.0 * 0.1)
+    np.testing.assert_allclose(internal.N[0], expected, rtol=ROUNDED)
+    assert np.abs(internal.M).max() < 1e-13
 
 
 def test_a_bar_that_speeds_up_bends_by_its_inertia() -> None:
     """The torque of the drive at O2 is the moment there: m L^2 alpha/3, and V falls to nothing at A."""
     scene = fourbar.Scene(replace(BARE, input=fourbar.Bar(0.1, 3.0)), fourbar.Motion(1.0, 0.0, 50.0))
-    found = solved(scene, 2, [0.0, 0.05, 0.1])
+    internal = solved(scene, 2, [0.0, 0.05, 0.1])
     torque = fourbar.solve(scene).torque[0]
-    assert torque == pytest.approx(3.0 * 0.1**2 * 50.0 / 3.0) and found.M[0, 0] == pytest.approx(-torque)
+    assert torque == pytest.approx(3.0 * 0.1**2 * 50.0 / 3.0) and internal.M[0, 0] == pytest.approx(-torque)
     m, x = 3.0 * 50.0 / 0.1, 0.05
-    assert found.V[0, 1] == pytest.approx(m * (0.1**2 - x**2) / 2.0)
-    assert found.M[0, 1] == pytest.approx(-m * (0.1**3 / 3.0 - 0.1**2 * x / 2.0 + x**3 / 6.0))
+    assert internal.V[0, 1] == pytest.approx(m * (0.1**2 - x**2) / 2.0)
+    assert internal.M[0, 1] == pytest.approx(-m * (0.1**3 / 3.0 - 0.1**2 * x / 2.0 + x**3 / 6.0))
 
 
 EVERYTHING = (
@@ -111,9 +111,9 @@ def test_what_cannot_be_is_refused_and_what_has_no_forces_is_nan() -> None:
     with pytest.raises(InputError, match="stations"):
         fourbar.internal_forces(moving, fourbar.solve(moving), 2, [math.inf])  # type: ignore[arg-type]
     open_ = crank_rocker(motion=fourbar.Motion(theta_4=np.array([0.2, 2.0]), omega_4=1.0))
-    found = fourbar.internal_forces(open_, fourbar.solve(open_), 3)
-    assert np.isnan(found.M[0]).all() and np.isfinite(found.M[1]).all()
-    assert np.isnan(found.largest.moment[0]) and np.isfinite(found.largest.moment[1])
+    internal = fourbar.internal_forces(open_, fourbar.solve(open_), 3)
+    assert np.isnan(internal.M[0]).all() and np.isfinite(internal.M[1]).all()
+    assert np.isnan(internal.largest.moment[0]) and np.isfinite(internal.largest.moment[1])
 
 
 def test_feet_that_differ_by_rounding_are_one() -> None:

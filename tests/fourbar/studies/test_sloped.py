@@ -88,8 +88,8 @@ FORMULAS: list[tuple[Scene, float, float]] = [
         0.1,
     ),
     *[
-        (scene(linkage=FourBar(1.0, Bar(0.9, 1.0), Bar(0.8, 2.0), Bar(0.85, 1.5))), at, 0.05)
-        for at in np.arange(-3, 3, 0.1)
+        (scene(linkage=FourBar(1.0, Bar(0.9, 1.0), Bar(0.8, 2.0), Bar(0.85, 1.5))), theta_2, 0.05)
+        for theta_2 in np.arange(-3, 3, 0.1)
     ],
 ]
 
@@ -97,7 +97,7 @@ FORMULAS: list[tuple[Scene, float, float]] = [
 @pytest.fixture
 def compared(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[tuple[str, int], bool]]:
     """File and line of each comparison of balls: whether it was open once."""
-    found: dict[tuple[str, int], bool] = {}
+    decisions: dict[tuple[str, int], bool] = {}
 
     def noted(holds: Any, fails: Any) -> Any:
         mask, frame = true(holds, fails), sys._getframe(1)
@@ -109,21 +109,21 @@ def compared(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[tuple[str, int], 
         ):
             frame = frame.f_back
         place = "/".join(Path(frame.f_code.co_filename).parts[-2:]), frame.f_lineno
-        found[place] = found.get(place, False) or isinstance(mask, Undecided)
+        decisions[place] = decisions.get(place, False) or isinstance(mask, Undecided)
         return mask
 
     def of_one(mask: Any, x: Any, y: Any) -> Any:
         pairs = np.broadcast_arrays(sloped.take_values(x), sloped.take_values(y), mask.holds | mask.fails)
-        for one, other, known in zip(*pairs, strict=True):
-            differ = one - other != 0
-            assert known or not differ, "two forms of one number that differ"
+        for first, second, is_decided in zip(*pairs, strict=True):
+            differ = first - second != 0
+            assert is_decided or not differ, "two forms of one number that differ"
         return both(mask, x, y)
 
     true, both = sloped.decided, Undecided.of_one
     before, flint.ctx.prec = flint.ctx.prec, 128
     monkeypatch.setattr(sloped, "decided", noted)
     monkeypatch.setattr(Undecided, "of_one", of_one)
-    yield found
+    yield decisions
     flint.ctx.prec = before
 
 
@@ -133,34 +133,34 @@ def ufuncs() -> list[Any]:
 
 
 @pytest.mark.parametrize("function", ufuncs(), ids=lambda f: f.__name__)
-@pytest.mark.parametrize("of", STRADDLED, ids=str)
-def test_a_function_of_balls_holds_every_sample_or_refuses(function: Any, of: tuple[float, float]) -> None:
-    x = Sloped(np.array([flint.arb(*of)], dtype=object), np.array([[1]], dtype=object))
-    given = (x,) if function.nin == 1 else (x, 1.0)
+@pytest.mark.parametrize("ball", STRADDLED, ids=str)
+def test_a_function_of_balls_holds_every_sample_or_refuses(function: Any, ball: tuple[float, float]) -> None:
+    x = Sloped(np.array([flint.arb(*ball)], dtype=object), np.array([[1]], dtype=object))
+    arguments = (x,) if function.nin == 1 else (x, 1.0)
     try:
-        found = function(*given)
+        outcome = function(*arguments)
     except (TypeError, AttributeError):
         return
     with np.errstate(all="ignore"):
-        samples = function(np.linspace(of[0] - of[1], of[0] + of[1], SAMPLES), *given[1:])
-    if isinstance(found, Undecided):
-        assert (samples | ~found.holds).all() and (~samples | ~found.fails).all()
+        samples = function(np.linspace(ball[0] - ball[1], ball[0] + ball[1], SAMPLES), *arguments[1:])
+    if isinstance(outcome, Undecided):
+        assert (samples | ~outcome.holds).all() and (~samples | ~outcome.fails).all()
         with pytest.raises(LimitError):
-            bool(found)
+            bool(outcome)
         return
-    if not isinstance(found, Sloped):
-        assert found.dtype == bool and (samples == found).all()
+    if not isinstance(outcome, Sloped):
+        assert outcome.dtype == bool and (samples == outcome).all()
         return
     for sample in samples[np.isfinite(samples)].tolist():
-        assert found.values[0].overlaps(flint.arb(sample, ROUNDING))
+        assert outcome.values[0].overlaps(flint.arb(sample, ROUNDING))
 
 
-@pytest.mark.parametrize(("at", "jumps"), [(0.3, False), (0.0, True)])
-def test_both_sides_of_an_open_comparison_are_taken(at: float, jumps: bool) -> None:
+@pytest.mark.parametrize(("centre", "jumps"), [(0.3, False), (0.0, True)])
+def test_both_sides_of_an_open_comparison_are_taken(centre: float, jumps: bool) -> None:
     """np.where may jump, so no slope is known; select chooses between forms of one number."""
-    x = Sloped(np.array([flint.arb(at, 0.1)], dtype=object), np.array([[1]], dtype=object))
+    x = Sloped(np.array([flint.arb(centre, 0.1)], dtype=object), np.array([[1]], dtype=object))
     jump, same = np.where(x > 0.0, x + 1.0, -x), fourbar.formulas.arithmetic.select(x > 0.0, 2.0 * x, x + x)
-    assert jump.values[0].contains(at + 1.05) and jump.values[0].contains(0.05 - at) == jumps
+    assert jump.values[0].contains(centre + 1.05) and jump.values[0].contains(0.05 - centre) == jumps
     assert flint.arb(jump.slopes[0, 0]).is_finite() != jumps and same.slopes[0, 0] == 2
     with pytest.raises(TypeError):
         bool(x)
@@ -180,39 +180,39 @@ def test_every_effect_is_walked() -> None:
 @pytest.mark.parametrize("key", STRADDLING)
 def test_an_effect_is_bounded_over_its_decisions_or_refused(key: str, compared: dict[tuple[str, int], bool]) -> None:
     walked = 0
-    for each, at, radius in STRADDLING[key]:
+    for case, centre, radius in STRADDLING[key]:
         try:
-            require_provable(each)
+            require_provable(case)
         except InputError:
             continue
-        held(each, at, radius)
+        held(case, centre, radius)
         walked += 1
     assert walked in (0, len(STRADDLING[key]))
-    own = {place: was for place, was in compared.items() if place[0].startswith("effects/")}
-    assert all(own.values()), own
+    of_effects = {place: was for place, was in compared.items() if place[0].startswith("effects/")}
+    assert all(of_effects.values()), of_effects
 
 
 @pytest.mark.slow
 def test_the_formulas_are_bounded_over_their_decisions(compared: dict[tuple[str, int], bool]) -> None:
-    for each, at, radius in FORMULAS:
-        held(each, at, radius)
+    for case, centre, radius in FORMULAS:
+        held(case, centre, radius)
     held(*STRADDLING["flywheel"][0])
-    own = {place: was for place, was in compared.items() if not place[0].startswith("effects/")}
-    assert len(own) > 4 and all(own.values()), own
+    of_formulas = {place: was for place, was in compared.items() if not place[0].startswith("effects/")}
+    assert len(of_formulas) > 4 and all(of_formulas.values()), of_formulas
 
 
-def held(each: Scene, at: float, radius: float) -> None:
+def held(case: Scene, centre: float, radius: float) -> None:
     """Samples of the box lie in its balls, and in the bounds that the slopes give."""
     search = _Search.__new__(_Search)
-    search.arb, search.scene, search.boxes, search.branch = flint.arb, each, 0, 1.0
-    search.reach = {tolerance.key: tolerance.reach for tolerance in each.tolerances}
-    search.keys = [key for key in list_entries(each) if key in search.reach]
-    known, random = list_entries(each), np.random.default_rng(0)
+    search.arb, search.scene, search.boxes, search.branch = flint.arb, case, 0, 1.0
+    search.reach = {tolerance.key: tolerance.reach for tolerance in case.tolerances}
+    search.keys = [key for key in list_entries(case) if key in search.reach]
+    entries, random = list_entries(case), np.random.default_rng(0)
     with np.errstate(all="ignore"):
-        over = search.evaluate(np.array([flint.arb(at, radius)], dtype=object), None)
-        nominal = search.evaluate(np.array([flint.arb(at)], dtype=object), np.zeros((len(search.keys), 1)))
+        over = search.evaluate(np.array([flint.arb(centre, radius)], dtype=object), None)
+        nominal = search.evaluate(np.array([flint.arb(centre)], dtype=object), np.zeros((len(search.keys), 1)))
         part = random.choice([-1.0, 1.0, *random.uniform(-1.0, 1.0, 4)], (1 + len(search.keys), SAMPLES))
-        points = np.array([flint.arb(at) + radius * flint.arb(x) for x in part[0]], dtype=object)
+        points = np.array([flint.arb(centre) + radius * flint.arb(x) for x in part[0]], dtype=object)
         for name, samples in search.evaluate(points, part[1:]).items():
             tops = [search._bound(sign, over[name], nominal[name], 0, radius)[0] for sign in (1, -1)]
             for sample in samples.values:
@@ -220,13 +220,13 @@ def held(each: Scene, at: float, radius: float) -> None:
                 assert not sample > tops[0] and not -sample > tops[1], name
     part = part[:, -1]
     numbers = {
-        key: read_place(each, known[key].place) + search.reach[key] * x
+        key: read_place(case, entries[key].place) + search.reach[key] * x
         for key, x in zip(search.keys, part[1:], strict=True)
     }
     solution = fourbar.solve(
-        replace_numbers(each, numbers),
+        replace_numbers(case, numbers),
         at=fourbar.scene.Command(
-            np.array([at + radius * part[0]]),
+            np.array([centre + radius * part[0]]),
             np.ones(1, np.int8),
             numbers.get("motion.omega_2", 10.0),
             numbers.get("motion.alpha_2", 0.0),

@@ -25,54 +25,60 @@ QUASI = 0.02
 """Of a standard deviation from 2048 quasi-random samples: a random sample would scatter by 1/sqrt(2 N) = 0.016."""
 
 
-def spread(*given: Tolerance, samples: int = 2048, **motion: Any) -> Any:
+def spread(*stated: Tolerance, samples: int = 2048, **motion: Any) -> Any:
     linkage = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.5), Bar(0.22, 0.4))
-    of = Scene(linkage, Motion(**({"theta_2": Sweep(0.3, 6.0, 6), "omega_2": 10.0} | motion)), tolerances=given)
-    return tolerances(of, samples)
+    case = Scene(linkage, Motion(**({"theta_2": Sweep(0.3, 6.0, 6), "omega_2": 10.0} | motion)), tolerances=stated)
+    return tolerances(case, samples)
 
 
 def test_a_number_that_the_torque_is_proportional_to() -> None:
     omega = Tolerance("motion.omega_2", 0.3)  # the torque of inertia alone is proportional to its square
-    found = spread(omega)
-    torque = found.spreads["torque"]
+    study = spread(omega)
+    torque = study.spreads["torque"]
     size = np.abs(torque.nominal)
     np.testing.assert_allclose(np.fmax(np.abs(torque.least), np.abs(torque.greatest)), 1.0609 * size, rtol=1e-4)
     np.testing.assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
     np.testing.assert_allclose(torque.first_order, 2 * 0.03 / math.sqrt(3) * size, rtol=1e-12)
     np.testing.assert_allclose(torque.deviation, torque.first_order, rtol=QUASI)
-    np.testing.assert_allclose(found.spreads["theta_4"].deviation, 0.0, atol=1e-14)
-    assert not torque.parted.any() and found.apart == found.invalid == 0
+    np.testing.assert_allclose(study.spreads["theta_4"].deviation, 0.0, atol=1e-14)
+    assert not torque.parted.any() and study.apart == study.invalid == 0
 
 
 def test_samples_and_first_order_agree_where_it_is_straight_and_shares_are_those_of_the_samples() -> None:
     both = Tolerance("lengths.input", 5e-5), Tolerance("lengths.output", 2e-5, True)
-    found, alone = spread(*both), [spread(each) for each in both]
+    study, alone = spread(*both), [spread(tolerance) for tolerance in both]
     for name in ("torque", "|F12|", "F43_x", "theta_4"):
-        own = found.spreads[name]
-        np.testing.assert_allclose(own.deviation, own.first_order, rtol=QUASI)
-        for share, one in zip(own.shares, alone, strict=True):
+        of_both = study.spreads[name]
+        np.testing.assert_allclose(of_both.deviation, of_both.first_order, rtol=QUASI)
+        for share, one in zip(of_both.shares, alone, strict=True):
             np.testing.assert_allclose(np.sqrt(share), one.spreads[name].deviation, rtol=QUASI)
-        assert (own.least <= own.low).all() and (own.low < own.nominal).all() and (own.high <= own.greatest).all()
+        assert (
+            (of_both.least <= of_both.low).all()
+            and (of_both.low < of_both.nominal).all()
+            and (of_both.high <= of_both.greatest).all()
+        )
 
 
 def test_the_same_seed_gives_the_same_samples_in_blocks_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    given = Tolerance("lengths.input", 5e-5), Tolerance("lengths.coupler", 2e-5)
-    whole = spread(*given, samples=100)
+    loose = Tolerance("lengths.input", 5e-5), Tolerance("lengths.coupler", 2e-5)
+    at_once = spread(*loose, samples=100)
     monkeypatch.setattr(studied, "AT_ONCE", 200)
-    pieces = spread(*given, samples=100)
-    for name, own in whole.spreads.items():
-        for one, other in zip(own, pieces.spreads[name], strict=True):
-            np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12, err_msg=name)
+    pieces = spread(*loose, samples=100)
+    for name, in_one in at_once.spreads.items():
+        for expected, piece in zip(in_one, pieces.spreads[name], strict=True):
+            np.testing.assert_allclose(expected, piece, rtol=1e-12, atol=1e-12, err_msg=name)
 
 
 def test_members_that_come_apart_are_counted_and_first_order_is_not_trusted_there() -> None:
     linkage = uniform(0.2, 0.48, 0.55, 0.2)
     edge = fourbar.formulas.mobility.limit_positions(linkage)[0].theta_2
-    at = edge + 2e-4 * np.sign(fourbar.formulas.mobility.choose_range(linkage)[0] - edge)
-    of = Scene(linkage, Motion(np.array([at, at + 0.3]), 1.0), tolerances=(Tolerance("lengths.output", 2e-4),))
-    found = tolerances(of, 256)
-    assert 0 < found.apart == found.without[0] < 256 and found.without[1] == 0
-    assert found.spreads["torque"].parted.tolist() == [True, False]
+    theta_2 = edge + 2e-4 * np.sign(fourbar.formulas.mobility.choose_range(linkage)[0] - edge)
+    case = Scene(
+        linkage, Motion(np.array([theta_2, theta_2 + 0.3]), 1.0), tolerances=(Tolerance("lengths.output", 2e-4),)
+    )
+    study = tolerances(case, 256)
+    assert 0 < study.apart == study.without[0] < 256 and study.without[1] == 0
+    assert study.spreads["torque"].parted.tolist() == [True, False]
 
 
 def test_tolerances_of_a_file_come_back_as_they_were() -> None:
@@ -104,21 +110,21 @@ def test_a_bad_tolerance_is_one_line(line: str, words: str) -> None:
 
 
 def test_the_positions_at_which_first_order_fails_are_named_each() -> None:
-    found = SimpleNamespace(
+    study = SimpleNamespace(
         theta_2=np.radians(np.arange(0.0, 361.0, 5.0)),
         spreads={"torque": SimpleNamespace(parted=np.isin(np.arange(73), (0, 1, 9, 72)))},
     )
-    assert "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)" in describe_parted(found, "torque")  # type: ignore[arg-type]
+    assert "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)" in describe_parted(study, "torque")  # type: ignore[arg-type]
 
 
 def test_what_the_study_refuses() -> None:
-    for given, words in (
+    for stated, words in (
         ((), "states none"),
         ((Tolerance("lengths.x", 1.0),), "did you mean"),
         ((Tolerance("bars.input.inertia", 1.0),), "left out"),
     ):
         with pytest.raises(InputError, match=words):
-            spread(*given)
+            spread(*stated)
     for samples in (1, 2.5, 10**9):
         with pytest.raises(InputError, match="whole number"):
             spread(Tolerance("lengths.input", 1e-5), samples=samples)  # type: ignore[arg-type]
@@ -136,8 +142,8 @@ def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: pytest.Capt
     nominal = re.search(r"^torque +N m +\S+ +(\S+)", printed, re.M)
     assert status(["tolerance", str(scene), "--samples", "64", "--units", "N.mm rad"]) == 0
     rows = capsys.readouterr().out
-    other = re.search(r"^torque N mm +\S+ +(\S+)", rows, re.M)
-    assert nominal and other and float(other[1]) == pytest.approx(1000.0 * float(nominal[1]), rel=1e-5)
+    in_N_mm = re.search(r"^torque N mm +\S+ +(\S+)", rows, re.M)
+    assert nominal and in_N_mm and float(in_N_mm[1]) == pytest.approx(1000.0 * float(nominal[1]), rel=1e-5)
     assert re.search(r"unit +rad +nominal", rows)
     assert status(["tolerance", str(scene), "--samples", "64", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

@@ -75,18 +75,18 @@ def scene(effects: tuple[Any, ...] = (), drive: int = 2, **motion: Any) -> Scene
     return Scene(LINK, Motion(**({"theta_2": ANGLES, "omega_2": 3.0, "alpha_2": 0.5} | motion)), drive, LOADS, effects)
 
 
-def spread(of: Scene) -> dict[str, Any]:
+def spread(case: Scene) -> dict[str, Any]:
     """A random array for each key of RANGES that the scene has."""
-    random, known = np.random.default_rng(3), list_entries(of)
-    return {key: random.uniform(*ends, M) for key, ends in RANGES.items() if key in known}
+    random, entries = np.random.default_rng(3), list_entries(case)
+    return {key: random.uniform(*ends, M) for key, ends in RANGES.items() if key in entries}
 
 
-def alone(study: Study, given: dict[str, Any], member: int) -> Scene:
+def alone(study: Study, values: dict[str, Any], member: int) -> Scene:
     """The scene of one member, its numbers floats."""
-    one, known = study.scene, list_entries(study.scene)
-    for key in known:
-        if key in given:
-            one = replace_place(one, known[key].place, float(given[key][member]))
+    one, entries = study.scene, list_entries(study.scene)
+    for key in entries:
+        if key in values:
+            one = replace_place(one, entries[key].place, float(values[key][member]))
     return one
 
 
@@ -94,26 +94,26 @@ def alone(study: Study, given: dict[str, Any], member: int) -> Scene:
     ("effects", "drive", "stage"), [(DRIVEN, 4, "error"), (RUBBING, 2, "force"), (DRIVEN, 3, None), ((), 2, "position")]
 )
 def test_a_member_is_its_linkage_alone(effects: tuple[Any, ...], drive: int, stage: str | None) -> None:
-    whole = scene(effects, drive)
-    given = spread(whole)
-    study = vary(whole, given)
+    case = scene(effects, drive)
+    values = spread(case)
+    study = vary(case, values)
     solution = solve(study, stage)
     for member in range(M):
-        own = solve(alone(study, given, member), stage)
-        assert own.evaluated() == solution.evaluated()
-        assert solution.status[member] == own.status
-        for name in own.evaluated():
+        single = solve(alone(study, values, member), stage)
+        assert single.evaluated() == solution.evaluated()
+        assert solution.status[member] == single.status
+        for name in single.evaluated():
             array = getattr(solution, name)
             assert array.shape == ((M, len(ANGLES), 2) if name in VECTORS else (M, len(ANGLES)))
             if name.endswith("_error"):
-                np.testing.assert_allclose(array[member], getattr(own, name), rtol=BARS, err_msg=name)
+                np.testing.assert_allclose(array[member], getattr(single, name), rtol=BARS, err_msg=name)
             else:
-                np.testing.assert_array_equal(array[member], getattr(own, name), err_msg=name)
+                np.testing.assert_array_equal(array[member], getattr(single, name), err_msg=name)
 
 
 def test_blocks_over_members_and_positions_change_no_digit(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = scene(DRIVEN)
-    study = vary(whole, spread(whole))
+    case = scene(DRIVEN)
+    study = vary(case, spread(case))
     at_once = solve(study)
     for size in (3, 12):  # positions of one member, and members
         monkeypatch.setattr(import_module("fourbar.solve"), "BLOCK", size)
@@ -129,20 +129,20 @@ def test_angles_of_its_own_for_each_member_and_arrays_to_write_into() -> None:
     solution = solve(study, out=out)
     assert solution.torque is out["torque"] and solution.F12 is None
     for member, length in enumerate((0.1, 0.12)):
-        given = {"lengths.input": [length] * 2}
-        one = alone(study, given, 0)
-        own = solve(Scene(one.linkage, Motion(theta_2[member], 3.0, 0.5), 2, LOADS))
-        np.testing.assert_array_equal(out["torque"][member], own.torque)
-        np.testing.assert_array_equal(out["a_G3"][member], own.a_G3)
+        values = {"lengths.input": [length] * 2}
+        one = alone(study, values, 0)
+        single = solve(Scene(one.linkage, Motion(theta_2[member], 3.0, 0.5), 2, LOADS))
+        np.testing.assert_array_equal(out["torque"][member], single.torque)
+        np.testing.assert_array_equal(out["a_G3"][member], single.a_G3)
 
 
 def test_what_the_scene_leaves_out_follows_the_length() -> None:
     plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(1.0, 5.0), effects=(Gravity(),))
     solution = solve(vary(plain, {"lengths.coupler": [0.25, 0.28], "bars.coupler.mass": 0.5}))
     longer = FourBar(0.3, Bar(0.1, 0.1), Bar(0.28, 0.5), Bar(0.22, 0.22))
-    own = solve(Scene(longer, Motion(1.0, 5.0), effects=(Gravity(),)))
-    assert solution.torque is not None and own.torque is not None
-    assert solution.torque[1, 0] == pytest.approx(own.torque[0], rel=1e-14)
+    single = solve(Scene(longer, Motion(1.0, 5.0), effects=(Gravity(),)))
+    assert solution.torque is not None and single.torque is not None
+    assert solution.torque[1, 0] == pytest.approx(single.torque[0], rel=1e-14)
 
 
 def test_a_bad_member_has_a_status_and_disturbs_no_other() -> None:
@@ -159,19 +159,19 @@ def test_a_bad_member_has_a_status_and_disturbs_no_other() -> None:
 
 def test_a_law_and_a_path_through_change_points() -> None:
     law = Law((0.0, 0.5, 1.0), (0.0, 2.0, 6.0), 6, "rest")
-    given = {"lengths.input": np.array([0.1, 0.11])}
-    study = vary(Scene(LINK, Motion(law=law)), given)
+    values = {"lengths.input": np.array([0.1, 0.11])}
+    study = vary(Scene(LINK, Motion(law=law)), values)
     solution = solve(study)
-    np.testing.assert_array_equal(solution.torque[1], solve(alone(study, given, 1)).torque)  # type: ignore[index]
+    np.testing.assert_array_equal(solution.torque[1], solve(alone(study, values, 1)).torque)  # type: ignore[index]
     kite = Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(Sweep(2.0, 8.0, 8), 1.0, through="follow"))
-    for given in ({"lengths.input": np.array([0.1, 0.09])}, {"bars.coupler.mass": np.array([1.0, 2.0])}):
-        study = vary(kite, given)
+    for values in ({"lengths.input": np.array([0.1, 0.09])}, {"bars.coupler.mass": np.array([1.0, 2.0])}):
+        study = vary(kite, values)
         solution = solve(study)
         assert -1 in solution.branch[0]
         for member in (0, 1):
-            own = solve(alone(study, given, member))
-            np.testing.assert_array_equal(solution.branch[member], own.branch)
-            np.testing.assert_array_equal(solution.theta_4[member], own.theta_4)
+            single = solve(alone(study, values, member))
+            np.testing.assert_array_equal(solution.branch[member], single.branch)
+            np.testing.assert_array_equal(solution.theta_4[member], single.theta_4)
 
 
 REFUSED = {
@@ -209,9 +209,9 @@ def test_texts_with_units_are_the_numbers() -> None:
     texts = {"lengths.input": ["10 cm", "4 in", 0.1], "bars.coupler.centre.1": "180 deg", "effects.torsion.B.rest": 0.5}
     si = texts | {"lengths.input": [0.1, 0.1016, 0.1], "bars.coupler.centre.1": np.pi}
     theta: dict[str, Any] = {"motion.theta_2": [["10 deg", "0.5 rev"], [0.1, 0.2], ["1 rad", 0]]}
-    one, other = vary(scene, texts | theta), vary(scene, si)
-    assert all((one.values[key] == other.values[key]).all() for key in si)
-    assert (one.at.angle == [[np.radians(10.0), np.pi], [0.1, 0.2], [1.0, 0.0]]).all()
+    from_texts, from_si = vary(scene, texts | theta), vary(scene, si)
+    assert all((from_texts.values[key] == from_si.values[key]).all() for key in si)
+    assert (from_texts.at.angle == [[np.radians(10.0), np.pi], [0.1, 0.2], [1.0, 0.0]]).all()
     assert Tolerance("lengths.input", "0.1 mm") == Tolerance("lengths.input", 1e-4)  # type: ignore[arg-type]
     for key, text, words in (
         ("lengths.input", "1 deg", 'lengths.input = .*"deg" does not convert to m'),
@@ -226,9 +226,9 @@ def test_texts_with_units_are_the_numbers() -> None:
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_cannot_vary_is_refused_in_one_line(name: str) -> None:
-    given, words = REFUSED[name]
+    values, words = REFUSED[name]
     with pytest.raises(InputError) as caught:
-        vary(scene(), given)
+        vary(scene(), values)
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
