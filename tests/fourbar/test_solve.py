@@ -39,12 +39,12 @@ def solved(scene: Scene, stage: str | None = "error") -> Solution:
 def without_value(solution: Solution) -> dict[str, list[str]]:
     """Quantities that are no number at positions whose status is ok, with what stands there instead."""
     ok = solution.status_code == OK
-    found = {}
+    missing = {}
     for name in STAGE_OF:
         values = getattr(solution, name)
         if values is not None and not np.isfinite(values[ok]).all():
-            found[name] = [str(value) for value in values[ok]]
-    return found
+            missing[name] = [str(value) for value in values[ok]]
+    return missing
 
 
 magnitudes = st.floats(-320.0, 308.0).map(lambda exponent: 10.0**exponent) | st.sampled_from([0.0, 1.0])
@@ -91,7 +91,7 @@ def scenes(draw: st.DrawFn) -> Scene:
         ),
         st.builds(Spring, *ends, sizes.filter(bool), sizes, numbers).map(lambda spring: Springs((spring,))),
     ]
-    effects = [draw(each) for each in possible if draw(st.integers(0, 3)) == 0]
+    effects = [draw(strategy) for strategy in possible if draw(st.integers(0, 3)) == 0]
     theta_2 = linkage.ground_angle + np.array(draw(st.lists(angles, min_size=1, max_size=4)))
     omega_2 = draw(numbers.filter(lambda omega: math.isfinite(omega * omega)))
     motion = Motion(theta_2, omega_2, draw(numbers), draw(st.sampled_from([1, -1])))

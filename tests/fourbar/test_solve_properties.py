@@ -197,10 +197,10 @@ def test_mirror_symmetry(scene: Scene) -> None:
         ),
         effects=tuple(replace(e, angle=-e.angle) if isinstance(e, Gravity) else e for e in scene.effects),
     )
-    ours, other = fourbar.solve(scene), fourbar.solve(mirrored)
-    flipped = {name: value * (1.0, -1.0) for name, value in forces(other).items()}
-    same_forces(scene, ours, flipped, -float(other.torque[0]))
-    assert abs(math.remainder(float(ours.theta_4[0] + other.theta_4[0]), math.tau)) <= ROUND_OFF
+    ours, of_mirrored = fourbar.solve(scene), fourbar.solve(mirrored)
+    flipped = {name: value * (1.0, -1.0) for name, value in forces(of_mirrored).items()}
+    same_forces(scene, ours, flipped, -float(of_mirrored.torque[0]))
+    assert abs(math.remainder(float(ours.theta_4[0] + of_mirrored.theta_4[0]), math.tau)) <= ROUND_OFF
 
 
 @EXAMPLES
@@ -239,9 +239,9 @@ def test_length_mass_and_time_scale(scene: Scene, length: int, mass: int, time: 
             for e in scene.effects
         ),
     )
-    ours, other = fourbar.solve(scene), fourbar.solve(scaled)
-    back = {name: value / force for name, value in forces(other).items()}
-    same_forces(scene, ours, back, float(other.torque[0]) / torque)
+    ours, of_scaled = fourbar.solve(scene), fourbar.solve(scaled)
+    back = {name: value / force for name, value in forces(of_scaled).items()}
+    same_forces(scene, ours, back, float(of_scaled.torque[0]) / torque)
 
 
 @EXAMPLES
@@ -250,9 +250,9 @@ def test_forces_go_as_the_speed_squared(scene: Scene, times: float) -> None:
     """No loads, no gravity, constant omega_2."""
     slow = replace(scene, motion=scene.motion.replace(acceleration=0.0))
     fast = replace(slow, motion=slow.motion.replace(speed=times * slow.motion.omega_2))
-    ours, other = fourbar.solve(slow), fourbar.solve(fast)
-    back = {name: value / times**2 for name, value in forces(other).items()}
-    same_forces(slow, ours, back, float(other.torque[0]) / times**2)
+    ours, of_fast = fourbar.solve(slow), fourbar.solve(fast)
+    back = {name: value / times**2 for name, value in forces(of_fast).items()}
+    same_forces(slow, ours, back, float(of_fast.torque[0]) / times**2)
 
 
 @EXAMPLES
@@ -261,9 +261,9 @@ def test_time_reversal(scene: Scene) -> None:
     """Backwards through the same position: the same forces, without what depends on the sense of motion."""
     still = replace(scene, effects=tuple(e for e in scene.effects if isinstance(e, Gravity)))
     back = replace(still, motion=still.motion.replace(speed=-still.motion.omega_2))
-    ours, other = fourbar.solve(still), fourbar.solve(back)
-    same_forces(still, ours, forces(other), float(other.torque[0]))
-    assert float(ours.omega_4[0]) == -float(other.omega_4[0])
+    ours, of_back = fourbar.solve(still), fourbar.solve(back)
+    same_forces(still, ours, forces(of_back), float(of_back.torque[0]))
+    assert float(ours.omega_4[0]) == -float(of_back.omega_4[0])
 
 
 @EXAMPLES
@@ -283,12 +283,16 @@ def test_frame_rotation(scene: Scene, turn: float) -> None:
         ),
         effects=tuple(replace(e, angle=e.angle + turn) if isinstance(e, Gravity) else e for e in scene.effects),
     )
-    ours, other = fourbar.solve(scene), fourbar.solve(turned)
+    ours, of_turned = fourbar.solve(scene), fourbar.solve(turned)
     cosine, sine = math.cos(turn), math.sin(turn)
     matrix = np.array([[cosine, sine], [-sine, cosine]])
     # theta_1, theta_2 and their turn are rounded: some 10 eps of angle on top
     same_forces(
-        scene, ours, {k: matrix @ v for k, v in forces(other).items()}, float(other.torque[0]), factor=shape(scene)
+        scene,
+        ours,
+        {k: matrix @ v for k, v in forces(of_turned).items()},
+        float(of_turned.torque[0]),
+        factor=shape(scene),
     )
 
 
