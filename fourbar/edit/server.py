@@ -96,6 +96,8 @@ class Workbench:
 
     def take(self, line: "PageLine", asked: dict[str, Any]) -> None:
         """Put a request in the queue; a later one of the same gesture takes the place of one that waits."""
+        if self.ended.is_set():  # a page may go on sending while the server ends
+            return
         if asked.get("do") in ("check", "stop"):
             self.check.start(self.session.now.text) if asked["do"] == "check" else self.check.stop()
             self.tell({"for": asked.get("id")}, to=line)
@@ -156,6 +158,8 @@ class Workbench:
 
         try:
             data = await self.loop.run_in_executor(self.aside, evaluate)
+            if self.ended.is_set():
+                return
             about = data and await self.loop.run_in_executor(self.one, describe, data)
         except FourBarError as error:
             self.tell({"note": str(error)})
