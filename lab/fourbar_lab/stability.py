@@ -36,6 +36,8 @@ FULL = 10_000
 """Samples per family of the full set."""
 CHUNK = 250
 """Samples per task: about a second."""
+WIDE = 160
+"""Columns of text for the table of all families where no terminal limits them."""
 
 
 def solve_position(scene: Scene, angle: float) -> dict[str, Any]:
@@ -181,6 +183,8 @@ def stability(
     if library != "numpy" or derivatives:
         rows.append(("no digit tells", *(str(tallies[family].untold) for family in chosen)))
     console = Console()
+    if not console.is_terminal:  # in a file the columns of all families keep their width
+        console.width = WIDE
     of = ", of derivatives by every number" if derivatives else ""
     title = f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed {seed}, {library}{of}"
     console.print(make_table(("output", *chosen), rows, title=title))
