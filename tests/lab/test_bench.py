@@ -74,8 +74,8 @@ def test_what_is_missing_is_named_with_its_reason(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, peers.not_run))
     for variable in bench.ONE_THREAD:
         monkeypatch.setenv(variable, "1")
-    result = CliRunner().invoke(bench.bench, standalone_mode=False)
-    assert result.return_value == HOLDS and "not run: C: no C compiler is installed\n" in result.output
+    process = CliRunner().invoke(bench.bench, standalone_mode=False)
+    assert process.return_value == HOLDS and "not run: C: no C compiler is installed\n" in process.output
 
 
 @pytest.mark.parametrize("name", bench.LIMITS)
@@ -90,6 +90,6 @@ def test_what_is_beyond_its_limit_fails_with_the_reason(
     monkeypatch.setattr(bench, "measure", lambda *_: bench.Measured(rows, {}, {}, {}))
     for variable in bench.ONE_THREAD:
         monkeypatch.setenv(variable, "1")
-    result = CliRunner().invoke(bench.bench, standalone_mode=False)
-    assert result.return_value == (0 if spoiled is None else 1)
-    assert (f"fails: {name}: {limit.reason}" in result.output) == (spoiled is not None)
+    process = CliRunner().invoke(bench.bench, standalone_mode=False)
+    assert process.return_value == (0 if spoiled is None else 1)
+    assert (f"fails: {name}: {limit.reason}" in process.output) == (spoiled is not None)

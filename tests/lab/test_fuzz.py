@@ -84,7 +84,7 @@ def test_a_limit_off_by_a_billionth_is_found(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(
         fourbar.formulas.mobility,
         "limit_positions",
-        lambda *of: tuple(limit._replace(theta_4=limit.theta_4 + 1e-9) for limit in true(*of)),
+        lambda *arguments: tuple(limit._replace(theta_4=limit.theta_4 + 1e-9) for limit in true(*arguments)),
     )
     kinds = {finding.split(":")[0] for finding in examine.list_findings(scene)}
     assert kinds == {"pinocchio-inverse range", "pinocchio-inverse limit_positions"}
@@ -102,7 +102,7 @@ def test_a_force_that_vanishes_is_held_to_its_prediction(
     answer = engine.start().answer(scene, examine.command(scene))
     wrong = np.array([[times, 0.0]])
     answer.quantities["F12"] = wrong
-    held = Held(engine.tolerance, ("F12",), lambda quantity, where: np.ones(1))
+    held = Held(engine.tolerance, ("F12",), lambda quantity, mask: np.ones(1))
     rows = examine.Comparison("", scene, answer, solution, held).rows()
     assert [row.verdict == "fails" for row in rows if row.quantity == "F12"] == [found]
 
@@ -156,7 +156,7 @@ def dies_in_scene_2(seed: int, bounds: bool, index: int) -> list[str]:
     return []
 
 
-def watched(monkeypatch: pytest.MonkeyPatch, change: Any = lambda found: found) -> list[Extremes]:
+def watched(monkeypatch: pytest.MonkeyPatch, change: Any = lambda extremes: extremes) -> list[Extremes]:
     """The proofs that the search is held against, each changed."""
     proven, true = [], outside.extremes
 
@@ -198,12 +198,16 @@ def test_a_ball_that_decides_silently_is_found(monkeypatch: pytest.MonkeyPatch) 
     """A distance that may be 0 had 1 m added."""
 
     def act_silently(effect: spring.Springs, actions: Actions, state: State) -> None:
-        for each in effect.springs:
-            across = each.end.place(state) - each.start.place(state)
+        for tension_spring in effect.springs:
+            across = tension_spring.end.place(state) - tension_spring.start.place(state)
             distance = np.abs(across)
             if isinstance(distance, Sloped):
                 distance.values += np.array([float(ball.contains(0)) for ball in distance.values], dtype=object)
-            actions.pull(each.start, each.end, (each.stiffness + each.slack / distance) * across)
+            actions.pull(
+                tension_spring.start,
+                tension_spring.end,
+                (tension_spring.stiffness + tension_spring.slack / distance) * across,
+            )
 
     assert outside.list_findings(meeting(0.1005)) == []
     monkeypatch.setattr(spring.Springs, "act", act_silently)

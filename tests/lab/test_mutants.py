@@ -89,10 +89,10 @@ def test_few_mutants_may_be_missed_and_none_that_matters_is_no_success(
     verdicts: list[bool | None], status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     some = [harness.Mutant(str(n), lambda: None, (lambda: None).__code__) for n, _ in enumerate(verdicts)]  # type: ignore[arg-type]
-    each = iter(verdicts)
+    next_verdicts = iter(verdicts)
     monkeypatch.setattr(harness, "make_baselines", list)
     monkeypatch.setattr(harness, "compile_mutants", lambda _: some)
-    monkeypatch.setattr(harness, "judge_mutant", lambda *_: next(each))
+    monkeypatch.setattr(harness, "judge_mutant", lambda *_: next(next_verdicts))
     assert ended(["mutants", "--module", "torque"]) == status
     assert capsys.readouterr().out.count("not caught: ") == verdicts.count(False)
 

@@ -122,7 +122,7 @@ def test_a_derivative_that_is_left_out_is_a_failure(monkeypatch: pytest.MonkeyPa
 
     def lost(scene: fourbar.Scene) -> fourbar.Sensitivity:
         sensitivity = fourbar.sensitivity(scene)
-        by = {name: np.full_like(of, np.nan) for name, of in sensitivity.by.items()}
+        by = {name: np.full_like(slopes, np.nan) for name, slopes in sensitivity.by.items()}
         return replace(sensitivity, status=["no_torque"], by=by)
 
     def judged(scene: fourbar.Scene) -> Tally:

@@ -66,7 +66,14 @@ def why_not(core: str) -> str | None:
     if machine(core) == machine():
         return "it is what this process calculates with"
     before = list(CORES)[: list(CORES).index(core)]
-    twin = next((other for other in before if why_not(other) is None and machine(other) == machine(core)), None)
+    twin = next(
+        (
+            core_before
+            for core_before in before
+            if why_not(core_before) is None and machine(core_before) == machine(core)
+        ),
+        None,
+    )
     return twin and f"the same as {twin} here"
 
 

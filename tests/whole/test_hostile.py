@@ -91,8 +91,8 @@ def test_reports_hold_hostile_text_as_text(
     print_table(summary, out, verbose=True)
     shown = capsys.readouterr().out
     assert "[bold red]" in shown
-    for name, where in (("terminal", shown), ("markdown", markdown), ("html", html)):
-        assert not STEERING.search(where), (name, STEERING.findall(where))
+    for name, output in (("terminal", shown), ("markdown", markdown), ("html", html)):
+        assert not STEERING.search(output), (name, STEERING.findall(output))
     # nothing was written outside the requested folder
     assert {path.name for path in tmp_path.rglob("*") if path.is_dir()} == {"deep", "out"}
 

@@ -33,10 +33,10 @@ def of_commands() -> Iterator[str]:
 
 def of_python() -> Iterator[str]:
     page = runpy.run_path(str(API))
-    named = {name: getattr(fourbar, name) for name in fourbar.__all__ if name != "__version__"}
-    functions = [name for name, thing in named.items() if not inspect.isclass(thing)]
-    returned = page["results"](functions, list(named))
-    for name, thing in {**named, **returned, "fourbar_validation.Answer": Answer}.items():
+    public = {name: getattr(fourbar, name) for name in fourbar.__all__ if name != "__version__"}
+    functions = [name for name, thing in public.items() if not inspect.isclass(thing)]
+    returned = page["results"](functions, list(public))
+    for name, thing in {**public, **returned, "fourbar_validation.Answer": Answer}.items():
         error = inspect.isclass(thing) and issubclass(thing, Exception)
         yield f"{name}({thing.__base__.__name__})" if error else f"{name}{page['signature'](thing)}"
         for method in page["METHODS"].get(name, ()):

@@ -333,10 +333,10 @@ def test_an_answer_at_its_own_motion_is_judged_there() -> None:
     moved = command._replace(angle=command.angle + 1e-3, speed=np.full(len(command.angle), 10.01))
     theirs = fourbar.solve(scene, at=moved)
     answers = {name: getattr(theirs, name).tolist() for name in problem["answers"]}
-    result = {**make_result("crank_rocker", **answers), "at": protocol.command_to_json(scene, moved)}
-    assert set(find_levels(judge(problem, result)).values()) == {"A"}
-    del result["at"]
-    assert set(find_levels(judge(problem, result)).values()) != {"A"}
+    answer_file = {**make_result("crank_rocker", **answers), "at": protocol.command_to_json(scene, moved)}
+    assert set(find_levels(judge(problem, answer_file)).values()) == {"A"}
+    del answer_file["at"]
+    assert set(find_levels(judge(problem, answer_file)).values()) != {"A"}
 
 
 def test_the_command_judges_a_result_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

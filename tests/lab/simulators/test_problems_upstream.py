@@ -58,9 +58,11 @@ def test_every_test_for_another_project_says_what_it_compares(path: Path) -> Non
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.parent.name)
 def test_a_file_for_another_project_states_our_answers(path: Path) -> None:
     text, stated = path.read_text(), literals(path)
-    named = [file.stem for file in PROBLEMS.glob("*.json") if file.stem in text]
-    tables = stated["EXPECTED"] if isinstance(next(iter(stated["EXPECTED"])), str) else {named[0]: stated["EXPECTED"]}
-    assert set(tables) <= set(named)
+    problems = [file.stem for file in PROBLEMS.glob("*.json") if file.stem in text]
+    tables = (
+        stated["EXPECTED"] if isinstance(next(iter(stated["EXPECTED"])), str) else {problems[0]: stated["EXPECTED"]}
+    )
+    assert set(tables) <= set(problems)
     compared = 0
     for name, table in tables.items():
         problem = json.loads((PROBLEMS / f"{name}.json").read_text())

@@ -46,8 +46,8 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
     """What -o writes, loaded by nothing but its text: reset to the keyframe and stepped for a revolution."""
     scene, out = tmp_path / "scene.toml", tmp_path / "out.xml"
     scene.write_text(fourbar.dump(turning(positions=72)))
-    result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-5", "-o", str(out)], standalone_mode=False)
-    assert result.return_value == 0, result.output
+    process = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-5", "-o", str(out)], standalone_mode=False)
+    assert process.return_value == 0, process.output
     loop = ClosedLoop(out.read_text())
     mujoco.mj_resetDataKeyframe(loop.model, loop.data, 0)
     steps = round(2.0 * math.pi / 10.0 / loop.model.opt.timestep)
@@ -58,9 +58,9 @@ def test_the_file_alone_keeps_the_error(tmp_path: Path) -> None:
         seen = {"theta_2": loop.data.qpos[O2], "omega_2": loop.data.qvel[O2], "alpha_2": loop.data.qacc[O2]}
         for key, value in {**seen, "torque": loop.crank_torque(), **loop.forces()}.items():
             rows.setdefault(key, []).append(value)
-    found = {key: np.array(values) for key, values in rows.items()}
-    at = Command(found["theta_2"], np.ones(steps, dtype=np.int8), found["omega_2"], found["alpha_2"])
-    assert steps < 100 and compute_errors(turning(), at, found).worst <= 1e-5
+    columns = {key: np.array(values) for key, values in rows.items()}
+    commanded = Command(columns["theta_2"], np.ones(steps, dtype=np.int8), columns["omega_2"], columns["alpha_2"])
+    assert steps < 100 and compute_errors(turning(), commanded, columns).worst <= 1e-5
 
 
 def test_what_lies_between_two_steps_is_judged_too() -> None:
@@ -70,10 +70,10 @@ def test_what_lies_between_two_steps_is_judged_too() -> None:
     trial = setup.try_out(advise.make_settings(12.0, 6.0))
     assert trial.steps == 2 and compute_errors(scene, trial.at, trial.quantities).worst < 2e-3
     assert matters.judge_trial(scene, trial).worst > 0.1
-    found = advise.advise(scene, 1e-2, setup)
-    assert found.reached and found.best.steps > 4
-    largest = [np.linalg.norm(fourbar.solve(scene, "force", at=at).F12, axis=1).max()
-               for at in (setup.command, setup.try_out(found.best.settings).at)]  # fmt: skip
+    advice = advise.advise(scene, 1e-2, setup)
+    assert advice.reached and advice.best.steps > 4
+    largest = [np.linalg.norm(fourbar.solve(scene, "force", at=commanded).F12, axis=1).max()
+               for commanded in (setup.command, setup.try_out(advice.best.settings).at)]  # fmt: skip
     assert largest[1] == pytest.approx(largest[0], rel=1e-2)
 
 
@@ -82,16 +82,18 @@ def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path: Path, monke
     scene = tmp_path / "scene.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
     out = tmp_path / "none.xml"
-    result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-14", "-o", str(out)], standalone_mode=False)
-    assert result.return_value == 1 and not out.exists()
-    assert "No setting of plain MJCF" in result.output and "inverse dynamics" in result.output
+    process = CliRunner().invoke(
+        advise.command, [str(scene), "--error", "1e-14", "-o", str(out)], standalone_mode=False
+    )
+    assert process.return_value == 1 and not out.exists()
+    assert "No setting of plain MJCF" in process.output and "inverse dynamics" in process.output
     still = replace(turning(), motion=fourbar.Motion(1.0, 10.0))
     scene.write_text(fourbar.dump(still))
-    result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
-    assert result.return_value == 1 and "nothing to run through" in result.output
+    process = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
+    assert process.return_value == 1 and "nothing to run through" in process.output
     scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
-    result = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
-    assert result.return_value == 1 and "motion law" in result.output
+    process = CliRunner().invoke(advise.command, [str(scene), "--error", "1e-3"], standalone_mode=False)
+    assert process.return_value == 1 and "motion law" in process.output
 
 
 def test_a_predicted_error_that_is_no_number_is_no_small_one() -> None:
@@ -149,10 +151,10 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason() -> No
     for scene, setting, why in ((hood, "the stiffness by pads", "lighter of coupler and output"),
                                 (turning(10.0, 36), "the timestep", "fourth power")):  # fmt: skip
         setup = TrialSetup(scene, advise.choose_positions(scene))
-        first, *others = found = matters.measure_influences(scene, setup, advise.make_settings(40.0, 12.0))
-        assert first.setting == setting and first.times > 10.0 and why in matters.write_sentence(found)
-        assert all(first.times >= other.times for other in others)
-    quiet = [replace(each, times=1.5) for each in found]
+        first, *others = influences = matters.measure_influences(scene, setup, advise.make_settings(40.0, 12.0))
+        assert first.setting == setting and first.times > 10.0 and why in matters.write_sentence(influences)
+        assert all(first.times >= influence.times for influence in others)
+    quiet = [replace(influence, times=1.5) for influence in influences]
     assert matters.write_sentence(quiet).startswith("No setting matters by itself")
 
 
@@ -164,9 +166,9 @@ def test_several_scenes_have_one_table(tmp_path: Path) -> None:
     ):
         files.append(str(tmp_path / f"{name}.toml"))
         Path(files[-1]).write_text(fourbar.dump(scene))
-    result = CliRunner().invoke(advise.command, [*files, "--error", "1e-4"], standalone_mode=False)
-    assert result.return_value == 1  # one of them cannot be run through
-    lines = result.output.splitlines()
+    process = CliRunner().invoke(advise.command, [*files, "--error", "1e-4"], standalone_mode=False)
+    assert process.return_value == 1  # one of them cannot be run through
+    lines = process.output.splitlines()
     assert lines[1].startswith("The timestep matters most here. If it is twice as long, the error is")
     assert lines[-2].split()[0] == "one.toml" and lines[-1].split()[:2] == ["still.toml", "-"]
     with pytest.raises(fourbar.InputError, match="MJCF of one scene, not of 2"):

@@ -43,11 +43,13 @@ Numbers = dict[str, np.ndarray]
 
 def right(scene: Scene, **changed: object) -> Numbers:
     """The right numbers at some positions; the command may be changed."""
-    at = command(scene)
+    commanded = command(scene)
     fields = {"theta_2": "angle", "omega_2": "speed", "alpha_2": "acceleration"}
     changed = {fields.get(name, name): value for name, value in changed.items()}
-    at = Command(at.theta_2[::EVERY], at.branch[::EVERY], at.omega_2, at.alpha_2)._replace(**changed)
-    solution = solve(scene, at=at)
+    commanded = Command(
+        commanded.theta_2[::EVERY], commanded.branch[::EVERY], commanded.omega_2, commanded.alpha_2
+    )._replace(**changed)
+    solution = solve(scene, at=commanded)
     assert np.all(solution.status_code == OK)
     return {name: np.array(getattr(solution, name)) for name in ("theta_2", *ALL)}
 
@@ -85,8 +87,8 @@ def test_the_right_numbers_agree_also_when_rounded(name: str, digits: int | None
 def test_a_torque_off_by_one_in_the_last_of_six_digits_is_found(name: str, tmp_path: Path) -> None:
     numbers = right(SCENES[name])
     numbers["torque"] = numbers["torque"] * (1.0 + 3e-5)
-    found = judged(SCENES[name], write(tmp_path / "theirs.csv", numbers, digits=5))
-    assert {finding.quantity for finding in found.differing} == {"torque"}
+    judgement = judged(SCENES[name], write(tmp_path / "theirs.csv", numbers, digits=5))
+    assert {finding.quantity for finding in judgement.differing} == {"torque"}
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -96,8 +98,8 @@ def test_a_theta_2_rounded_as_the_rest_is_allowed_for_and_excuses_no_more(name: 
     assert np.any(rounded["theta_2"] != numbers["theta_2"])
     assert judged(SCENES[name], write(tmp_path / "theirs.csv", rounded, digits=5)).differing == []
     wrong = rounded | {"F43": rounded["F43"] * (1.0 + 1e-4)}
-    found = judged(SCENES[name], write(tmp_path / "wrong.csv", wrong, digits=5))
-    assert {finding.quantity for finding in found.differing} == {"F43"}
+    judgement = judged(SCENES[name], write(tmp_path / "wrong.csv", wrong, digits=5))
+    assert {finding.quantity for finding in judgement.differing} == {"F43"}
 
 
 def test_whole_degrees_are_positions_that_somebody_chose(tmp_path: Path) -> None:
@@ -130,9 +132,9 @@ def same(scene: Scene) -> Scene:
 
 def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
     """m a and I alpha by hand: what they add to static equilibrium is put on as loads at G, as d'Alembert does."""
-    motion = solve(scene, at=(at := command(scene)))
+    motion = solve(scene, at=(commanded := command(scene)))
     numbers: dict[str, list[np.ndarray]] = {name: [] for name in ("theta_2", *ALL)}
-    for i in range(0, len(at.theta_2), EVERY):
+    for i in range(0, len(commanded.theta_2), EVERY):
         extra = []
         for bar in (2, 3, 4):
             described = scene.linkage.bar(bar)
@@ -140,7 +142,7 @@ def inertial_times(scene: Scene, by_mass: float, by_inertia: float) -> Numbers:
             couple = (by_inertia - 1.0) * -described.moment_of_inertia * float(getattr(motion, f"alpha_{bar}")[i])
             force = (math.hypot(x, y), math.atan2(y, x))
             extra.append(fourbar.Load(bar, force, moment=couple))
-        here = Command(at.theta_2[i : i + 1], at.branch[i : i + 1], at.omega_2, at.alpha_2)
+        here = Command(commanded.theta_2[i : i + 1], commanded.branch[i : i + 1], commanded.omega_2, commanded.alpha_2)
         one = solve(replace(scene, loads=(*scene.loads, *extra)), at=here)
         for name, values in numbers.items():
             values.append(getattr(one, name)[0])
@@ -290,8 +292,8 @@ def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(digits: int, 
     numbers = right(scene)
     for name in ("torque", "F12"):
         numbers[name] = numbers[name] / 9.81
-    found = judged(scene, write(tmp_path / "theirs.csv", numbers, ("torque", "F12"), digits=digits)).explanations
-    assert [each.quantities for each in found] == [("torque", "F12")]
+    explanations = judged(scene, write(tmp_path / "theirs.csv", numbers, ("torque", "F12"), digits=digits)).explanations
+    assert [explanation.quantities for explanation in explanations] == [("torque", "F12")]
     path = tmp_path / "angles.csv"
     rows = zip(numbers["theta_2"].tolist(), numbers["theta_4"].tolist(), strict=True)
     path.write_text("\n".join(["theta_2,theta_4 [deg]", *(f"{x!r},{y:.{digits}f}" for x, y in rows), ""]))
@@ -304,8 +306,8 @@ def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(tmp_path: Path
     slip = numbers | {"torque": numbers["torque"] * np.where(np.arange(12) == 5, -1.0, 1.0)}
     assert not judged(scene, write(tmp_path / "slip.csv", slip, ("torque",))).explanations
     numbers["theta_2"] = np.array([float(f"{x:.5f}") for x in np.radians(numbers["theta_2"])])
-    found = judged(scene, write(tmp_path / "theirs.csv", numbers, ("torque",))).explanations
-    assert numbers["theta_2"][0] == 0.0 and "in radians where degrees" in found[0].text
+    explanations = judged(scene, write(tmp_path / "theirs.csv", numbers, ("torque",))).explanations
+    assert numbers["theta_2"][0] == 0.0 and "in radians where degrees" in explanations[0].text
 
 
 @pytest.mark.parametrize(("what", "scene", "columns", "planted", "words"), MISTAKES, ids=[m[0] for m in MISTAKES])
@@ -317,9 +319,9 @@ def test_a_known_mistake_is_the_first_explanation(
     words: str,
     tmp_path: Path,
 ) -> None:
-    found = judged(SCENES[scene], write(tmp_path / "theirs.csv", planted(SCENES[scene]), columns))
-    assert found.differing
-    first = found.explanations[0]
+    judgement = judged(SCENES[scene], write(tmp_path / "theirs.csv", planted(SCENES[scene]), columns))
+    assert judgement.differing
+    first = judgement.explanations[0]
     assert words in first.text
     assert first.complete
 
@@ -328,11 +330,11 @@ def test_two_mistakes_in_two_columns_are_both_named(tmp_path: Path) -> None:
     scene = SCENES["crank_rocker"]
     numbers = right(scene)
     numbers |= {"torque": numbers["torque"] * 100.0, "F43": -numbers["F43"]}
-    found = judged(scene, write(tmp_path / "theirs.csv", numbers))
-    found_causes = {explanation.text[:14]: explanation for explanation in found.explanations}
+    judgement = judged(scene, write(tmp_path / "theirs.csv", numbers))
+    found_causes = {explanation.text[:14]: explanation for explanation in judgement.explanations}
     assert found_causes["units: numbers"].quantities == ("torque",)
     assert found_causes["sign reversed,"].quantities == ("F43",)
-    assert not any(explanation.complete for explanation in found.explanations)
+    assert not any(explanation.complete for explanation in judgement.explanations)
 
 
 EVERY_QUANTITY = [name for name in UNITS if name not in (*NOT_JUDGED, *LINE_QUANTITIES, "theta_2")]
@@ -343,15 +345,15 @@ EVERY_QUANTITY = [name for name in UNITS if name not in (*NOT_JUDGED, *LINE_QUAN
 def test_every_quantity_is_judged_at_its_own_scale(name: str, quantity: str, tmp_path: Path) -> None:
     """Off by 1e-9 of its largest value it differs, whatever its unit: A_x was once judged in newtons."""
     scene = SCENES[name]
-    at = command(scene)
-    at = Command(at.theta_2[::EVERY], at.branch[::EVERY], at.omega_2, at.alpha_2)
-    solution = solve(scene, at=at)
-    numbers = {"theta_2": at.theta_2, quantity: np.array(getattr(solution, quantity))}
+    commanded = command(scene)
+    commanded = Command(commanded.theta_2[::EVERY], commanded.branch[::EVERY], commanded.omega_2, commanded.alpha_2)
+    solution = solve(scene, at=commanded)
+    numbers = {"theta_2": commanded.theta_2, quantity: np.array(getattr(solution, quantity))}
     assert judged(scene, write(tmp_path / "right.csv", numbers, (quantity,))).differing == []
     size = np.abs(numbers[quantity]).max()
     off = numbers | {quantity: numbers[quantity] + 1e-9 * (size or 1.0)}
-    found = judged(scene, write(tmp_path / "off.csv", off, (quantity,)))
-    assert len(found.differing) == len(found.findings) > 0
+    judgement = judged(scene, write(tmp_path / "off.csv", off, (quantity,)))
+    assert len(judgement.differing) == len(judgement.findings) > 0
 
 
 def test_a_quantity_of_no_known_scale_is_not_judged_by_another() -> None:
@@ -402,8 +404,8 @@ def test_nonsense_is_explained_by_nothing(tmp_path: Path) -> None:
     numbers = right(scene)
     rng = np.random.default_rng(3)
     numbers |= {name: rng.normal(size=numbers[name].shape) for name in FORCES}
-    found = judged(scene, write(tmp_path / "theirs.csv", numbers, FORCES))
-    assert found.explanations == []
+    judgement = judged(scene, write(tmp_path / "theirs.csv", numbers, FORCES))
+    assert judgement.explanations == []
 
 
 PUBLISHED = {
@@ -493,8 +495,8 @@ def test_a_table_that_is_too_large_or_missing_is_one_line(tmp_path: Path, capsys
 def test_positions_that_do_not_assemble_are_named_by_their_line(tmp_path: Path) -> None:
     path = tmp_path / "theirs.csv"
     path.write_text("theta_2 [deg],theta_3\n\n45,1\n")
-    found = judged(SCENES["thesis"], path)
-    assert found.not_assembled == [3]
+    judgement = judged(SCENES["thesis"], path)
+    assert judgement.not_assembled == [3]
     assert status(["check", str(MODELS / "thesis.toml"), str(path)]) == FAILED
 
 
@@ -538,11 +540,11 @@ def test_blank_cells_state_nothing_and_the_rest_of_their_row_is_judged(tmp_path:
     (one, two), (first, second) = numbers["theta_2"][:2].tolist(), numbers["torque"][:2].tolist()
     third = numbers["F12"][1, 0].item()
     path.write_text(f"theta_2,torque,F12_x,F12_y,note\n{one},{first},,,a\n{two},{2 * second},{third},,b\n")
-    found = judged(SCENES["thesis"], path)
-    assert [(f.line, f.quantity, f.agrees) for f in found.findings] == [
+    judgement = judged(SCENES["thesis"], path)
+    assert [(f.line, f.quantity, f.agrees) for f in judgement.findings] == [
         (2, "torque", True), (3, "torque", False), (3, "F12_x", True)
     ]  # fmt: skip
-    (wrong,) = found.differing
+    (wrong,) = judgement.differing
     assert wrong.theirs == (2 * second,) and wrong.ours == pytest.approx((second,), rel=1e-12)
 
 
@@ -597,17 +599,17 @@ def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_to
     numbers = right(SCENES["crank_rocker"])
     numbers["torque"] = numbers["torque"] * 1e3 * (1.0 + 1e-4 * np.sin(np.arange(len(numbers["torque"]))))
     table = read_table(write(tmp_path / "theirs.csv", numbers))
-    found = judge_table(SCENES["crank_rocker"], table, Allowance(rtol=1e-3))
-    assert "N mm where N m" in found.explanations[0].text and found.explanations[0].complete
+    judgement = judge_table(SCENES["crank_rocker"], table, Allowance(rtol=1e-3))
+    assert "N mm where N m" in judgement.explanations[0].text and judgement.explanations[0].complete
 
 
 def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(tmp_path: Path) -> None:
     parallelogram = fourbar.FourBar(0.3, fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.5), fourbar.Bar(0.1, 0.2))
     scene = Scene(parallelogram, fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0, through="follow"))
     (tmp_path / "theirs.csv").write_text(str(fourbar.solve(scene).to_csv()))
-    found = judged(scene, tmp_path / "theirs.csv")
+    judgement = judged(scene, tmp_path / "theirs.csv")
     assert {*solve(scene).branch.tolist()} == {1, -1}
-    assert found.differing == [] and found.not_assembled == [] and found.compared > 100
+    assert judgement.differing == [] and judgement.not_assembled == [] and judgement.compared > 100
 
 
 def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(tmp_path: Path) -> None:

@@ -80,19 +80,19 @@ def errors(scene: Scene, examined: Examined, how: str) -> dict[str, float]:
 
 
 def test_the_generated_file_differs_in_nothing_and_agrees() -> None:
-    found = examine(CRANK_ROCKER, GENERATED, {})
-    assert keys(CRANK_ROCKER, found) == set()
+    examination = examine(CRANK_ROCKER, GENERATED, {})
+    assert keys(CRANK_ROCKER, examination) == set()
     for how in (ONE_STATE, THROUGH_TIME):
-        assert max(errors(CRANK_ROCKER, found, how).values()) <= SIMULATED.factor
+        assert max(errors(CRANK_ROCKER, examination, how).values()) <= SIMULATED.factor
 
 
 def test_the_description_is_that_of_the_scene() -> None:
-    found, linkage = values(generated(CRANK_ROCKER)), CRANK_ROCKER.linkage
+    numbers, linkage = values(generated(CRANK_ROCKER)), CRANK_ROCKER.linkage
     for number, name in ((2, "input"), (3, "coupler"), (4, "output")):
         bar = linkage.bar(number)
         expected = (bar.length, bar.mass, bar.moment_of_inertia, *bar.mass_centre)
         parts = ("mass", "inertia", "centre.distance", "centre.angle")
-        described = (found[f"lengths.{name}"], *(found[f"bars.{name}.{part}"] for part in parts))
+        described = (numbers[f"lengths.{name}"], *(numbers[f"bars.{name}.{part}"] for part in parts))
         assert described == pytest.approx(expected, rel=1e-14)
 
 
@@ -102,8 +102,8 @@ def test_what_is_welded_to_a_bar_is_part_of_it() -> None:
     text = re.sub(
         '(name="rocker"[^>]*><joint/>)<inertial[^>]*>', r"\1" + half.format(0.05) + half.format(0.15), other_plane()
     )
-    found = values(examine(BARE, text, MINE))
-    described = [found[f"bars.output.{part}"] for part in ("mass", "centre.distance", "centre.angle", "inertia")]
+    numbers = values(examine(BARE, text, MINE))
+    described = [numbers[f"bars.output.{part}"] for part in ("mass", "centre.distance", "centre.angle", "inertia")]
     assert described == pytest.approx([0.4, 0.1, 0.0, 2e-3 + 0.2 * 0.1**2 / 2.0], rel=1e-12, abs=1e-14)
 
 
@@ -140,8 +140,8 @@ def test_a_planted_difference_is_named(what: str, old: str, new: str, key: str, 
     if "range" in new:
         text = text.replace('limit="disable"', "")
     text = text.replace('damper="disable"', "")
-    found = {d.key: d.remark for d in find_differences(generated(CRANK_ROCKER).described, described(text))}
-    assert word in found[key]
+    remarks = {d.key: d.remark for d in find_differences(generated(CRANK_ROCKER).described, described(text))}
+    assert word in remarks[key]
 
 
 UNREAD = [
@@ -168,13 +168,15 @@ DRY = replace(CRANK_ROCKER, effects=(*CRANK_ROCKER.effects, Friction((("A", 0.05
 def test_how_softly_dry_friction_slips_is_named_and_costs() -> None:
     """By default its couple rises over 0.02 s of slip."""
     text = re.sub(' sol(ref|imp)friction="[^"]*"', "", write_mjcf(DRY))
-    found = examine(DRY, text.replace('joint name="A"', 'joint name="rod"').replace('joint="A"', 'joint="rod"'), {})
-    by_key = differences(DRY, found)
+    examination = examine(
+        DRY, text.replace('joint name="A"', 'joint name="rod"').replace('joint="A"', 'joint="rod"'), {}
+    )
+    by_key = differences(DRY, examination)
     fields = {f"pins.{pin}.{field}" for pin in ("A", "O4") for field in ("solreffriction", "solimpfriction")}
     assert by_key.keys() == fields
     assert by_key["pins.A.solreffriction"].written == 'joint "rod" solreffriction'
     assert by_key["pins.A.solreffriction"].theirs == (0.02, 1.0)
-    assert errors(DRY, found, ONE_STATE)["F12"] > 100.0 * SIMULATED.factor
+    assert errors(DRY, examination, ONE_STATE)["F12"] > 100.0 * SIMULATED.factor
 
 
 def test_a_cause_is_named_without_what_hangs_on_it() -> None:
@@ -190,9 +192,9 @@ def test_a_cause_is_named_without_what_hangs_on_it() -> None:
 def test_loads_under_other_names_and_in_another_order_are_the_same_loads() -> None:
     text = GENERATED.replace("load_1", "couple").replace("load_2", "push")
     first, second = re.findall("    <general [^>]*(?:couple|push)[^>]*/>\n", text)
-    found = examine(CRANK_ROCKER, text.replace(first + second, second + first), {})
-    assert keys(CRANK_ROCKER, found) == set()
-    assert max(errors(CRANK_ROCKER, found, ONE_STATE).values()) <= SIMULATED.factor
+    examination = examine(CRANK_ROCKER, text.replace(first + second, second + first), {})
+    assert keys(CRANK_ROCKER, examination) == set()
+    assert max(errors(CRANK_ROCKER, examination, ONE_STATE).values()) <= SIMULATED.factor
 
 
 def described(text: str) -> Mapping[str, ModelEntry]:
@@ -205,9 +207,9 @@ def described(text: str) -> Mapping[str, ModelEntry]:
 
 @pytest.mark.parametrize(("old", "new"), [("-9.81", "-9.80"), ('mass="0.5"', 'mass="0.501"')])
 def test_what_a_difference_costs_is_seen(old: str, new: str) -> None:
-    found = examine(CRANK_ROCKER, GENERATED.replace(old, new), {})
-    assert errors(CRANK_ROCKER, found, ONE_STATE)["F12"] > SIMULATED.factor
-    assert errors(CRANK_ROCKER, found, THROUGH_TIME)["F12"] > SIMULATED.factor
+    examination = examine(CRANK_ROCKER, GENERATED.replace(old, new), {})
+    assert errors(CRANK_ROCKER, examination, ONE_STATE)["F12"] > SIMULATED.factor
+    assert errors(CRANK_ROCKER, examination, THROUGH_TIME)["F12"] > SIMULATED.factor
 
 
 def other_plane(closure: str = 'site1="r" site2="q"', axis: str = "0 -1 0", option: str = "") -> str:
@@ -235,11 +237,11 @@ def test_bodies_and_sites_are_guessed_from_what_hangs_together_and_from_the_leng
     rocker = re.search(' *<body name="rocker".*?</body>', text)
     assert rocker is not None  # it comes first in the file
     text = text.replace(rocker[0], "").replace("<worldbody>", "<worldbody>" + rocker[0])
-    found = examine(BARE, text, {})
-    assert found.names.items() >= MINE.items()
-    assert ({"B3": "r", "B4": "q"}.items() <= found.names.items()) == (not closure)
-    assert "guessed" in found.notes[0] and "input=crank, coupler=rod, output=rocker" in found.notes[0]
-    assert errors(BARE, found, ONE_STATE)["theta_4"] < STIFF_ENOUGH
+    examination = examine(BARE, text, {})
+    assert examination.names.items() >= MINE.items()
+    assert ({"B3": "r", "B4": "q"}.items() <= examination.names.items()) == (not closure)
+    assert "guessed" in examination.notes[0] and "input=crank, coupler=rod, output=rocker" in examination.notes[0]
+    assert errors(BARE, examination, ONE_STATE)["theta_4"] < STIFF_ENOUGH
 
 
 COSTLY = [
@@ -296,10 +298,10 @@ def test_what_is_attached_costs_what_it_does_in_the_file_itself(key: str) -> Non
     spoilt = examine(SPRUNG, text.replace(old, new), {})
     (difference,) = differences(SPRUNG, spoilt).values()
     assert difference.key == key
-    unchanged, changed = (rows_of(SPRUNG, found or []) for found in examine_changed(SPRUNG, [(key, difference.theirs)]))
+    unchanged, changed = (rows_of(SPRUNG, rows or []) for rows in examine_changed(SPRUNG, [(key, difference.theirs)]))
     priced = price(difference, changed, unchanged)
-    found = errors(SPRUNG, spoilt, ONE_STATE)
-    assert priced.cost == pytest.approx(max(found[name] for name in TORQUE_AND_PINS), abs=FLOOR)
+    rows = errors(SPRUNG, spoilt, ONE_STATE)
+    assert priced.cost == pytest.approx(max(rows[name] for name in TORQUE_AND_PINS), abs=FLOOR)
 
 
 def test_a_servo_on_a_tendon_pulls_also_where_it_is_told_nothing_and_a_motor_does_not() -> None:
@@ -320,16 +322,16 @@ def test_a_load_that_is_missing_and_an_entry_that_cannot_stand_alone() -> None:
     assert missing is not None and others == [None] * 3
     text = re.sub('<general [^>]*name="load_2"[^>]*>', "", GENERATED)
     expected = errors(CRANK_ROCKER, examine(CRANK_ROCKER, text, {}), ONE_STATE)
-    found = {row.quantity: row.error for row in rows_of(CRANK_ROCKER, missing[:1])}
-    assert all(found[name] == pytest.approx(expected[name], abs=FLOOR) for name in TORQUE_AND_PINS)
+    errors_by_quantity = {row.quantity: row.error for row in rows_of(CRANK_ROCKER, missing[:1])}
+    assert all(errors_by_quantity[name] == pytest.approx(expected[name], abs=FLOOR) for name in TORQUE_AND_PINS)
 
 
 @pytest.mark.parametrize("axis", ["0 -1 0", "0 1 0"])
 def test_another_plane_and_a_reversed_axis_change_no_number(axis: str) -> None:
-    found = examine(BARE, other_plane(f'site1="r" site2="q" {STIFF}', axis), MINE)
-    assert max(errors(BARE, found, ONE_STATE).values()) < STIFF_ENOUGH
-    assert {"plane"} <= keys(BARE, found)
-    assert ("pins.A.positive" in keys(BARE, found)) == (axis == "0 1 0")
+    examination = examine(BARE, other_plane(f'site1="r" site2="q" {STIFF}', axis), MINE)
+    assert max(errors(BARE, examination, ONE_STATE).values()) < STIFF_ENOUGH
+    assert {"plane"} <= keys(BARE, examination)
+    assert ("pins.A.positive" in keys(BARE, examination)) == (axis == "0 1 0")
 
 
 def test_the_default_softness_costs_a_percent_or_so() -> None:
@@ -339,9 +341,9 @@ def test_the_default_softness_costs_a_percent_or_so() -> None:
 
 
 def test_body_anchors_on_an_open_rest_state_build_another_linkage() -> None:
-    found = examine(BARE, other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'), MINE)
-    assert "in the pose of the file" in differences(BARE, found)["lengths.output"].remark
-    assert values(found)["lengths.output"] == pytest.approx(0.05)
+    examination = examine(BARE, other_plane('body1="rod" body2="rocker" anchor="0.25 0 0"'), MINE)
+    assert "in the pose of the file" in differences(BARE, examination)["lengths.output"].remark
+    assert values(examination)["lengths.output"] == pytest.approx(0.05)
 
 
 def test_cut_at_another_pin_it_is_the_same_linkage() -> None:
@@ -355,19 +357,19 @@ def test_cut_at_another_pin_it_is_the_same_linkage() -> None:
         r'<inertial pos="(\S+) 0 (\S+)"', lambda m: f'<inertial pos="{float(m[1]) - 0.22!r} 0 {m[2]}"', hanging
     ).replace('<site name="q" pos="0.22 0 0"/>', '<site name="q" pos="-0.22 0 0"/>')
     text = text.replace(rocker[0], '<site name="r" pos="1.3 2 3"/>').replace("<ROCKER/>", hanging)
-    found = examine(BARE, text.replace('site1="r" site2="q"', f'site1="r" site2="q" {STIFF}'), MINE)
-    assert values(found)["closure.pin"] == "O4"
-    assert not {key for key in keys(BARE, found) if key.startswith(("bars.", "lengths."))}
-    assert max(errors(BARE, found, ONE_STATE).values()) < STIFF_ENOUGH
+    examination = examine(BARE, text.replace('site1="r" site2="q"', f'site1="r" site2="q" {STIFF}'), MINE)
+    assert values(examination)["closure.pin"] == "O4"
+    assert not {key for key in keys(BARE, examination) if key.startswith(("bars.", "lengths."))}
+    assert max(errors(BARE, examination, ONE_STATE).values()) < STIFF_ENOUGH
 
 
 def test_a_servo_and_another_equality_are_taken_off_and_reported() -> None:
     text = GENERATED.replace("</actuator>", '<velocity name="servo" joint="O2" kv="10"/></actuator>')
     text = text.replace("</equality>", '<joint joint1="O2" joint2="O4"/></equality>')
-    found = examine(CRANK_ROCKER, text, {})
-    assert any("servo" in note for note in found.notes)
-    assert any("switched off" in note for note in found.notes)
-    assert max(errors(CRANK_ROCKER, found, ONE_STATE).values()) <= SIMULATED.factor
+    examination = examine(CRANK_ROCKER, text, {})
+    assert any("servo" in note for note in examination.notes)
+    assert any("switched off" in note for note in examination.notes)
+    assert max(errors(CRANK_ROCKER, examination, ONE_STATE).values()) <= SIMULATED.factor
 
 
 def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
@@ -379,10 +381,13 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
         examined = examine(scene, mine, {})
         assert any("gives the cylinder's force" in note for note in examined.notes)
         for how, most in ((ONE_STATE, 1e-9), (THROUGH_TIME, 1e-6)):
-            found = errors(scene, examined, how)
-            assert "torque" not in found and max(found[name] for name in ("drive_force", "F12", "F43", "F14")) < most
-    at = 'name="cylinder_end" pos="'
-    moved = text.replace(at + "0.0", at + "0.1")
+            worst_errors = errors(scene, examined, how)
+            assert (
+                "torque" not in worst_errors
+                and max(worst_errors[name] for name in ("drive_force", "F12", "F43", "F14")) < most
+            )
+    start = 'name="cylinder_end" pos="'
+    moved = text.replace(start + "0.0", start + "0.1")
     assert moved != text and errors(scene, examine(scene, moved, {}), ONE_STATE)["drive_force"] > 1e-2
     assert any(key.startswith("tendons.") for key in keys(scene, examine(scene, moved, {})))
     with pytest.raises(InputError, match="0 actuators with a control on tendons"):
@@ -391,16 +396,16 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for() -> None:
 
 def test_a_loop_that_nothing_closes_is_seen_in_the_numbers() -> None:
     text = other_plane("").replace('site name="r"', 'site name="B3"').replace('site name="q"', 'site name="B4"')
-    found = examine(BARE, text, MINE)
-    assert values(found)["closure.by"] == "nothing"
-    assert np.isnan(errors(BARE, found, ONE_STATE)["F43"])
-    assert errors(BARE, found, ONE_STATE)["torque"] > 0.01
+    examination = examine(BARE, text, MINE)
+    assert values(examination)["closure.by"] == "nothing"
+    assert np.isnan(errors(BARE, examination, ONE_STATE)["F43"])
+    assert errors(BARE, examination, ONE_STATE)["torque"] > 0.01
 
 
 def test_colliding_bars_are_seen() -> None:
     text = GENERATED.replace('contype="0" conaffinity="0"', "").replace('contact="disable"', "")
-    found = examine(CRANK_ROCKER, text, {})
-    assert "contacts" in keys(CRANK_ROCKER, found)
+    examination = examine(CRANK_ROCKER, text, {})
+    assert "contacts" in keys(CRANK_ROCKER, examination)
 
 
 HOSTILE = [
@@ -547,10 +552,10 @@ def test_the_command_writes_and_prints_what_it_found(tmp_path: Path) -> None:
     scene.write_text(fourbar.dump(BARE))
     names = [f"--name={role}={name}" for role, name in {**MINE, "coupler": "rod<b>|"}.items()]
     arguments = [str(scene), str(path), *names, "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(mjcf.command, arguments, standalone_mode=False)
-    assert result.return_value == 1, result.output
-    assert "\x1b" not in result.output
-    assert "closure.softness" in result.output
+    process = CliRunner().invoke(mjcf.command, arguments, standalone_mode=False)
+    assert process.return_value == 1, process.output
+    assert "\x1b" not in process.output
+    assert "closure.softness" in process.output
     report = (tmp_path / "out" / "theirs.md").read_text()
     assert "\x1b" not in report
     assert any(
@@ -570,10 +575,10 @@ def run(tmp_path: Path, text: str, *options: str) -> tuple[int | None, list[floa
     path.write_text(text)
     out = tmp_path / f"out{len(options)}"
     arguments = [str(scene), str(path), "--out", str(out), *options]
-    result = CliRunner().invoke(mjcf.command, arguments, standalone_mode=False)
-    if result.exception is not None:
-        raise result.exception
-    return result.return_value, sorted(
+    process = CliRunner().invoke(mjcf.command, arguments, standalone_mode=False)
+    if process.exception is not None:
+        raise process.exception
+    return process.return_value, sorted(
         {row.allowed for row in read_columns(out / "results.csv") if row.quantity != "undecided"}
     )
 

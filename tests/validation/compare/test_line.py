@@ -36,9 +36,9 @@ def test_every_pair_of_bars_agrees_with_thirteen_equations(one: int, other: int)
             scene = driven(one, other, effects=effects)
             rows = judge("", replace(scene, motion=scene.motion.replace(branch=branch)), FREE_BODY).rows
             assert not [row for row in rows if row.failed]
-            known = {row.quantity for row in rows if row.engine == "free-body" and row.verdict == AGREES}
-            assert known >= {"drive_force", "stroke", "drive_line", "stroke_speed", "drive_condition", "F12"}
-            assert "drive_force_inertia" in known and "torque" not in known
+            agreeing = {row.quantity for row in rows if row.engine == "free-body" and row.verdict == AGREES}
+            assert agreeing >= {"drive_force", "stroke", "drive_line", "stroke_speed", "drive_condition", "F12"}
+            assert "drive_force_inertia" in agreeing and "torque" not in agreeing
 
 
 @pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
@@ -49,8 +49,8 @@ def test_every_pair_of_bars_agrees_with_the_multipliers_of_an_engine(engine: Eng
     for effects in ((fourbar.Gravity(), fourbar.Viscous.at(B=0.02)), (fourbar.Gravity(), PINS)):
         rows = judge("", driven(one, other, effects=effects), [*FREE_BODY, engine]).rows
         assert not [row for row in rows if row.failed]
-        known = {row.quantity for row in rows if row.engine == engine.name and row.verdict == AGREES}
-        assert known >= {"drive_force", "stroke", "stroke_speed", "drive_force_inertia", "F12", "F32", "F43", "F14"}
+        agreeing = {row.quantity for row in rows if row.engine == engine.name and row.verdict == AGREES}
+        assert agreeing >= {"drive_force", "stroke", "stroke_speed", "drive_force_inertia", "F12", "F32", "F43", "F14"}
 
 
 @pytest.mark.parametrize("engine", [*FREE_BODY, *EXACT], ids=lambda engine: engine.name)
@@ -102,8 +102,11 @@ FAULTS = {
     "line reversed": ("act", _reversed),
     "one of its two ends": ("act", _of_one_end),
     "lever of the wrong bar": ("act", _of_the_wrong_bar),
-    "sign of the speed": ("gain", lambda self, state, of=LinearDrive.gain: -of(self, state)),
-    "half the leverage": ("leverage", lambda *given, of=LinearDrive.leverage: (0.5 * of(*given)[0], of(*given)[1])),
+    "sign of the speed": ("gain", lambda self, state, true=LinearDrive.gain: -true(self, state)),
+    "half the leverage": (
+        "leverage",
+        lambda *arguments, true=LinearDrive.leverage: (0.5 * true(*arguments)[0], true(*arguments)[1]),
+    ),
 }
 
 

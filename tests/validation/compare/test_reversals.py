@@ -37,9 +37,9 @@ def dead_centres() -> list[float]:
 def test_they_are_where_geometry_puts_them(pin: str, places: list[float]) -> None:
     """The rocker turns at its dead centres; bars 3 and 4 turn together where A lies on the line of centres."""
     posed = scene(pin)
-    found = find_reversals(posed, command(posed), solve(posed))
-    assert [reversal.theta_2 for reversal in found] == pytest.approx(places, abs=ROUNDING)
-    assert {reversal.pin for reversal in found} <= {pin}
+    reversals = find_reversals(posed, command(posed), solve(posed))
+    assert [reversal.theta_2 for reversal in reversals] == pytest.approx(places, abs=ROUNDING)
+    assert {reversal.pin for reversal in reversals} <= {pin}
 
 
 def test_the_jump_is_that_of_statics() -> None:
@@ -65,12 +65,12 @@ def test_both_sides_are_judged_and_the_reversal_itself_is_not(start: float) -> N
 def test_a_curve_is_not_drawn_across_the_jump() -> None:
     posed = scene("O4")
     solution = solve(posed)
-    found = find_reversals(posed, command(posed), solution)
+    reversals = find_reversals(posed, command(posed), solution)
     assert solution.F43 is not None
-    x, y = break_curve(solution.theta_2, solution.F43[:, 0], found, lambda side: side.F43[:, 0])  # type: ignore[index]
+    x, y = break_curve(solution.theta_2, solution.F43[:, 0], reversals, lambda side: side.F43[:, 0])  # type: ignore[index]
     gaps = np.flatnonzero(np.isnan(y))
-    assert len(gaps) == len(found) == 2 and len(x) == len(y) == len(solution) + 6
-    for gap, reversal in zip(gaps, found, strict=True):
+    assert len(gaps) == len(reversals) == 2 and len(x) == len(y) == len(solution) + 6
+    for gap, reversal in zip(gaps, reversals, strict=True):
         assert x[gap - 1] == x[gap + 1] == reversal.theta_2
         assert abs(y[gap + 1] - y[gap - 1]) > 0.1
     assert (np.diff(x) >= 0).all()

@@ -62,7 +62,9 @@ def test_a_quantity_that_every_row_calls_degraded_is_counted_and_named() -> None
         "three": [("a", "torque", DEGRADED, 0.5), ("b", "torque", REFUSES, NAN)],
     }
     judged = judge_for_report("", crank_rocker(), (), draw=False)
-    records = [replace(judged, name=name, rows=[row(name, *of) for of in many]) for name, many in scenes.items()]
+    records = [
+        replace(judged, name=name, rows=[row(name, *values) for values in many]) for name, many in scenes.items()
+    ]
     summary = summary_of(records)
     assert (summary.loose, summary.pairs) == (2, 5)
     stated = "2 of 5 quantities of a scene are at best"
@@ -76,7 +78,7 @@ IDENTITY = replace(ROW, engine="formulas", quantity="closure")
 
 
 @pytest.mark.parametrize(
-    ("of", "sentence", "status"),
+    ("rows", "sentence", "status"),
     [
         (rows(agree=2), "All 2 comparisons hold: 2 agree", HOLDS),
         (
@@ -101,8 +103,8 @@ IDENTITY = replace(ROW, engine="formulas", quantity="closure")
         ([replace(IDENTITY, quantity="theta_2")], "All 1 comparisons hold: 1 agrees", HOLDS),  # with an exact solution
     ],
 )
-def test_all_hold_counts_what_was_compared_alone(of: list[Row], sentence: str, status: int) -> None:
-    counts = Counts(of)
+def test_all_hold_counts_what_was_compared_alone(rows: list[Row], sentence: str, status: int) -> None:
+    counts = Counts(rows)
     assert (counts.sentence(), counts.status) == (sentence, status)
 
 
@@ -162,16 +164,16 @@ class SilentWithoutEffects(Echo):
 )
 def test_what_is_wrong_with_the_inertia_alone_is_a_row(adapter: type, verdict: str, reason: str) -> None:
     engine = Engine("echo", adapter, EQUIVALENCE)
-    found = [row for row in judge("scene", crank_rocker(), [engine]).rows if row.quantity == "torque_inertia"]
-    assert [(row.verdict, row.reason) for row in found] == [(verdict, reason)]
+    inertial_rows = [row for row in judge("scene", crank_rocker(), [engine]).rows if row.quantity == "torque_inertia"]
+    assert [(row.verdict, row.reason) for row in inertial_rows] == [(verdict, reason)]
 
 
 def test_where_no_loop_closes_no_identity_is_counted_as_held() -> None:
     apart = fourbar.Motion(fourbar.Sweep(2.0, 4.0, 5), 1.0)  # beyond the limits of this input
     scene = Scene(fourbar.uniform(0.3, 0.25, 0.1, 0.22), apart)
     assert not fourbar.solve(scene).assembled.any()
-    found = judge("scene", scene, [w for w in ENGINES if w.name == "free-body"]).rows
-    verdicts = {(row.engine, row.quantity): row.verdict for row in found}
+    rows = judge("scene", scene, [w for w in ENGINES if w.name == "free-body"]).rows
+    verdicts = {(row.engine, row.quantity): row.verdict for row in rows}
     assert verdicts["formulas", "closure"] == verdicts["free-body", "torque"] == UNDECIDED
     assert verdicts["free-body", "assembled"] == AGREES
 
@@ -187,9 +189,9 @@ def test_an_identity_that_is_due_nowhere_is_not_counted_as_held(monkeypatch: pyt
 
 def test_formulas_without_an_answer_fail() -> None:
     scene = crank_rocker()
-    at = command(scene)
-    answer = Echo().answer(scene, at)
-    positions = fourbar.solve(scene, "position", at=at)
+    commanded = command(scene)
+    answer = Echo().answer(scene, commanded)
+    positions = fourbar.solve(scene, "position", at=commanded)
     (row,) = [
         r
         for r in Comparison("", scene, answer, positions, Held(EQUIVALENCE, ("torque",))).rows()
@@ -292,12 +294,12 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before() -> N
 def test_two_runs_without_a_comparison_in_common_are_no_success(
     old: list[Row], new: list[Row], sentence: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folders = [str(save(tmp_path / name, each)) for name, each in (("old", old), ("new", new))]
+    folders = [str(save(tmp_path / name, rows)) for name, rows in (("old", old), ("new", new))]
     assert status(["compare", *folders]) == code
     assert sentence in capsys.readouterr().out
-    found = compare_rows((HERE, old), (HERE, new))
-    sentence = render.write_verdict(found)
-    assert sentence in html.unescape(render.write_html(found)) and sentence in render.write_markdown(found)
+    changes = compare_rows((HERE, old), (HERE, new))
+    sentence = render.write_verdict(changes)
+    assert sentence in html.unescape(render.write_html(changes)) and sentence in render.write_markdown(changes)
 
 
 def test_of_two_rows_of_one_name_the_worse_one_counts() -> None:
@@ -310,7 +312,7 @@ def test_numbers_without_a_digit_do_not_agree(tmp_path: Path, capsys: pytest.Cap
     rocker = fourbar.uniform(0.3, 0.25, 0.1, 0.22)
     limit = limit_positions(rocker)[0].theta_2
     near = (Scene(rocker, fourbar.Motion(limit + side * 1e-13, 1.0)) for side in (1.0, -1.0))
-    scene = next(each for each in near if fourbar.solve(each).assembled.all())
+    scene = next(candidate for candidate in near if fourbar.solve(candidate).assembled.all())
     (tmp_path / "scene.toml").write_text(fourbar.dump(scene))
     (tmp_path / "theirs.csv").write_text(f"theta_2, torque\n{scene.motion.theta_2!r}, 17.0\n")
     assert status(["check", str(tmp_path / "scene.toml"), str(tmp_path / "theirs.csv")]) == FAILED
@@ -331,7 +333,7 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(
 
 
 @pytest.mark.parametrize(
-    ("error", "allowed", "where", "verdict", "worst"),
+    ("error", "allowed", "mask", "verdict", "worst"),
     [
         ([0.0, 2.0, 1.0], 2.0, None, AGREES, 1),
         ([0.0, 2.0, 1.0], [1.0, 3.0, 0.5], None, FAILS, 2),
@@ -344,9 +346,9 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(
     ],
 )
 def test_one_rule_of_agreement(
-    error: list[float], allowed: float | list[float], where: list[bool] | None, verdict: str, worst: int
+    error: list[float], allowed: float | list[float], mask: list[bool] | None, verdict: str, worst: int
 ) -> None:
-    mask, places = None if where is None else np.array(where), np.array([1.0, 2.0, 3.0])
+    mask, places = None if mask is None else np.array(mask), np.array([1.0, 2.0, 3.0])
     bound = np.array(allowed) if isinstance(allowed, list) else allowed
     row = Row.judged(("a", "b", "c"), "F12", np.array(error), bound, "", places, 1.0, mask)
     assert (row.verdict, row.theta_2) == (verdict, worst + 1.0)

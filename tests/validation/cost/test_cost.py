@@ -55,12 +55,12 @@ def tried(scene: fourbar.Scene, build: Build | None = None) -> Callable[[Setting
 )
 def test_each_integrator_shows_its_order(integrator: str, order: float, steps: tuple[int, ...]) -> None:
     error = tried(turning())
-    found = [
+    points = [
         error(replace(BEST, integrator=integrator, steps_per_revolution=n, time_constant_steps=n / 4)).worst
         for n in steps
     ]
-    exponent, sigma = laws.fit([1.0 / n for n in steps], found)
-    assert abs(exponent - order) <= max(2.0 * sigma, laws.WITHIN), (exponent, sigma, found)
+    exponent, sigma = laws.fit([1.0 / n for n in steps], points)
+    assert abs(exponent - order) <= max(2.0 * sigma, laws.WITHIN), (exponent, sigma, points)
 
 
 def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc() -> None:
@@ -129,10 +129,12 @@ def test_every_drive_exerts_the_torque_of_the_formulas(build: Build, settings: S
 
 def test_one_state_is_wrong_in_proportion_and_right_in_the_limit() -> None:
     for scene in (turning(positions=12), crank_rocker(), thesis(np.radians([100.0, 135.0, 220.0, 300.0]))):
-        at = command(scene)
+        commanded = command(scene)
 
-        def wrong(*impedances: float, scene: fourbar.Scene = scene, at: object = at) -> float:
-            return compute_errors(scene, at, MujocoOneState(impedances).answer(scene, at).quantities).worst  # type: ignore[arg-type]
+        def wrong(*impedances: float, scene: fourbar.Scene = scene, commanded: object = commanded) -> float:
+            return compute_errors(
+                scene, commanded, MujocoOneState(impedances).answer(scene, commanded).quantities
+            ).worst  # type: ignore[arg-type]
 
         soft, stiff = wrong(0.999), wrong(0.9999)
         assert soft / stiff == pytest.approx(10.0, rel=0.1)
@@ -141,10 +143,10 @@ def test_one_state_is_wrong_in_proportion_and_right_in_the_limit() -> None:
 
 def test_formulas_in_four_precisions() -> None:
     for scene in (turning(positions=8), crank_rocker(), thesis(np.radians([100.0, 135.0, 220.0]))):
-        at = formulas.choose_few(command(scene))
-        exact = formulas.evaluate_balls(scene, at, 2 * formulas.FIFTY_DIGITS)
+        commanded = formulas.choose_few(command(scene))
+        exact = formulas.evaluate_balls(scene, commanded, 2 * formulas.FIFTY_DIGITS)
         wrong = {
-            name: formulas.compare_with_reference(scene, at, method(scene, at), exact).worst
+            name: formulas.compare_with_reference(scene, commanded, method(scene, commanded), exact).worst
             for name, method in formulas.METHODS.items()
         }
         assert wrong["formulas, double"] < 1e-13 and wrong["13x13"] < 1e-12
@@ -161,11 +163,11 @@ def test_single_precision_slides_too() -> None:
 
 def test_what_is_no_number_or_not_compared_has_no_small_error() -> None:
     scene = turning(positions=8)
-    at = formulas.choose_few(command(scene))
-    exact, ours = formulas.evaluate_balls(scene, at), formulas.evaluate_double(scene, at)
+    commanded = formulas.choose_few(command(scene))
+    exact, ours = formulas.evaluate_balls(scene, commanded), formulas.evaluate_double(scene, commanded)
     ours["torque"][3], ours["F12"][2, 1] = math.nan, math.nan
-    found = formulas.compare_with_reference(scene, at, ours, {**exact, "F14": [(None, None)] * 9})
-    assert found.torque == found.F12 == found.F14 == math.inf and found.F43 < 1e-13
+    worst_errors = formulas.compare_with_reference(scene, commanded, ours, {**exact, "F14": [(None, None)] * 9})
+    assert worst_errors.torque == worst_errors.F12 == worst_errors.F14 == math.inf and worst_errors.F43 < 1e-13
     still = replace(scene, motion=scene.motion.replace(speed=0.0), drive_bar=4)
     solution = fourbar.solve(still, "force")
     assert (
@@ -204,23 +206,25 @@ JUMPING = (6.4e-2, 3.2e-2, 1.6e-2, 8e-3, 4e-3, 0.44, 1e-3, 5e-4)
 )
 def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping: tuple[float, ...]) -> None:
     ladder = [point(20.0 * 2**k, 0.05 / 2**k) for k in range(8)]
-    ladder = [replace(each, F43=error) for each, error in zip(ladder, jumping, strict=True)]
-    found = {law.quantity: law for law in laws.fit_laws({"Euler, tc held": ladder})}
-    assert {name for name, law in found.items() if not law.holds} == {"F43"} and found["F43"].decided
+    ladder = [replace(rung, F43=error) for rung, error in zip(ladder, jumping, strict=True)]
+    laws_found = {law.quantity: law for law in laws.fit_laws({"Euler, tc held": ladder})}
+    assert {name for name, law in laws_found.items() if not law.holds} == {"F43"} and laws_found["F43"].decided
     jump = f"jumps from 4.0e-03 to {jumping[5]:.1e} at 640/rev"
     assert laws.list_warnings({"Euler, tc held": ladder}) == [f"Euler, tc held: F43: {jump}"]
     assert "F43 jumps" in pictures.state_jumps({"Euler, tc held": ladder})
     drawn = {line.get_gid(): len(line.get_xdata()) for axes in pictures.draw_orders({"Euler, tc held": ladder}, "").axes
              for line in axes.lines if line.get_gid() and len(line.get_xdata())}  # fmt: skip
     assert drawn == {"jump-F43": 1}
-    (line,) = laws.write_laws(list(found.values()))
+    (line,) = laws.write_laws(list(laws_found.values()))
     assert f"; F43: FAILS, {jump}" in line and "torque, F12, F32, F14: holds, 1.00" in line
 
 
 def test_each_quantity_has_its_own_order_and_floor() -> None:
     ladder = [replace(point(20.0 * 2**k, 2.0 ** (-4 * k - 8)), F14=0.05 / 2**k, F32=1e-3) for k in range(8)]
-    found = {law.quantity: law for law in laws.fit_laws({"RK4, tc held": ladder})}
-    assert found["torque"].holds and found["F14"].exponent == pytest.approx(1.0) and not found["F14"].holds
+    laws_found = {law.quantity: law for law in laws.fit_laws({"RK4, tc held": ladder})}
+    assert (
+        laws_found["torque"].holds and laws_found["F14"].exponent == pytest.approx(1.0) and not laws_found["F14"].holds
+    )
     (line,) = laws.list_warnings({"RK4, tc held": ladder})
     assert line.endswith("F32 beyond 20 (1.0e-03)") and "torque" not in line
 
@@ -228,8 +232,8 @@ def test_each_quantity_has_its_own_order_and_floor() -> None:
 def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported() -> None:
     """In the thesis's mechanism the torque falls by its order with Euler, and the pin forces are wrong throughout."""
     ladder = [replace(point(160.0 * 2**k, 0.05 / 2**k), F12=error) for k, error in enumerate((1.8, 0.9, 1.1, 0.7))]
-    found = {law.quantity: law for law in laws.fit_laws({"Euler, tc held": ladder})}
-    assert found["torque"].holds and not found["F12"].decided and not found["F12"].holds
+    laws_found = {law.quantity: law for law in laws.fit_laws({"Euler, tc held": ladder})}
+    assert laws_found["torque"].holds and not laws_found["F12"].decided and not laws_found["F12"].holds
     assert laws.list_warnings({"Euler, tc held": ladder}) == [
         "Euler, tc held: no timestep of the ladder brings F12 below 0.1"
     ]
@@ -238,7 +242,7 @@ def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported() -> 
 
 def test_a_dip_and_a_motion_lost_at_coarse_steps_are_no_jump() -> None:
     """Where two sources cancel the error dips; the softest closures, and the fewest steps, carry no motion at all."""
-    ladder = [point(20.0 * 2**k, each) for k, each in enumerate((0.9, math.inf, 0.3, 3e-2, 1e-4, 1.2e-2, 6e-3, 3e-3))]
+    ladder = [point(20.0 * 2**k, error) for k, error in enumerate((0.9, math.inf, 0.3, 3e-2, 1e-4, 1.2e-2, 6e-3, 3e-3))]
     assert not any(laws.find_jumps(ladder, quantity) for quantity in QUANTITIES)
 
 
@@ -264,12 +268,12 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         list(units("b").points())
-    found = dict(units(None).points())
-    assert done == ["a", "b", "c"] and [p.curve for row in found.values() for p in row] == ["a", "b", "c"]
+    points = dict(units(None).points())
+    assert done == ["a", "b", "c"] and [p.curve for row in points.values() for p in row] == ["a", "b", "c"]
     assert json.loads((tmp_path / "run.json").read_text())["study"] == study.VERSION
-    other = study.CostStudy("s", turning(20.0), tmp_path)  # another scene in the same folder starts over
-    other.units = {}
-    assert not list(other.points()) and not list((tmp_path / "parts").iterdir())
+    second_study = study.CostStudy("s", turning(20.0), tmp_path)  # another scene in the same folder starts over
+    second_study.units = {}
+    assert not list(second_study.points()) and not list((tmp_path / "parts").iterdir())
 
 
 @pytest.mark.slow
@@ -281,11 +285,11 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
     monkeypatch.setattr(study, "design_curves", lambda scene: [c for c in every(scene) if c.name in few])
     monkeypatch.setattr(study, "REQUIRED", (1e-3, 1e-5))
     monkeypatch.setattr(study, "ROUNDS", 1)
-    result = CliRunner().invoke(cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False)
-    assert result.exception is None and result.return_value == 0, result.output
-    assert "matters most here. " in result.output and ", because " in result.output
-    assert re.search(r"RK4 steps +ms/turn +\+-", result.output)
-    assert any(re.search(r": .* \d+e-\d+ +\d+ +\S+ +\d+ % *$", line) for line in result.output.splitlines())
+    process = CliRunner().invoke(cost, [str(scene), "--out", str(tmp_path / "out")], standalone_mode=False)
+    assert process.exception is None and process.return_value == 0, process.output
+    assert "matters most here. " in process.output and ", because " in process.output
+    assert re.search(r"RK4 steps +ms/turn +\+-", process.output)
+    assert any(re.search(r": .* \d+e-\d+ +\d+ +\S+ +\d+ % *$", line) for line in process.output.splitlines())
     folder = tmp_path / "out" / "small"
     rows = (folder / "cost.csv").read_text().splitlines()
     assert rows[0] == ",".join(study.COLUMNS) and len(rows) > 40
@@ -302,8 +306,8 @@ def test_the_command_writes_table_report_and_pictures(tmp_path: Path, monkeypatc
 def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
     scene, out = tmp_path / "law.toml", tmp_path / "out"
     scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
-    result = CliRunner().invoke(cost, [str(scene), "--out", str(out)], standalone_mode=False)
-    assert isinstance(result.exception, fourbar.errors.LimitError) and "motion law" in str(result.exception)
+    process = CliRunner().invoke(cost, [str(scene), "--out", str(out)], standalone_mode=False)
+    assert isinstance(process.exception, fourbar.errors.LimitError) and "motion law" in str(process.exception)
     assert not out.exists()
 
 
@@ -325,7 +329,7 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut() -> None:
     with apply_style():
         figure = pictures._draw_work_precision(curves, "torque", "title")
     boxes = [text.get_window_extent() for text in figure.axes[0].texts]
-    assert len(boxes) == 7 and not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    assert len(boxes) == 7 and not any(box.overlaps(next_box) for box, next_box in combinations(boxes, 2))
     assert all(figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1 for box in boxes)
 
 

@@ -128,13 +128,15 @@ def test_a_turned_frame_turns_gravity_with_it() -> None:
         motion=motion,
         effects=(Gravity(9.81, 0.3 + by),),
     )
-    one, other = fourbar.solve(posed), fourbar.solve(turned)
-    assert one.torque is not None and one.F32 is not None and other.F32 is not None
+    posed_solution, turned_solution = fourbar.solve(posed), fourbar.solve(turned)
+    assert posed_solution.torque is not None and posed_solution.F32 is not None and turned_solution.F32 is not None
     # 60 roundings of numbers of the size of the largest
-    assert other.torque == pytest.approx(one.torque, abs=60 * 2.0**-52 * np.abs(one.torque).max(), rel=0)
+    assert turned_solution.torque == pytest.approx(
+        posed_solution.torque, abs=60 * 2.0**-52 * np.abs(posed_solution.torque).max(), rel=0
+    )
     spin = np.exp(1j * by)
-    expected = (one.F32 @ [1, 1j]) * spin
-    assert np.abs(other.F32 @ [1, 1j] - expected).max() <= 60 * 2.0**-52 * np.abs(expected).max()
+    expected = (posed_solution.F32 @ [1, 1j]) * spin
+    assert np.abs(turned_solution.F32 @ [1, 1j] - expected).max() <= 60 * 2.0**-52 * np.abs(expected).max()
 
 
 # faults
@@ -171,9 +173,9 @@ def test_an_effect_that_acts_elsewhere_in_the_formulas_fails_the_run(
     true, kind = question.solve, "loads" if isinstance(ACTING[name], Load) else "effects"
     elsewhere = replace(scene(name), **{kind: (moved(ACTING[name]),)})
     monkeypatch.setattr(question, "solve", lambda _, *a, **k: true(elsewhere, *a, **k))
-    found = failing(scene(name), [engine for engine in EXACT if engine.name in INVERSE])
-    assert {engine for engine, _, _ in found} >= INVERSE
-    assert "torque" in {quantity for _, quantity, _ in found}
+    failed = failing(scene(name), [engine for engine in EXACT if engine.name in INVERSE])
+    assert {engine for engine, _, _ in failed} >= INVERSE
+    assert "torque" in {quantity for _, quantity, _ in failed}
 
 
 class FaultyTree:
@@ -214,14 +216,14 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(
         monkeypatch.setattr(free_body_effects, "apply_load", faulty(free_body_effects.apply_load))
     else:
         monkeypatch.setitem(free_body_effects.WRENCH_OF, name, faulty(free_body_effects.WRENCH_OF[name]))
-    found = failing(scene(name), [engine for engine in EXACT if engine.name == "free-body"])
-    assert "torque" in {quantity for _, quantity, _ in found}
+    failed = failing(scene(name), [engine for engine in EXACT if engine.name == "free-body"])
+    assert "torque" in {quantity for _, quantity, _ in failed}
 
 
 def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Spring, "slack", 0.0)
-    found = failing(scene("springs"), [engine for engine in EXACT if engine.name in ON_TREES])
-    assert {engine for engine, _, _ in found} >= ON_TREES
+    failed = failing(scene("springs"), [engine for engine in EXACT if engine.name in ON_TREES])
+    assert {engine for engine, _, _ in failed} >= ON_TREES
 
 
 @pytest.mark.parametrize("name", ACTING)
@@ -230,5 +232,5 @@ def test_a_fault_in_the_engine_term_fails_the_run(name: str, factor: float, monk
     key = ACTING[name].key
     right = TERM_OF[key]
     monkeypatch.setitem(TERM_OF, key, lambda effect, tree: right(effect, FaultyTree(tree, factor)))
-    found = failing(scene(name), [engine for engine in EXACT if engine.name in ON_TREES])
-    assert {engine for engine, _, _ in found} >= ON_TREES
+    failed = failing(scene(name), [engine for engine in EXACT if engine.name in ON_TREES])
+    assert {engine for engine, _, _ in failed} >= ON_TREES

@@ -96,8 +96,8 @@ def test_each_effect_adds_what_it_needs_and_no_more(
 
 def test_an_effect_of_zero_size_is_still_named() -> None:
     """A torque of 0 that the scene writes down is the scene's; what it leaves out is not there at all."""
-    named = write_mjcf(crank_rocker(loads=(), effects=(Friction.at(A=0.0),)))
-    assert "frictionloss=" in named and 'frictionloss="0.0"' not in write_mjcf(crank_rocker(loads=(), effects=()))
+    mjcf = write_mjcf(crank_rocker(loads=(), effects=(Friction.at(A=0.0),)))
+    assert "frictionloss=" in mjcf and 'frictionloss="0.0"' not in write_mjcf(crank_rocker(loads=(), effects=()))
 
 
 POSITIONS_ONLY = """

@@ -96,12 +96,12 @@ def answered(name: str, case: Scene, at: Command | None = None) -> Any:
 
 def failures(name: str, case: Scene, every: int = 1) -> list[tuple[str, str]]:
     """Quantities on which an engine and the formulas disagree, or its refusal."""
-    at = command(case)
-    at = at._replace(angle=at.theta_2[::every], branch=at.branch[::every])
-    answer = answered(name, case, at)
+    commanded = command(case)
+    commanded = commanded._replace(angle=commanded.theta_2[::every], branch=commanded.branch[::every])
+    answer = answered(name, case, commanded)
     if answer.refusal is not None:
         return [("refusal", answer.refusal)]
-    comparison = Comparison("scene", case, answer, solve(case, "force", at=at), Held(EQUIVALENCE, COMPARED))
+    comparison = Comparison("scene", case, answer, solve(case, "force", at=commanded), Held(EQUIVALENCE, COMPARED))
     rows = [*comparison.rows(), comparison.closure()]
     return [(row.quantity, row.reason) for row in rows if not row.passed]
 
@@ -224,12 +224,12 @@ def test_bars_without_mass_or_inertia(name: str) -> None:
     """Exudyn and Pinocchio hold them; MuJoCo and OpenSim would drop them, and OpenSim and Drake divide by some."""
     without_mass, without_inertia = REFUSED[name]
     for number in (2, 3, 4):
-        for values, refused in (*((each, without_mass) for each in MASSLESS), (POINT, without_inertia)):
-            found = failures(name, with_bar(number, **values))
+        for values, refused in (*((massless, without_mass) for massless in MASSLESS), (POINT, without_inertia)):
+            failed = failures(name, with_bar(number, **values))
             if number in refused:
-                assert found[0][0] == "refusal" and f"bar {number}" in found[0][1]
+                assert failed[0][0] == "refusal" and f"bar {number}" in failed[0][1]
             else:
-                assert found == []
+                assert failed == []
 
 
 @each_engine
@@ -339,7 +339,7 @@ SPOILED = Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.linspace(0.3, 6.0, 6
 
 
 def judged(name: str) -> set[str]:
-    return {found for found, _ in failures(name, SPOILED)}
+    return {failed_quantity for failed_quantity, _ in failures(name, SPOILED)}
 
 
 @each_engine
@@ -390,7 +390,7 @@ def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
         assert {*MOVED, "torque" if case.drive is None else "drive_force", "closure"} <= held
         right = loop.Assembler.find
         with monkeypatch.context() as patch:
-            patch.setattr(loop.Assembler, "find", lambda self, theta, branch, of=right: of(self, theta, -branch))
+            patch.setattr(loop.Assembler, "find", lambda self, theta, branch, find=right: find(self, theta, -branch))
             assert [row for row in judge("", case, [ENGINE[name]]).rows if row.engine == name and row.failed]
 
 
@@ -431,20 +431,22 @@ def test_a_thousand_turns_take_no_position(name: str) -> None:
 @each_engine
 def test_a_position_before_leaves_nothing_behind(name: str) -> None:
     fast = Scene(bars(MECHANISMS["crank-rocker"]), Motion(np.array([1.0, 2.0]), 3e4, 1e9))
-    whole, at = answered(name, fast).quantities, command(fast)
-    alone = answered(name, fast, at._replace(angle=at.theta_2[1:], branch=at.branch[1:])).quantities
+    quantities, commanded = answered(name, fast).quantities, command(fast)
+    alone = answered(
+        name, fast, commanded._replace(angle=commanded.theta_2[1:], branch=commanded.branch[1:])
+    ).quantities
     for quantity in ("omega_3", "alpha_4", "F12", "F43", "torque"):
-        np.testing.assert_array_equal(whole[quantity][1:], alone[quantity], err_msg=quantity)
+        np.testing.assert_array_equal(quantities[quantity][1:], alone[quantity], err_msg=quantity)
         assert np.isfinite(alone[quantity]).all(), quantity
 
 
 def test_a_scene_before_leaves_nothing_behind() -> None:
     """MuJoCo keeps one memory for the trees of an engine."""
-    linkage, at = bars(MECHANISMS["crank-rocker"]), Motion(np.linspace(0.0, 6.0, 5), 10.0, 3.0)
-    plain, loaded = Scene(linkage, at), Scene(replace(linkage, ground=0.31), at, 4, LOADS, EFFECTS)
+    linkage, motion = bars(MECHANISMS["crank-rocker"]), Motion(np.linspace(0.0, 6.0, 5), 10.0, 3.0)
+    plain, loaded = Scene(linkage, motion), Scene(replace(linkage, ground=0.31), motion, 4, LOADS, EFFECTS)
     engine = MujocoInverse()
     engine.answer(loaded, command(loaded))
-    kept, fresh = (each.answer(plain, command(plain)).quantities for each in (engine, MujocoInverse()))
+    kept, fresh = (asked.answer(plain, command(plain)).quantities for asked in (engine, MujocoInverse()))
     for name, values in fresh.items():
         np.testing.assert_array_equal(kept[name], values, err_msg=name)
 
@@ -459,9 +461,9 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
     link, motion = uniform(0.3, 0.1, 0.25, 0.22), Motion(np.array([theta_2]), 3.0, 2.0)
     for arms, jams in ((r, False), (50.0, True)):
         friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
-        whole = Scene(link, motion, drive, (), (Gravity(), friction))
+        case_of_link = Scene(link, motion, drive, (), (Gravity(), friction))
         names = ("pinocchio-inverse", "free-body")
-        answers = [ENGINE[name].start().answer(whole, command(whole)) for name in names]
+        answers = [ENGINE[name].start().answer(case_of_link, command(case_of_link)) for name in names]
         engine, bodies = (answer.quantities["torque"][0] for answer in answers)
         assert math.isnan(engine) is math.isnan(bodies) is jams
         assert jams or abs(engine - bodies) <= 1e-9 * abs(bodies)  # of some 1e-12 that rounding leaves near a jam

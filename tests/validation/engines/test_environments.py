@@ -102,12 +102,12 @@ def test_an_engine_is_asked_for_its_steps_an_error_or_a_setting() -> None:
     (guest,) = start_engines([entry], ENGINES)
     (wanted,) = adjust_engines([guest], 1e-3)
     refused, exact = start_engines([replace(entry, setting="fast"), Entry("free", adapter="free-body")], ENGINES)
-    at = list_positions(scene)
-    assert guest.start().answer(scene, at).setting == "RK4 96/rev"
-    answer = wanted.start().answer(scene, at)
+    commanded = list_positions(scene)
+    assert guest.start().answer(scene, commanded).setting == "RK4 96/rev"
+    answer = wanted.start().answer(scene, commanded)
     assert answer.evidence["wanted_error"] == 1e-3 and answer.setting != "RK4 96/rev"
-    assert refused.start().answer(scene, at).refusal == "the engine's hello does not list 'fast' in settings"
-    assert adjust_engines([exact], 1e-3)[0].start().answer(scene, at).setting == "exact"
+    assert refused.start().answer(scene, commanded).refusal == "the engine's hello does not list 'fast' in settings"
+    assert adjust_engines([exact], 1e-3)[0].start().answer(scene, commanded).setting == "exact"
 
 
 @pytest.mark.parametrize(

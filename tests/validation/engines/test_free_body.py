@@ -49,7 +49,7 @@ def test_it_imports_the_description_and_nothing_of_the_formulas() -> None:
     for module in (free_body, free_body_closure, free_body_effects):
         modules = imported(ROOT / "validation/fourbar_validation/engines" / f"{module.__name__.split('.')[-1]}.py")
         assert modules
-        assert not {each for each in modules if not each.startswith(allowed) and each.split(".")[0] not in standard}
+        assert not {name for name in modules if not name.startswith(allowed) and name.split(".")[0] not in standard}
 
 
 # the closure
@@ -176,8 +176,8 @@ def test_dry_friction_does_nothing_at_rest() -> None:
 )
 def test_friction_of_one_pin(F: complex, C: complex, x: float) -> None:
     """x = |F + C x| by hand; where the couple adds to its own load by as much as it is, the pin jams."""
-    found = continue_couples(np.array([[F]], dtype=complex), np.array([[[C]]], dtype=complex), np.array([1.0]))
-    assert found[0, 0] == pytest.approx(x, rel=1e-14, nan_ok=True)
+    couples = continue_couples(np.array([[F]], dtype=complex), np.array([[[C]]], dtype=complex), np.array([1.0]))
+    assert couples[0, 0] == pytest.approx(x, rel=1e-14, nan_ok=True)
 
 
 def test_friction_of_several_pins_fulfils_its_equations() -> None:
@@ -198,10 +198,10 @@ def test_a_singular_position_costs_no_other() -> None:
 
 def test_positions_alone_are_judged_with_what_is_stated_of_the_linkage() -> None:
     rows = judge("scene", crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.0, 6.0, 20))), ONE).rows
-    found = {row.quantity for row in rows if row.engine == "free-body"}
+    quantities = {row.quantity for row in rows if row.engine == "free-body"}
     of_the_linkage = {"assembled", "undecided", "closure", "range", "limit_positions", "transmission"}
     of_positions = {name for name, stage in STAGE_OF.items() if stage == "position" and name not in LINE_QUANTITIES}
-    assert found == of_the_linkage | of_positions
+    assert quantities == of_the_linkage | of_positions
     assert all(row.passed for row in rows)
 
 
@@ -253,7 +253,7 @@ def test_faults_in_the_free_bodies_show(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_blocks_of_positions_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = answered(crank_rocker())
+    full_answer = answered(crank_rocker())
     monkeypatch.setattr(free_body, "BLOCK", 7)
     for name, values in answered(crank_rocker()).items():
-        assert np.array_equal(values, whole[name]), name
+        assert np.array_equal(values, full_answer[name]), name

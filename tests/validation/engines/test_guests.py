@@ -49,18 +49,18 @@ def judged(scene: fourbar.Scene, *entries: str, seconds: float = 60.0) -> Verdic
     """Verdict and reason by engine and quantity; a name without a colon is a class of tests.support."""
     entries = tuple(entry if re.search("[: ]", entry) else HERE + entry for entry in entries)
     engines = (*guests.read_guests(entries, [engine.name for engine in FREE_BODY], seconds), *FREE_BODY)
-    result: Verdicts = {}
+    by_engine: Verdicts = {}
     for row in judge("scene", scene, engines).rows:
-        result.setdefault(row.engine, {})[row.quantity] = row.verdict, row.reason
-    return result
+        by_engine.setdefault(row.engine, {})[row.quantity] = row.verdict, row.reason
+    return by_engine
 
 
 def verdicts(rows: dict[str, tuple[str, str]]) -> set[str]:
     return {verdict for verdict, _ in rows.values()}
 
 
-def others_agree(found: Verdicts) -> bool:
-    return verdicts(found["formulas"]) == verdicts(found["free-body"]) == {AGREES}
+def others_agree(by_engine: Verdicts) -> bool:
+    return verdicts(by_engine["formulas"]) == verdicts(by_engine["free-body"]) == {AGREES}
 
 
 @pytest.mark.parametrize("language", ["python", "node"])
@@ -131,9 +131,11 @@ FINE: dict[str, tuple[str, str]] = {
 
 
 def test_a_torque_that_is_a_thousandth_off_fails_alone(tmp_path: Path) -> None:
-    found = judged(SCENE, write_program(tmp_path, "off", (TORQUE, '"torque": 1.001 * (moments[0] - cross(r2, F32))')))
-    assert {name for name, (verdict, _) in found["off"].items() if verdict == FAILS} == {"torque", "torque_inertia"}
-    assert others_agree(found)
+    by_engine = judged(
+        SCENE, write_program(tmp_path, "off", (TORQUE, '"torque": 1.001 * (moments[0] - cross(r2, F32))'))
+    )
+    assert {name for name, (verdict, _) in by_engine["off"].items() if verdict == FAILS} == {"torque", "torque_inertia"}
+    assert others_agree(by_engine)
 
 
 @pytest.mark.slow
@@ -146,12 +148,14 @@ def test_whatever_a_program_does_costs_its_own_rows(tmp_path: Path, monkeypatch:
     for name, (old, new, _) in PROGRAMS.items():
         entries[name] = write_program(tmp_path, name, (old, new))
     fine = {name: write_program(tmp_path, name, pair) for name, pair in FINE.items()}
-    found = judged(SCENE, *entries.values(), *fine.values())
-    assert others_agree(found)
+    by_engine = judged(SCENE, *entries.values(), *fine.values())
+    assert others_agree(by_engine)
     for name in fine:
-        assert verdicts(found[name]) == {AGREES}, (name, found[name])
+        assert verdicts(by_engine[name]) == {AGREES}, (name, by_engine[name])
     for name, (_, _, reason) in PROGRAMS.items():
-        rows = found[name if name in found else name.replace(" ", "_")]  # of one whose hello fails the file's name
+        rows = by_engine[
+            name if name in by_engine else name.replace(" ", "_")
+        ]  # of one whose hello fails the file's name
         ((verdict, said),) = [row for quantity, row in rows.items() if quantity == "all"]
         assert verdict == FAILS and said.startswith(reason) and "\n" not in said, (name, rows)
     end_guests()
@@ -167,11 +171,11 @@ def test_a_program_that_is_silent_ends_at_its_limit(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(processes, "MOST_ERRORS", 10**7)
     entries = [write_program(tmp_path, name, pair) for name, pair in SILENT.items()]
     began = time.monotonic()
-    found = judged(SCENE, *entries, seconds=3.0)
-    assert time.monotonic() - began < 60.0 and others_agree(found)
+    by_engine = judged(SCENE, *entries, seconds=3.0)
+    assert time.monotonic() - began < 60.0 and others_agree(by_engine)
     for name in ("silent", "ignores termination"):
-        assert found[name] == {"all": (FAILS, "no answer within 3 s")}
-    assert found["floods its errors"]["all"][1].startswith(("wrote more than", "no answer within"))
+        assert by_engine[name] == {"all": (FAILS, "no answer within 3 s")}
+    assert by_engine["floods its errors"]["all"][1].startswith(("wrote more than", "no answer within"))
     assert not list_processes(f"MARK_OF_TEST={tmp_path}")
 
 
@@ -182,20 +186,22 @@ def test_what_is_killed_from_outside_is_asked_again(tmp_path: Path) -> None:
     lives.write_text("xxxx")
     body = f"    n = os.path.getsize({str(lives)!r})\n"
     body += f"    if n: os.truncate({str(lives)!r}, n - 1); os.kill(os.getpid(), 9)\n"
-    found = judged(SCENE, write_program(tmp_path, "unlucky", (LAST, AFTER_HELLO + body + LAST)))
-    assert verdicts(found["unlucky"]) == {AGREES} and not lives.stat().st_size
+    by_engine = judged(SCENE, write_program(tmp_path, "unlucky", (LAST, AFTER_HELLO + body + LAST)))
+    assert verdicts(by_engine["unlucky"]) == {AGREES} and not lives.stat().st_size
 
 
 def test_a_class_is_served_by_our_host() -> None:
     classes = "Right Angle Changes Prints Empty Leaves Lacks Shapes Elsewhere Complex"
-    found = judged(SCENE, *classes.split())
-    assert others_agree(found) and verdicts(found["right"]) == {AGREES}
-    assert found["right"].keys() >= {*fourbar.quantities.UNKNOWNS, "assembled", "closure", "torque_inertia"}
-    assert set(found["angle"]) == {"assembled", "theta_3", "undecided"} and verdicts(found["angle"]) == {AGREES}
-    failing = {name: {quantity for quantity, row in rows.items() if row[0] == FAILS} for name, rows in found.items()}
+    by_engine = judged(SCENE, *classes.split())
+    assert others_agree(by_engine) and verdicts(by_engine["right"]) == {AGREES}
+    assert by_engine["right"].keys() >= {*fourbar.quantities.UNKNOWNS, "assembled", "closure", "torque_inertia"}
+    assert set(by_engine["angle"]) == {"assembled", "theta_3", "undecided"} and verdicts(by_engine["angle"]) == {AGREES}
+    failing = {
+        name: {quantity for quantity, row in rows.items() if row[0] == FAILS} for name, rows in by_engine.items()
+    }
     assert failing["changes"] == {"torque"}
     assert failing["lacks"] == {"theta_4", "torque", "closure", "torque_inertia"}
-    reasons = {name: rows["all"][1] for name, rows in found.items() if "all" in rows}
+    reasons = {name: rows["all"][1] for name, rows in by_engine.items() if "all" in rows}
     assert reasons == {
         "prints": "ValueError: no licence",
         "empty": "TypeError: the answer is a NoneType, not a fourbar_validation.Answer",
@@ -213,9 +219,12 @@ def test_a_guest_is_asked_for_what_its_hello_names(tmp_path: Path) -> None:
     stroke = fourbar.Motion(stroke=fourbar.Sweep(0.25, 0.35, 8), stroke_speed=0.2, side="left")
     drive = fourbar.LinearDrive(SpringEnd(1, 0.3, 2.2), SpringEnd(2, 0.12, 0.4))
     for scene in (four, crank_rocker(motion=stroke, drive=drive)):
-        found = judged(scene, "OfAnyBar", "Right")
-        assert verdicts(found["of any bar"]) == {AGREES} and {"theta_3", "alpha_4", "F12"} <= found["of any bar"].keys()
-        assert found["right"].keys() == {"all"} and found["right"]["all"][0] == REFUSES
+        by_engine = judged(scene, "OfAnyBar", "Right")
+        assert (
+            verdicts(by_engine["of any bar"]) == {AGREES}
+            and {"theta_3", "alpha_4", "F12"} <= by_engine["of any bar"].keys()
+        )
+        assert by_engine["right"].keys() == {"all"} and by_engine["right"]["all"][0] == REFUSES
     assert judged(three, "OfAnyBar")["of any bar"]["all"][0] == REFUSES
     loaded = judged(crank_rocker(), write_program(tmp_path, "plain"))["plain"]
     assert loaded["all"] == (REFUSES, "the engine's hello does not list loads in effects")
@@ -225,11 +234,11 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch: pyte
     pytest.importorskip("mujoco")
     monkeypatch.setattr("fourbar_validation.run.released.LONGEST_STEP", 1e-3)  # MuJoCo's here
     motion = fourbar.Motion(1.0, 2.0, free=Free(0.2, 10))
-    found = judged(crank_rocker(motion=motion, loads=()), "Releases", "Right")
-    assert verdicts(found["releases"]) <= {AGREES, DEGRADED} and verdicts(found["right"]) <= {AGREES, DEGRADED}
-    assert {"theta_2", "omega_2", "energy", "stopped_at", "F12"} <= found["releases"].keys()
-    assert "energy" not in found["right"]
-    assert {name: found["releases"][name] for name in found["mujoco-forward"]} == found["mujoco-forward"]
+    by_engine = judged(crank_rocker(motion=motion, loads=()), "Releases", "Right")
+    assert verdicts(by_engine["releases"]) <= {AGREES, DEGRADED} and verdicts(by_engine["right"]) <= {AGREES, DEGRADED}
+    assert {"theta_2", "omega_2", "energy", "stopped_at", "F12"} <= by_engine["releases"].keys()
+    assert "energy" not in by_engine["right"]
+    assert {name: by_engine["releases"][name] for name in by_engine["mujoco-forward"]} == by_engine["mujoco-forward"]
 
 
 def test_names_stand_apart() -> None:
@@ -256,9 +265,9 @@ def test_what_is_not_there_is_refused_in_one_line(entry: str, part: str) -> None
 
 @pytest.mark.parametrize(("name", "reason"), [("Nameless", "engine"), ("Loose", "tolerance"), ("Else", "answers")])
 def test_a_hello_that_fails_is_one_failing_row(name: str, reason: str) -> None:
-    found = judged(SCENE, name)
-    ((engine, rows),) = [item for item in found.items() if item[0] not in ("formulas", "free-body")]
-    assert others_agree(found) and rows.keys() == {"all"} and rows["all"][0] == FAILS
+    by_engine = judged(SCENE, name)
+    ((engine, rows),) = [item for item in by_engine.items() if item[0] not in ("formulas", "free-body")]
+    assert others_agree(by_engine) and rows.keys() == {"all"} and rows["all"][0] == FAILS
     assert engine == name and rows["all"][1].startswith(reason)
 
 

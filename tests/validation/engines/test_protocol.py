@@ -67,19 +67,23 @@ def test_every_scene_and_command_comes_back_bit_for_bit():
             sent = through_text(protocol.release_to_json(scene))
             assert protocol.release_from_json(back, **sent).motion == scene.motion
             continue
-        at = list_positions(scene)
-        told, command = protocol.command_from_json(back, through_text(protocol.command_to_json(scene, at)))
+        commanded = list_positions(scene)
+        told, command = protocol.command_from_json(back, through_text(protocol.command_to_json(scene, commanded)))
         if scene.motion.stroke is not None:
-            at = at._replace(
-                angle=np.full_like(at.angle, np.nan), acceleration=np.full_like(at.angle, np.nan), condition=None
+            commanded = commanded._replace(
+                angle=np.full_like(commanded.angle, np.nan),
+                acceleration=np.full_like(commanded.angle, np.nan),
+                condition=None,
             )
-            at = at._replace(speed=None if at.speed is None else np.full_like(at.angle, np.nan), lost=None)
+            commanded = commanded._replace(
+                speed=None if commanded.speed is None else np.full_like(commanded.angle, np.nan), lost=None
+            )
             assert told.motion.side == scene.motion.side
-        elif at.speed is None:
-            at = at._replace(acceleration=0.0)
-        differing = [name for name in at._fields if not same(getattr(command, name), getattr(at, name))]
+        elif commanded.speed is None:
+            commanded = commanded._replace(acceleration=0.0)
+        differing = [name for name in commanded._fields if not same(getattr(command, name), getattr(commanded, name))]
         assert not differing, (scene.title, differing)
-        assert protocol.command_to_json(told, command) == protocol.command_to_json(scene, at)
+        assert protocol.command_to_json(told, command) == protocol.command_to_json(scene, commanded)
         seen += 1
     assert seen > 100
 
@@ -113,29 +117,31 @@ def test_a_gas_spring_travels_as_its_file_is_written_and_a_table_in_radians():
 def test_an_engine_answers_alike_from_both_ends():
     for file in ("crank_rocker.toml", "gallery/excavator_bucket.toml", "gallery/tailgate.toml"):
         scene = fourbar.load(MODELS / file)
-        at = list_positions(scene)
+        commanded = list_positions(scene)
         told, command = protocol.command_from_json(
-            protocol.scene_from_json(protocol.scene_to_json(scene)), protocol.command_to_json(scene, at)
+            protocol.scene_from_json(protocol.scene_to_json(scene)), protocol.command_to_json(scene, commanded)
         )
-        here, there = ask_at(FreeBody(), scene, at), FreeBody().answer(told, command)
-        back = protocol.answer_from_json("free-body", at, through_text(protocol.answer_to_json(told, command, there)))
-        assert back.quantities.keys() == here.quantities.keys()
-        assert all(same(back.quantities[name], array) for name, array in here.quantities.items())
-        assert same(back.assembled, here.assembled) and back.at is at
+        direct, received = ask_at(FreeBody(), scene, commanded), FreeBody().answer(told, command)
+        back = protocol.answer_from_json(
+            "free-body", commanded, through_text(protocol.answer_to_json(told, command, received))
+        )
+        assert back.quantities.keys() == direct.quantities.keys()
+        assert all(same(back.quantities[name], array) for name, array in direct.quantities.items())
+        assert same(back.assembled, direct.assembled) and back.at is commanded
 
 
 def test_an_answer_comes_back_with_all_that_it_says():
     scene = crank_rocker()
-    at = list_positions(scene)
-    n = len(at.angle)
-    moved = at._replace(angle=at.angle + 1e-3, speed=np.full(n, 10.01), acceleration=5.0)
+    commanded = list_positions(scene)
+    n = len(commanded.angle)
+    moved = commanded._replace(angle=commanded.angle + 1e-3, speed=np.full(n, 10.01), acceleration=5.0)
     torque, force = np.linspace(0.0, 1.0, n), np.ones((n, 2))
     torque[3] = np.nan
     answer = Answer(
         "mine", "RK4", moved, np.arange(n) != 3, {"torque": torque, "F12": force}, None, {"torque": torque},
         ["it slipped"], {"gap": 1e-9}, "nothing", "everything", 0.25,
     )  # fmt: skip
-    back = protocol.answer_from_json("mine", at, through_text(protocol.answer_to_json(scene, at, answer)))
+    back = protocol.answer_from_json("mine", commanded, through_text(protocol.answer_to_json(scene, commanded, answer)))
     for name in ("setting", "alarms", "evidence", "shared", "own", "seconds", "refusal"):
         assert getattr(back, name) == getattr(answer, name)
     assert all(same(one, two) for one, two in zip(back.at, moved, strict=True))
@@ -144,13 +150,15 @@ def test_an_answer_comes_back_with_all_that_it_says():
 
 
 def test_what_an_answer_leaves_out_has_defaults():
-    at = list_positions(crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0)))
-    answer = protocol.answer_from_json("mine", at, {"answers": {"torque": [1, None, 3], "F12": [[1, 2], None, None]}})
-    assert answer.assembled.tolist() == [True, False, True] and answer.setting == "exact" and answer.at is at
+    commanded = list_positions(crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0)))
+    answer = protocol.answer_from_json(
+        "mine", commanded, {"answers": {"torque": [1, None, 3], "F12": [[1, 2], None, None]}}
+    )
+    assert answer.assembled.tolist() == [True, False, True] and answer.setting == "exact" and answer.at is commanded
     assert np.isnan(answer.quantities["F12"][1:]).all()
     with pytest.raises(EngineError, match="no licence"):
-        protocol.answer_from_json("mine", at, {"error": "no licence"})
-    assert protocol.answer_from_json("mine", at, {"refusal": "no springs here"}).refusal == "no springs here"
+        protocol.answer_from_json("mine", commanded, {"error": "no licence"})
+    assert protocol.answer_from_json("mine", commanded, {"refusal": "no springs here"}).refusal == "no springs here"
 
 
 WRONG_SCENES = [
@@ -212,8 +220,8 @@ WRONG_SETTINGS = [[], {"name": 1}, {"steps_per_turn": 3.5}, {"steps_per_turn": 0
 
 
 def read_answer(data):
-    at = list_positions(crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0)))
-    return protocol.answer_from_json("mine", at, data)
+    commanded = list_positions(crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0)))
+    return protocol.answer_from_json("mine", commanded, data)
 
 
 READ = {
@@ -244,9 +252,9 @@ def test_a_setting_that_is_none_is_refused_in_one_line(data) -> None:
 def test_an_engine_through_time_may_be_faster_by_what_the_acceleration_gives() -> None:
     """omega^2 = omega_0^2 + 2 alpha theta: of a stroke too, whose bar has the motion that the formulas state."""
     command = list_positions(fourbar.load(MODELS / "capabilities" / "stroke_input.toml"))
-    own = command._replace(stroke=None, speed=1.2 * command.speed, acceleration=1.2 * command.acceleration)
-    protocol.require_near(own, command)
+    faster = command._replace(stroke=None, speed=1.2 * command.speed, acceleration=1.2 * command.acceleration)
+    protocol.require_near(faster, command)
     steady = command._replace(acceleration=0.0 * command.acceleration)
-    for made, asked in ((own._replace(speed=0.0 * own.speed), command), (own, steady)):
+    for made, asked in ((faster._replace(speed=0.0 * faster.speed), command), (faster, steady)):
         with pytest.raises(InputError, match=r"must be within .* of the command"):
             protocol.require_near(made, asked)

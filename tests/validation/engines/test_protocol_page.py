@@ -58,11 +58,11 @@ def test_the_page_s_engine_answers_what_the_formulas_do(engine: Path, file: Path
     if motion.speed is None:
         motion = motion.replace(speed=1.0)
     scene = replace(scene, motion=motion, loads=(), effects=gravity, drive_bar=2)
-    at = list_positions(scene)
-    question = {"scene": protocol.scene_to_json(scene), "command": protocol.command_to_json(scene, at)}
+    commanded = list_positions(scene)
+    question = {"scene": protocol.scene_to_json(scene), "command": protocol.command_to_json(scene, commanded)}
     hello, reply = ask(engine, {"ask": "hello", "protocol": 1}, {"ask": "answer", **question})
-    answer = protocol.answer_from_json(hello["engine"], at, reply)
-    truth, compared = fourbar.solve(scene, at=at), 0
+    answer = protocol.answer_from_json(hello["engine"], commanded, reply)
+    truth, compared = fourbar.solve(scene, at=commanded), 0
     steady = truth.condition >= 0.03
     force = max(magnitude(getattr(truth, name)[steady]).max() for name in PIN_FORCES)
     size = {"torque": force * scene.linkage.input.length, **dict.fromkeys(PIN_FORCES, force)}
@@ -105,13 +105,13 @@ def test_what_the_judge_writes_is_what_the_schema_says() -> None:
 
 def test_what_an_engine_writes_is_what_the_schema_says(engine: Path) -> None:
     scene = replace(crank_rocker(), loads=())
-    at = list_positions(scene)
-    question = {"scene": protocol.scene_to_json(scene), "command": protocol.command_to_json(scene, at)}
+    commanded = list_positions(scene)
+    question = {"scene": protocol.scene_to_json(scene), "command": protocol.command_to_json(scene, commanded)}
     hello, reply = ask(engine, {"ask": "hello", "protocol": 1}, {"ask": "answer", **question})
     check("hello").validate(hello)
     check("answer").validate(reply)
-    for answer in (FreeBody().answer(scene, at), Answer("mine", "exact", refusal="no")):
-        data = {"id": 1, **protocol.answer_to_json(scene, at, answer)}
+    for answer in (FreeBody().answer(scene, commanded), Answer("mine", "exact", refusal="no")):
+        data = {"id": 1, **protocol.answer_to_json(scene, commanded, answer)}
         check("reply").validate(json.loads(json.dumps(data)))
 
 

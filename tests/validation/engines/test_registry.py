@@ -43,7 +43,7 @@ NAMES = ["exudyn-constraints", "opensim-constraints", "drake-inverse"]
 
 
 def test_the_lab_alone_adds_engines(only: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert [each.name for each in load()] == NAMES  # of the checkout, where it lies on the path
+    assert [engine.name for engine in load()] == NAMES  # of the checkout, where it lies on the path
     monkeypatch.setattr(registry, "CHECKOUT", None)
     assert load() == ()
     installed(only, "stranger", "[fourbar.engines]\nmine = os:abort\n")
@@ -51,6 +51,6 @@ def test_the_lab_alone_adds_engines(only: Path, monkeypatch: pytest.MonkeyPatch)
     project = (ROOT / "lab" / "pyproject.toml").read_text()
     lines = project.partition('entry-points."fourbar.engines"]')[2].partition("[")[0].replace('"', "").splitlines()[1:]
     installed(only, "fourbar-lab", "[fourbar.engines]\n" + "\n".join(lines) + "\n[other]\nmine = os:abort\n")
-    found = load()
-    assert [each.name for each in found] == NAMES
-    assert all(isinstance(each, Engine) and each.code in each.fingerprint() and each.code for each in found)
+    engines = load()
+    assert [engine.name for engine in engines] == NAMES
+    assert all(isinstance(engine, Engine) and engine.code in engine.fingerprint() and engine.code for engine in engines)

@@ -159,8 +159,8 @@ def solve_as_printed(sides: list[str], arms: list[list[str]]) -> float:
             matrix[3 * k, column] = matrix[3 * k + 1, column + 1] = 1.0
             matrix[3 * k + 2, column : column + 2] = [float(text) for text in row[2 * pin : 2 * pin + 2]]
     matrix[8, 12] = 1.0
-    for row, one, other in ((9, 2, 4), (10, 3, 5), (11, 6, 10), (12, 7, 11)):
-        matrix[row, [one, other]] = 1.0
+    for row, first, second in ((9, 2, 4), (10, 3, 5), (11, 6, 10), (12, 7, 11)):
+        matrix[row, [first, second]] = 1.0
     return float(np.linalg.solve(matrix, right)[12])
 
 
@@ -212,9 +212,9 @@ def test_open_loops_that_the_errata_state() -> None:
 def test_limits_that_the_errata_state() -> None:
     linkage = make_scene(THETA_2).linkage
     for bar, title in ((4, "limits"), (2, "dead centres")):
-        found = {f"{np.degrees(limit.theta_2) % 360.0:.4f}" for limit in limit_positions(linkage, bar)}
+        angles = {f"{np.degrees(limit.theta_2) % 360.0:.4f}" for limit in limit_positions(linkage, bar)}
         stated = ERRATA["16"].right.split(title)[1].split(" deg")[0]
-        assert found == {part.strip() for part in stated.split(" and ")}
+        assert angles == {part.strip() for part in stated.split(" and ")}
 
 
 def test_public_test_cases_agree_to_the_last_digit() -> None:
@@ -245,20 +245,20 @@ def test_quantities_of_an_answer() -> None:
     assert compute_value(s, "v_A_x", 0) == pytest.approx(-0.2244 * 0.48 * np.sin(THETA_2), rel=TYPED)
 
 
-@pytest.mark.parametrize("other", [scenes.thesis(), fourbar.load(MODELS / "thesis.toml")], ids=["code", "file"])
-def test_inputs_are_those_of_the_model(other: fourbar.Scene) -> None:
+@pytest.mark.parametrize("scene", [scenes.thesis(), fourbar.load(MODELS / "thesis.toml")], ids=["code", "file"])
+def test_inputs_are_those_of_the_model(scene: fourbar.Scene) -> None:
     ours = make_scene(THETA_2)
-    assert ours.linkage.lengths == pytest.approx(other.linkage.lengths, rel=TYPED)
-    assert ours.linkage.ground_angle == pytest.approx(other.linkage.ground_angle, rel=TYPED)
+    assert ours.linkage.lengths == pytest.approx(scene.linkage.lengths, rel=TYPED)
+    assert ours.linkage.ground_angle == pytest.approx(scene.linkage.ground_angle, rel=TYPED)
     for number in (2, 3, 4):
-        mine, theirs = ours.linkage.bar(number), other.linkage.bar(number)
+        mine, theirs = ours.linkage.bar(number), scene.linkage.bar(number)
         assert mine.mass == theirs.mass
         assert mine.moment_of_inertia == pytest.approx(theirs.moment_of_inertia, rel=TYPED)
         assert mine.mass_centre == pytest.approx(theirs.mass_centre, rel=TYPED)
-    assert (ours.drive_bar, ours.motion.omega_2) == (other.drive_bar, other.motion.omega_2)
-    assert ours.motion.branch == other.motion.branch and ours.effects == other.effects == ()
-    assert len(ours.loads) == len(other.loads)
-    for load, their in zip(ours.loads, other.loads, strict=True):
+    assert (ours.drive_bar, ours.motion.omega_2) == (scene.drive_bar, scene.motion.omega_2)
+    assert ours.motion.branch == scene.motion.branch and ours.effects == scene.effects == ()
+    assert len(ours.loads) == len(scene.loads)
+    for load, their in zip(ours.loads, scene.loads, strict=True):
         assert (load.bar, load.frame) == (their.bar, their.frame)
         assert load.moment == pytest.approx(their.moment, rel=TYPED)
         assert (load.force is None) == (their.force is None)
@@ -268,12 +268,12 @@ def test_inputs_are_those_of_the_model(other: fourbar.Scene) -> None:
 
 
 def test_the_command_explains_every_difference() -> None:
-    result = CliRunner().invoke(published, standalone_mode=False)
-    assert result.return_value == 0
-    assert max(map(len, result.output.splitlines())) <= 80
+    process = CliRunner().invoke(published, standalone_mode=False)
+    assert process.return_value == 0
+    assert max(map(len, process.output.splitlines())) <= 80
     for figure in ALL:
         line = f"{figure.table}: {figure.name}  printed {figure.printed}"
-        assert (line in result.output) == (figure.verdict() == "differs")
+        assert (line in process.output) == (figure.verdict() == "differs")
     assert CliRunner().invoke(published, ["--all"]).output.count("  printed ") == len(ALL)
 
 

@@ -81,16 +81,16 @@ def test_round_off_grows_with_the_condition() -> None:
 
 def test_better_and_new_rows_are_no_regression_but_a_new_failure_is() -> None:
     simulated = replace(ROW, error=4e-6, allowed=1e-5)
-    found = compare_rows((HERE, [simulated]), (HERE, [replace(simulated, error=1e-6), replace(ROW, quantity="F12")]))
-    assert {change.kind for change in found.changes} == {Kind.BETTER, Kind.NEW}
-    assert not found.regressed
+    changes = compare_rows((HERE, [simulated]), (HERE, [replace(simulated, error=1e-6), replace(ROW, quantity="F12")]))
+    assert {change.kind for change in changes.changes} == {Kind.BETTER, Kind.NEW}
+    assert not changes.regressed
     failing = replace(ROW, quantity="F12", verdict=FAILS)
     assert compare_rows((HERE, [ROW]), (HERE, [ROW, failing])).regressed
 
 
 def test_other_versions_are_reported_first() -> None:
-    other = About({**HERE.versions, "mujoco": "3.3.7"}, HERE.machine, HERE.settings)
-    found = compare_rows((other, [ROW]), (HERE, [ROW]))
+    older = About({**HERE.versions, "mujoco": "3.3.7"}, HERE.machine, HERE.settings)
+    found = compare_rows((older, [ROW]), (HERE, [ROW]))
     assert [what for what, _, _ in found.surroundings] == ["mujoco"]
     assert render.write_text(found).startswith("mujoco: 3.3.7 -> ")
 
@@ -114,9 +114,9 @@ def test_command_writes_every_form_and_leaves_with_the_status(tmp_path: Path) ->
     new = save(tmp_path / "new", [replace(ROW, error=1e-9), replace(hostile, error=1e-9)])
     forms = [f"--{form}={tmp_path / form}" for form in ("markdown", "html", "junit")]
     runner = CliRunner()
-    result = runner.invoke(compare, [str(old), str(new), *forms], standalone_mode=False)
-    assert result.return_value == 1
-    assert "2 regressions" in result.output
+    process = runner.invoke(compare, [str(old), str(new), *forms], standalone_mode=False)
+    assert process.return_value == 1
+    assert "2 regressions" in process.output
     assert "<script>" not in (tmp_path / "html").read_text()
     assert "<script>" not in (tmp_path / "markdown").read_text()
     suites = ET.parse(tmp_path / "junit").getroot()
@@ -198,7 +198,7 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(tmp_path: Path, caps
     run, kept = save(tmp_path / "run", [ROW]), tmp_path / "kept"
     assert status(["accept", str(run), "--to", str(kept)]) == 0
     file, table = kept / HISTORY, (kept / "results.csv").read_bytes()
-    whole = file.read_bytes()
+    contents = file.read_bytes()
     run = save(tmp_path / "later", [replace(ROW, error=2e-15)])
     another = replace(HERE, date="later")
     write_about(another, run)
@@ -207,8 +207,8 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(tmp_path: Path, caps
     for damage in (
         b"",
         b"no columns",
-        whole[:-100],
-        whole[:300] + b"\0" + whole[301:],
+        contents[:-100],
+        contents[:300] + b"\0" + contents[301:],
         (tmp_path / "results.parquet").read_bytes(),
     ):
         file.write_bytes(damage)
@@ -217,8 +217,8 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(tmp_path: Path, caps
         line = capsys.readouterr().err
         assert line == f"error: --to = '{file}': is damaged, or no table written by `accept`\n"
         assert (kept / "results.csv").read_bytes() == table and file.read_bytes() == damage
-    for place in range(4, len(whole)):  # a bit of a number, which the checksum of its page shows
-        damage = whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :]
+    for place in range(4, len(contents)):  # a bit of a number, which the checksum of its page shows
+        damage = contents[:place] + bytes([contents[place] ^ 1]) + contents[place + 1 :]
         with contextlib.suppress(OSError, ValueError):
             if pq.read_table(pa.BufferReader(damage), columns=["error"])["error"].to_pylist() != [ROW.error]:
                 break
@@ -313,8 +313,8 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
 ) -> None:
     """One row group after the other, both in step; every row is counted, of each kind the worst are listed."""
     monkeypatch.setattr("fourbar_validation.compare.columns.GROUP_ROWS", 60)
-    for where in ("fourbar_validation.compare.columns", "fourbar_validation.regression.accept"):
-        monkeypatch.setattr(f"{where}.CSV_ROWS", 100)
+    for module in ("fourbar_validation.compare.columns", "fourbar_validation.regression.accept"):
+        monkeypatch.setattr(f"{module}.CSV_ROWS", 100)
     monkeypatch.setattr("fourbar_validation.compare.columns.BATCH_ROWS", 60)
     scenes, kept = 1000, 5
     for name, grown in (("old", 1.0), ("new", 1e3)):
@@ -336,11 +336,11 @@ def test_two_long_runs_are_read_scene_by_scene_and_little_of_them_is_kept(
             yield scene, rows
             alive -= 1
 
-    found = compare_runs((HERE, watched(before)), (HERE, watched(after)), {"engine"}, kept)
-    assert most == 2 and found.rows == 2 * scenes and found.regressed == found.kinds[Kind.WORSE] == scenes - 1
-    assert [change.key[0][-3:] for change in found.of(Kind.WORSE)] == ["999", "998", "997", "996", "995"]
-    assert len(found.changes) == 2 * kept
-    cases = ET.fromstring(render.write_junit(found))
+    changes = compare_runs((HERE, watched(before)), (HERE, watched(after)), {"engine"}, kept)
+    assert most == 2 and changes.rows == 2 * scenes and changes.regressed == changes.kinds[Kind.WORSE] == scenes - 1
+    assert [change.key[0][-3:] for change in changes.of(Kind.WORSE)] == ["999", "998", "997", "996", "995"]
+    assert len(changes.changes) == 2 * kept
+    cases = ET.fromstring(render.write_junit(changes))
     assert cases.findall(".//testcase")[-1].get("name") == f"{2 * (scenes - kept)} rows more: see results.parquet"
     arguments = ["compare", str(tmp_path / "old"), str(tmp_path / "new")]
     assert [status(arguments), status([*arguments, "--only", "random-0-000000000"])] == [1, 0]
@@ -354,8 +354,8 @@ def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_wi
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rows = [replace(ROW, scene=f"scene {k:03d}") for k in range(80)]
-    whole, some = save(tmp_path / "whole", rows), save(tmp_path / "some", [rows[7], rows[70]])
-    assert status(["compare", str(whole), str(some)]) == 0
+    all_rows, some = save(tmp_path / "whole", rows), save(tmp_path / "some", [rows[7], rows[70]])
+    assert status(["compare", str(all_rows), str(some)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "Not run: scene scene 000 (1 row)" and lines[50] == "Not run: 28 more (28 rows)"
     assert lines[-1].startswith("No regression in 2 of 80 rows: 78 not run, 2 same")
@@ -363,7 +363,7 @@ def test_a_part_of_a_long_run_compares_with_its_part_and_a_table_out_of_order_wi
     first, *others = table.read_text().splitlines(keepends=True)
     table.write_text(first + "".join(reversed(others)))
     write_about(HERE, some)
-    assert status(["compare", str(whole), str(some)]) == 2
+    assert status(["compare", str(all_rows), str(some)]) == 2
     assert "is sorted by scene" in capsys.readouterr().err
 
 
@@ -400,26 +400,28 @@ def disagreeing(worse: set[tuple[str, str]]) -> tuple[list[Row], list[Row]]:
 )
 def test_the_report_says_who_is_at_fault(worse: set[tuple[str, str]], sentence: str) -> None:
     old, new = disagreeing(worse)
-    found = compare_rows((HERE, old), (HERE, new))
-    assert found.fault.sentences == [sentence]
+    changes = compare_rows((HERE, old), (HERE, new))
+    assert changes.fault.sentences == [sentence]
     for form in (render.write_text, render.write_markdown, render.write_html):
-        assert sentence in html.unescape(form(found))
+        assert sentence in html.unescape(form(changes))
 
 
 def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first() -> None:
     old, new = disagreeing({("sim", "F12"), ("sim", "torque"), ("one", "torque")})
     better = [replace(row, error=1e-9) if row.engine == "two" else row for row in old]
     new = [replace(row, error=1.0) if row.failed and row.engine == "one" and row.scene == "b" else row for row in new]
-    found = compare_rows((HERE, better), (HERE, new))
-    groups = [line for line in render.write_text(found).splitlines() if "scenes, " in line and "rows (" in line]
+    changes_from_better = compare_rows((HERE, better), (HERE, new))
+    groups = [
+        line for line in render.write_text(changes_from_better).splitlines() if "scenes, " in line and "rows (" in line
+    ]
     cause = "agrees -> fails: # where # was predicted"
     assert groups == [
         f"Verdict got worse: one, 3 of 3 scenes, 3 rows (torque 3), {cause}",
         f"Verdict got worse: sim, 3 of 3 scenes, 6 rows (F12 3, torque 3), {cause}",
         "Better: two, 3 of 3 scenes, 6 rows (F12 3, torque 3)",
     ]
-    assert found.of(Kind.VERDICT_WORSE)[0].key[:2] == ("b", "one")
-    assert groups[0].partition(": ")[2] in html.unescape(render.write_html(found))
+    assert changes_from_better.of(Kind.VERDICT_WORSE)[0].key[:2] == ("b", "one")
+    assert groups[0].partition(": ")[2] in html.unescape(render.write_html(changes_from_better))
 
 
 SCENE = fourbar.load(Path(__file__).parents[3] / "models" / "crank_rocker.toml")
@@ -434,20 +436,20 @@ def test_a_scene_that_changed_comes_first_and_its_rows_are_not_compared() -> Non
     output = replace(SCENE.linkage.output, inertia=0.05)
     heavier = replace(SCENE, linkage=replace(SCENE.linkage, output=output), title="another title")
     before = replace(SCENE, linkage=replace(SCENE.linkage, output=replace(output, inertia=0.048)))
-    other, wrong = replace(ROW, scene="other"), replace(ROW, error=1e-9, allowed=1e-8)
-    old = made([ROW, other], {"scene": before, "other": SCENE})
-    found = compare_rows(old, made([wrong, other], {"scene": heavier, "other": SCENE}))
-    assert render.write_text(found).splitlines()[0] == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
-    assert found.status == 0 and found.not_compared == ["scene scene changed (1 row)"]
-    assert compare_rows(old, made([replace(wrong, verdict=FAILS), other], {"scene": heavier})).regressed
+    other_row, wrong = replace(ROW, scene="other"), replace(ROW, error=1e-9, allowed=1e-8)
+    old = made([ROW, other_row], {"scene": before, "other": SCENE})
+    changes = compare_rows(old, made([wrong, other_row], {"scene": heavier, "other": SCENE}))
+    assert render.write_text(changes).splitlines()[0] == "scene scene: bars.output.inertia 0.048 -> 0.05 kg m^2"
+    assert changes.status == 0 and changes.not_compared == ["scene scene changed (1 row)"]
+    assert compare_rows(old, made([replace(wrong, verdict=FAILS), other_row], {"scene": heavier})).regressed
     assert compare_rows(made([ROW], {"scene": before}), made([wrong], {"scene": heavier})).nothing
     for form in (render.write_markdown, render.write_html):
-        assert "bars.output.inertia 0.048" in form(found)
+        assert "bars.output.inertia 0.048" in form(changes)
 
 
 def test_a_renamed_scene_is_found_by_what_it_states(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    other = replace(SCENE, linkage=replace(SCENE.linkage, output=replace(SCENE.linkage.output, inertia=0.05)))
-    names = {"g": SCENE, "h": other, "same": SCENE}, {"a": other, "gate": SCENE, "same": SCENE}
+    heavier = replace(SCENE, linkage=replace(SCENE.linkage, output=replace(SCENE.linkage.output, inertia=0.05)))
+    names = {"g": SCENE, "h": heavier, "same": SCENE}, {"a": heavier, "gate": SCENE, "same": SCENE}
     both = []
     for folder, error, scenes in zip(("old", "new"), (1e-9, 2e-9), names, strict=True):
         stated, rows = made([replace(ROW, scene=name, error=error, allowed=1e-9) for name in scenes], scenes)
@@ -464,9 +466,9 @@ def test_a_renamed_scene_is_found_by_what_it_states(tmp_path: Path, capsys: pyte
 def test_what_grew_within_its_allowance_is_shown_and_no_regression() -> None:
     """Another kernel of the BLAS turns 3.4e-7 into 5.2e-7 where 1 is allowed; a wider allowance excuses nothing."""
     shipped = replace(ROW, quantity="as shipped", error=3.4e-7, allowed=1.0)
-    found = compare_rows((HERE, [shipped]), (HERE, [replace(shipped, error=5.2e-7)]))
-    assert [change.kind for change in found.changes] == [Kind.GREW] and found.status == 0
-    assert "Grew within its allowance: scene / engine / exact / as shipped" in render.write_text(found)
+    changes = compare_rows((HERE, [shipped]), (HERE, [replace(shipped, error=5.2e-7)]))
+    assert [change.kind for change in changes.changes] == [Kind.GREW] and changes.status == 0
+    assert "Grew within its allowance: scene / engine / exact / as shipped" in render.write_text(changes)
     assert kinds([replace(shipped, allowed=4e-7)], [replace(shipped, error=6e-7)]) == [Kind.WORSE]
 
 
@@ -477,49 +479,49 @@ def test_the_kernels_of_a_run_are_recorded_and_named_where_they_differ() -> None
     possible = [core for core in CORES if why_not(core) is None]
     if not possible:
         pytest.skip("this CPU can pass for no other")
-    found = [
+    printed = [
         subprocess.check_output([sys.executable, "-c", code], cwd=ROOT, env=os.environ | more, text=True)
         for more in ({}, environment(possible[0]))
     ]
-    one, other = map(ast.literal_eval, found)
-    assert set(one) == {"cpu_features", "blas_kernel"} and one != other
-    old, new = (replace(HERE, versions=HERE.versions | kernels) for kernels in (one, other))
+    first, second = map(ast.literal_eval, printed)
+    assert set(first) == {"cpu_features", "blas_kernel"} and first != second
+    old, new = (replace(HERE, versions=HERE.versions | kernels) for kernels in (first, second))
     text = render.write_text(compare_rows((old, [ROW]), (new, [ROW])))
-    assert any(f"{name}: {one[name]} -> {other[name]}" in text for name in one)
-    assert set(one) <= set(HERE.versions)
+    assert any(f"{name}: {first[name]} -> {second[name]}" in text for name in first)
+    assert set(first) <= set(HERE.versions)
 
 
 def test_more_positions_and_other_settings_are_named_so() -> None:
     finer = replace(SCENE, motion=SCENE.motion.replace(angle=fourbar.Sweep(0.0, 2.0 * math.pi, 720)))
     worse = replace(ROW, error=1e-9, allowed=1e-8)
-    found = compare_rows(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
-    assert found.not_compared == ["scene scene has other positions (1 row)"] and not found.regressed
-    assert "360} -> " in str(found.scenes[0]) or "steps" in str(found.scenes[0])
+    changes = compare_rows(made([ROW], {"scene": SCENE}), made([worse], {"scene": finer}))
+    assert changes.not_compared == ["scene scene has other positions (1 row)"] and not changes.regressed
+    assert "360} -> " in str(changes.scenes[0]) or "steps" in str(changes.scenes[0])
     old, new = replace(ROW, setting="RK4 628/rev"), replace(worse, setting="RK4 1256/rev")
-    found = compare_rows(made([old], {"scene": SCENE}), made([new], {"scene": SCENE}))
-    assert found.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 row)"] and not found.regressed
+    changes = compare_rows(made([old], {"scene": SCENE}), made([new], {"scene": SCENE}))
+    assert changes.not_compared == ["scene / engine: RK4 628/rev -> RK4 1256/rev (1 row)"] and not changes.regressed
 
 
 def test_of_an_older_record_only_the_hash_can_say_that_scenes_changed() -> None:
     old = About(HERE.versions, HERE.machine, {**HERE.settings, "suite": "0123456789abcdef"})
-    found = compare_rows((old, [ROW]), made([ROW], {"scene": SCENE}))
-    assert not found.scenes and not found.regressed
-    first, note = found.notes
+    changes = compare_rows((old, [ROW]), made([ROW], {"scene": SCENE}))
+    assert not changes.scenes and not changes.regressed
+    first, note = changes.notes
     assert "0123456789ab -> suite" in note and "the older record does not say what they ask" in note
     assert first == "1 of 1 rows are compared: the others are of one run alone"
     others = [replace(ROW, scene=f"another {k}") for k in range(3)]
-    found = compare_rows((old, [ROW, others[0]]), made([ROW, *others[1:]], {"scene": SCENE}))
-    assert render.write_text(found).startswith(
+    changes = compare_rows((old, [ROW, others[0]]), made([ROW, *others[1:]], {"scene": SCENE}))
+    assert render.write_text(changes).startswith(
         "1 of 4 rows are compared"
-    ) and "No regression in 1 of 4 rows" in render.write_text(found)
+    ) and "No regression in 1 of 4 rows" in render.write_text(changes)
 
 
 def test_what_was_not_wanted_is_not_run_and_what_was_wanted_is_gone() -> None:
     rows = [replace(ROW, scene=scene, engine=engine) for scene in ("a", "b") for engine in ("engine", "formulas")]
     rows.append(replace(ROW, scene="a", engine="other"))
     old = made(rows, dict.fromkeys("ab", SCENE), ("engine", "other"))
-    found = compare_rows(old, made(rows[:2], {"a": SCENE}))
-    assert found.not_run == ["scene b (2 rows)", "other (1 row)"] and found.status == 0
+    changes = compare_rows(old, made(rows[:2], {"a": SCENE}))
+    assert changes.not_run == ["scene b (2 rows)", "other (1 row)"] and changes.status == 0
     gone = compare_rows(old, made(rows[1:2], {"a": SCENE}))
     assert [change.key[1] for change in gone.changes if change.regression] == ["engine"]
     assert compare_rows(old, (HERE, rows[:2])).not_run[0] == "scene b (2 rows)"  # without a record its rows say so
@@ -543,10 +545,10 @@ def test_the_run_itself_is_written_as_junit(tmp_path: Path, monkeypatch: pytest.
     xml, scene = tmp_path / "run.xml", Path(__file__).parents[3] / "models" / "crank_rocker.toml"
     arguments = ["run", str(scene), "--engines", "free-body", "--no-pictures", "--out", str(tmp_path / "out")]
     assert status([*arguments, "--junit", str(xml)]) == 0
-    found, rows = ET.parse(xml).getroot(), read_run(tmp_path / "out")[1]
-    names = [case.get("name") for case in found.iter("testcase")]
+    report, rows = ET.parse(xml).getroot(), read_run(tmp_path / "out")[1]
+    names = [case.get("name") for case in report.iter("testcase")]
     assert names == [row.quantity for row in rows[:10]] + [f"{len(rows) - 10} rows more: see results.parquet"]
-    assert found.get("failures") == "0" and found.get("name", "").startswith("All ")
+    assert report.get("failures") == "0" and report.get("name", "").startswith("All ")
     failing = [replace(row, verdict=FAILS, reason="not held") for row in rows[20:22]]
     kinds = [(case.outcome, case.message.partition(": ")[2]) for case in list_cases([*rows, *failing])][10:]
     assert kinds == [("failure", "not held")] * 2 + [("skipped", "")]

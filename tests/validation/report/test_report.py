@@ -51,8 +51,8 @@ def copies(count: int, *, failing: int = 0) -> list[Record]:
         name = f"scene-{number:03d}"
         rows = [replace(row, scene=name) for row in demo().rows]
         if number < failing:
-            at = next(i for i, row in enumerate(rows) if row.quantity == "torque")
-            rows[at] = replace(rows[at], error=0.5, verdict=FAILS)
+            index = next(i for i, row in enumerate(rows) if row.quantity == "torque")
+            rows[index] = replace(rows[index], error=0.5, verdict=FAILS)
         made.append(replace(demo(), name=name, rows=rows))
     return made
 
@@ -60,9 +60,9 @@ def copies(count: int, *, failing: int = 0) -> list[Record]:
 def report(pages: list[Record], **more) -> tuple[Summary, str]:
     """Summary and page, the lines of results.csv counted as `run` does."""
     lines, line = {}, 2
-    for each in pages:
-        lines[each.name] = line
-        line += len(each.rows)
+    for record in pages:
+        lines[record.name] = line
+        line += len(record.rows)
     summary = summary_of(pages)
     return summary, write_html(summary, lines, **more)
 
@@ -71,7 +71,7 @@ def unpacked(text: str) -> str:
     """The page with the packed bodies of its scenes laid open."""
     return re.sub(
         r'<script type="application/gzip">(.*?)</script>',
-        lambda found: gzip.decompress(base64.b64decode(found.group(1))).decode(),
+        lambda match: gzip.decompress(base64.b64decode(match.group(1))).decode(),
         text,
         flags=re.DOTALL,
     )
@@ -83,7 +83,7 @@ def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(
     pages = copies(count, failing=1)
     _, text = report(pages)
     text = unpacked(text)
-    lines = list(csv.reader(io.StringIO(write_rows(row for each in pages for row in each.rows))))
+    lines = list(csv.reader(io.StringIO(write_rows(row for record in pages for row in record.rows))))
     rows = dict(re.findall(r'<tr id="row-(\d+)"[^>]*>(.*?)</tr>', text))
     assert {int(line) for line in rows} == set(range(2, len(lines) + 1))
     for line, shown in rows.items():
@@ -101,7 +101,7 @@ def test_the_page_carries_results_csv_to_the_byte() -> None:
     _, text = report(pages)
     data = re.search(r'download="results.csv" href="data:text/csv;base64,([^"]*)"', text)
     assert data is not None
-    assert base64.b64decode(data.group(1)).decode() == write_rows(row for each in pages for row in each.rows)
+    assert base64.b64decode(data.group(1)).decode() == write_rows(row for page in pages for row in page.rows)
 
 
 @pytest.mark.slow
@@ -143,12 +143,12 @@ def test_a_section_of_another_module_is_shown_and_linked() -> None:
 def test_the_errors_drawn_are_the_largest_of_their_stretches() -> None:
     error = np.random.default_rng(1).uniform(size=1000)
     for phase in (0.0, 0.3, 0.9):
-        found = find_worst_of_segments(error, phase)
-        assert STRETCHES <= len(found) <= STRETCHES + 1
-        assert int(np.argmax(error)) in found
-        assert np.all(np.diff(found) > 0)
-    error[found[3]] = np.nan
-    assert found[3] not in find_worst_of_segments(error, 0.9)
+        worst = find_worst_of_segments(error, phase)
+        assert STRETCHES <= len(worst) <= STRETCHES + 1
+        assert int(np.argmax(error)) in worst
+        assert np.all(np.diff(worst) > 0)
+    error[worst[3]] = np.nan
+    assert worst[3] not in find_worst_of_segments(error, 0.9)
     assert len(find_worst_of_segments(np.full(40, np.nan), 0.0)) == 0
     assert len(find_worst_of_segments(np.array([FLOOR]), 0.5)) == 1
 
@@ -203,11 +203,11 @@ def test_an_engine_that_is_missing_is_reported_as_failing() -> None:
 def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fourbar_validation.report.summary.SCENES_SHOWN", 20)
     pages = copies(100)
-    for number, each in enumerate(pages):
-        each.rows[0] = replace(each.rows[0], error=number * 8e-3, allowed=1.0)
-        each.left_out = [f"mujoco-simulated: falls to {number * 1e-3:.1e}; below 0.05 it is not simulated"]
-        each.evidence = {"sim": {"error_at_4h": 1e-3, "error_at_2h": 1e-4, "observed_order": 3.0 + number}}
-        each.timings = [*each.timings, replace(each.timings[0], engine="sim", setting=f"RK4 {628 + number}/rev")]
+    for number, record in enumerate(pages):
+        record.rows[0] = replace(record.rows[0], error=number * 8e-3, allowed=1.0)
+        record.left_out = [f"mujoco-simulated: falls to {number * 1e-3:.1e}; below 0.05 it is not simulated"]
+        record.evidence = {"sim": {"error_at_4h": 1e-3, "error_at_2h": 1e-4, "observed_order": 3.0 + number}}
+        record.timings = [*record.timings, replace(record.timings[0], engine="sim", setting=f"RK4 {628 + number}/rev")]
     summary, text = report(pages)
     assert [w.row.scene for w in summary.worst[:2]] == ["scene-099", "scene-098"]
     assert {scene.name for scene in summary.shown} == {f"scene-0{number}" for number in range(80, 100)}
@@ -224,9 +224,9 @@ def test_every_engine_of_a_report_has_a_mark_of_its_own(monkeypatch: pytest.Monk
     monkeypatch.setattr(svg, "NUMBERS", {})
     classes = "tests.support.hostile_class:"
     engines = guests.read_guests(
-        [f"{classes}Right", f"{classes}Leaves"], [each.name for each in (*ENGINES, *load_further())]
+        [f"{classes}Right", f"{classes}Leaves"], [engine.name for engine in (*ENGINES, *load_further())]
     )
-    names = [each.name for each in (*ENGINES, *load_further(), *engines)]
+    names = [engine.name for engine in (*ENGINES, *load_further(), *engines)]
     svg.NUMBERS.update(guests.list_numbers(engines))
     marks = {name: (svg.choose_style(name).symbol, svg.choose_style(name).marker) for name in names}
     assert len({mark for mark, _ in marks.values()}) == len({marker for _, marker in marks.values()}) == len(names)
@@ -242,11 +242,11 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     """Beside the error what is allowed to it; a share of undecided numbers is no error; our own rows are one."""
     row = Row("first", "mujoco-simulated", "RK4", "F12", 2.5e-7, 1e-5, AGREES, "", math.radians(40.0), 1.0)
     share = replace(row, quantity="undecided", error=0.4, allowed=0.5, theta_2=math.nan)
-    own = [
+    colours = [
         replace(row, engine=engine, quantity="torque", error=error)
         for engine, error in (("study", 1e-6), ("formulas", 0.0))
     ]
-    pages = [replace(demo(draw=False), name="first", rows=[row, share, *own], left_out=["extremes: too near"])]
+    pages = [replace(demo(draw=False), name="first", rows=[row, share, *colours], left_out=["extremes: too near"])]
     summary = summary_of(pages)
     assert [line.name for line in summary.engines] == ["mujoco-simulated", "our own consistency"]
     assert summary.engines[0].worst == row and summary.engines[0].undecided == 0.4

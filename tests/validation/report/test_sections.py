@@ -43,9 +43,9 @@ def test_a_failing_row_fails_its_family_in_the_report(tmp_path: Path) -> None:
     write_results(rows, tmp_path / "hard" / "results.csv")
     assert collect_sections(None, tmp_path) == []  # unfinished: its page is not written yet
     (tmp_path / "hard" / "report.html").touch()
-    (found,) = collect_sections(None, tmp_path)
-    assert found.rows == collect_hard_cases(rows).rows
-    assert [file for _, file in found.links] == ["hard/report.html"]
+    (section,) = collect_sections(None, tmp_path)
+    assert section.rows == collect_hard_cases(rows).rows
+    assert [file for _, file in section.links] == ["hard/report.html"]
 
 
 def test_the_report_of_the_hard_suite_has_its_picture_every_statement_and_every_limit(

@@ -220,13 +220,13 @@ def test_results_survive_the_file(tmp_path) -> None:  # type: ignore[no-untyped-
 
 def test_an_engine_that_raised_an_alarm_is_excused_by_no_prediction_of_its_own() -> None:
     scene = crank_rocker()
-    at = command(scene)
+    commanded = command(scene)
     engine = next(engine for engine in ENGINES if engine.residuals)
-    answer = Answer(engine.name, "RK4", at, predicted={"torque": np.ones(len(at.theta_2))})
-    predicted = make_prediction(engine, scene, at, answer)
-    assert predicted is not None and predicted("torque", np.ones(len(at.theta_2), bool))[0] == 1.0
+    answer = Answer(engine.name, "RK4", commanded, predicted={"torque": np.ones(len(commanded.theta_2))})
+    predicted = make_prediction(engine, scene, commanded, answer)
+    assert predicted is not None and predicted("torque", np.ones(len(commanded.theta_2), bool))[0] == 1.0
     answer.alarms.append("the loop is open")
-    assert make_prediction(engine, scene, at, answer) is None
+    assert make_prediction(engine, scene, commanded, answer) is None
 
 
 class AnswersAnyway(Echo):
@@ -287,27 +287,27 @@ def test_an_engine_is_started_once_a_scene_and_no_question_is_put_twice(monkeypa
     monkeypatch.setattr(FreeBody, "answer", noting)
     scene = crank_rocker()
     judge("scene", scene, [engine for engine in ENGINES if engine.name == "free-body"])
-    assert len({(id(of), id(command)) for of, command in put}) == len(put)
+    assert len({(id(asked), id(command)) for asked, command in put}) == len(put)
     # nor of the bars without loads, which the answer holds too
-    assert [of for of, _ in put if of.linkage is scene.linkage] == [scene]
+    assert [asked for asked, _ in put if asked.linkage is scene.linkage] == [scene]
     judge("scene", scene, [Engine("counting", Counting, EQUIVALENCE)])
     assert Counting.started == 1
 
 
 def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch: pytest.MonkeyPatch) -> None:
     """The angle, its rates and the lever are what the formulas computed from the stroke: it finds its own."""
-    given: list[Command] = []
+    commands: list[Command] = []
     answering = FreeBody.answer
 
-    def seen(engine: FreeBody, scene: Scene, at: Command) -> Answer:
-        given.append(at)
-        return answering(engine, scene, at)
+    def seen(engine: FreeBody, scene: Scene, command: Command) -> Answer:
+        commands.append(command)
+        return answering(engine, scene, command)
 
     monkeypatch.setattr(FreeBody, "answer", seen)
     rows = judge("", FAULT_SCENES["stroke"], [engine for engine in ENGINES if engine.name == "free-body"]).rows
     assert not [row for row in rows if row.failed]
     assert sum(row.engine == "free-body" and row.compared for row in rows) > 20
-    assert given
-    for at in given:
+    assert commands
+    for at in commands:
         assert at.stroke is not None and np.isfinite(at.stroke).all() and at.condition is None
         assert all(np.isnan(values).all() for values in (at.angle, at.speed, at.acceleration))

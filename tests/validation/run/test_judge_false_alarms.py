@@ -48,7 +48,7 @@ def test_ratios_over_ten_decades_raise_no_alarm() -> None:
     """As `run --random N --type uneven`. In the last the forces were summed more strictly than its coupler allows."""
     scenes = [(index, draw_random_scene(0, index, ())) for index in (1, 6, 8, 9, 10, 32, 36, 61)]
     lengths = [scene.linkage.lengths for _, scene in scenes]
-    assert max(max(each) / min(each) for each in lengths) > 1e8
+    assert max(max(bars) / min(bars) for bars in lengths) > 1e8
     kinds = {effect.key for _, scene in scenes for effect in scene.effects}
     assert kinds == {"gravity", "viscous", "friction", "springs", "torsion", "flywheel"}
     failed = [(index, row) for index, scene in scenes for row in judge(str(index), scene, EXACT).rows if row.failed]

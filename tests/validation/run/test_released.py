@@ -57,13 +57,13 @@ def answering(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[Row]:
     from fourbar_validation.engines.pinocchio import PinocchioReleased
 
     true = PinocchioReleased.release
-    monkeypatch.setattr(PinocchioReleased, "release", lambda *given: change(true(*given)))
+    monkeypatch.setattr(PinocchioReleased, "release", lambda *arguments: change(true(*arguments)))
     return [row for row in judge("falling", falling()).rows if row.engine == "pinocchio-forward"]
 
 
 def test_an_engine_that_stops_before_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    def cut(of: Any) -> Any:
-        return replace(of, theta_2=of.theta_2[:20], omega_2=of.omega_2[:20], energy=of.energy[:20])
+    def cut(answer: Any) -> Any:
+        return replace(answer, theta_2=answer.theta_2[:20], omega_2=answer.omega_2[:20], energy=answer.energy[:20])
 
     (only,) = answering(monkeypatch, cut)
     assert only.verdict == FAILS and "20 of 44 instants" in only.reason
@@ -73,10 +73,10 @@ def test_an_engine_that_stops_before_fails(monkeypatch: pytest.MonkeyPatch) -> N
 def test_an_engine_that_is_nan_before_it_fails_and_one_that_is_nan_behind_the_limit_does_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def struck(at: int) -> Any:
-        def strike(of: Any) -> Any:
-            of.theta_2[at] = np.nan
-            return of
+    def struck(index: int) -> Any:
+        def strike(answer: Any) -> Any:
+            answer.theta_2[index] = np.nan
+            return answer
 
         return strike
 
@@ -87,7 +87,7 @@ def test_an_engine_that_is_nan_before_it_fails_and_one_that_is_nan_behind_the_li
 
 
 def test_an_engine_that_meets_no_limit_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    rows = answering(monkeypatch, lambda of: replace(of, stopped_at=None))
+    rows = answering(monkeypatch, lambda answer: replace(answer, stopped_at=None))
     assert [row.quantity for row in rows if row.verdict == FAILS] == ["stopped_at"]
 
 

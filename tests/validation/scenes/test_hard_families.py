@@ -45,12 +45,12 @@ SWEEP = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 0.1 + 2 * math.pi,
 
 
 def test_the_suite_is_made_from_its_parameters_alone() -> None:
-    one, other = Hard(), Hard()
-    names = [one.name(i) for i in range(len(one))]
-    assert names == sorted(set(names)) == [other.name(i) for i in range(len(other))]
-    for i in (0, len(one) // 2, len(one) - 1):
-        assert fourbar.dump(one.scene(i)) == fourbar.dump(other.scene(i))
-    assert {one.scene(i).source for i in range(len(one))} == {family.statement for family in FAMILIES}
+    first, second = Hard(), Hard()
+    names = [first.name(i) for i in range(len(first))]
+    assert names == sorted(set(names)) == [second.name(i) for i in range(len(second))]
+    for i in (0, len(first) // 2, len(first) - 1):
+        assert fourbar.dump(first.scene(i)) == fourbar.dump(second.scene(i))
+    assert {first.scene(i).source for i in range(len(first))} == {family.statement for family in FAMILIES}
 
 
 @pytest.mark.slow
@@ -177,8 +177,8 @@ def test_predictions_know_what_no_law_in_sines_knows() -> None:
         at_ = fourbar.command(scene)
         for quantity in ("torque", "F32"):
             error = predict_from_data(scene, at_, quantity)
-            known = np.isfinite(error)
-            assert known.any() and (error[known] <= predict_in_world_axes(scene, at_, quantity)[known]).all(), name
+            judged = np.isfinite(error)
+            assert judged.any() and (error[judged] <= predict_in_world_axes(scene, at_, quantity)[judged]).all(), name
 
 
 def test_every_declared_limit_is_measured() -> None:

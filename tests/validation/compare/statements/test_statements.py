@@ -62,12 +62,14 @@ def test_what_is_stated_holds_of_random_linkages() -> None:
         assert all(row.passed for row in rows), rows
 
 
-def changed(function: str, change: Callable[[Any], Any], where: Any = mobility) -> Callable[[pytest.MonkeyPatch], None]:
+def changed(
+    function: str, change: Callable[[Any], Any], module: Any = mobility
+) -> Callable[[pytest.MonkeyPatch], None]:
     """A module's function answers something else."""
-    true = getattr(where, function)
+    true = getattr(module, function)
 
     def plant(monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(where, function, lambda *a, **k: change(true(*a, **k)))
+        monkeypatch.setattr(module, function, lambda *a, **k: change(true(*a, **k)))
 
     return plant
 
@@ -77,80 +79,84 @@ def moved(limits: tuple[mobility.LimitPosition, ...], field: str) -> tuple[mobil
 
 
 FAULTS = {
-    "a limit missing": (TRIPLE, "range", changed("limit_positions", lambda found: found[:-1])),
+    "a limit missing": (TRIPLE, "range", changed("limit_positions", lambda limits: limits[:-1])),
     "interval begins late": (
         TRIPLE,
         "range",
-        changed("find_intervals", lambda found: tuple((low + SEEN, high) for low, high in found)),
+        changed("find_intervals", lambda intervals: tuple((low + SEEN, high) for low, high in intervals)),
     ),
     "the complement of the range": (
         TRIPLE,
         "range",
-        changed("find_intervals", lambda found: tuple((high, low + 2 * math.pi) for low, high in found)),
+        changed("find_intervals", lambda intervals: tuple((high, low + 2 * math.pi) for low, high in intervals)),
     ),
-    "turns fully": (TRIPLE, "range", changed("turns_fully", lambda found: True)),
-    "a full turn denied": (ROCKER, "range", changed("turns_fully", lambda found: False)),
-    "sweep leaves the range": (TRIPLE, "range", changed("choose_range", lambda found: (found[0] - 0.1, found[1]))),
-    "swing": (ROCKER, "range", changed("swing", lambda found: found + SEEN)),
-    "change point": (CHANGE, "range", changed("change_points", lambda found: found[:1])),
-    "a change point that is none": (ROCKER, "range", changed("change_points", lambda found: (0.4,))),
+    "turns fully": (TRIPLE, "range", changed("turns_fully", lambda turns: True)),
+    "a full turn denied": (ROCKER, "range", changed("turns_fully", lambda turns: False)),
+    "sweep leaves the range": (
+        TRIPLE,
+        "range",
+        changed("choose_range", lambda interval: (interval[0] - 0.1, interval[1])),
+    ),
+    "swing": (ROCKER, "range", changed("swing", lambda angle: angle + SEEN)),
+    "change point": (CHANGE, "range", changed("change_points", lambda angles: angles[:1])),
+    "a change point that is none": (ROCKER, "range", changed("change_points", lambda angles: (0.4,))),
     "theta_2 of a dead centre": (
         ROCKER,
         "limit_positions",
-        changed("limit_positions", lambda found: moved(found, "theta_2")),
+        changed("limit_positions", lambda limits: moved(limits, "theta_2")),
     ),
     "theta_3 of a dead centre": (
         ROCKER,
         "limit_positions",
-        changed("limit_positions", lambda found: moved(found, "theta_3")),
+        changed("limit_positions", lambda limits: moved(limits, "theta_3")),
     ),
     "branch of a dead centre": (
         ROCKER,
         "limit_positions",
-        changed("limit_positions", lambda found: tuple(limit._replace(branch=-limit.branch) for limit in found)),
+        changed("limit_positions", lambda limits: tuple(limit._replace(branch=-limit.branch) for limit in limits)),
     ),
     "no branch of a dead centre": (
         ROCKER,
         "limit_positions",
-        changed("limit_positions", lambda found: tuple(limit._replace(branch=0) for limit in found)),
+        changed("limit_positions", lambda limits: tuple(limit._replace(branch=0) for limit in limits)),
     ),
     "stretched for folded": (
         TRIPLE,
         "limit_positions",
-        changed("limit_positions", lambda found: tuple(limit._replace(stretched=False) for limit in found)),
+        changed("limit_positions", lambda limits: tuple(limit._replace(stretched=False) for limit in limits)),
     ),
     "least angle at B": (
         ROCKER,
         "transmission",
-        changed("transmission_extremes", lambda found: found._replace(least=found.least + SEEN), transmission),
+        changed("transmission_extremes", lambda ends: ends._replace(least=ends.least + SEEN), transmission),
     ),
     "where the angle at B is greatest": (
         ROCKER,
         "transmission",
-        changed("transmission_extremes", lambda found: found._replace(theta_2_greatest=0.4), transmission),
+        changed("transmission_extremes", lambda ends: ends._replace(theta_2_greatest=0.4), transmission),
     ),
     "transmission angle": (
         ROCKER,
         "transmission",
-        changed("transmission_angle", lambda found: found + SEEN, transmission),
+        changed("transmission_angle", lambda angle: angle + SEEN, transmission),
     ),
     "drive condition": (
         ROCKER,
         "transmission",
-        changed("drive_sine", lambda found: found * (1.0 + SEEN), fourbar_validation.compare.statements.transmission),
+        changed("drive_sine", lambda sine: sine * (1.0 + SEEN), fourbar_validation.compare.statements.transmission),
     ),
     "mechanical advantage": (
         ROCKER,
         "transmission",
-        changed("mechanical_advantage", lambda found: -found, transmission),
+        changed("mechanical_advantage", lambda gain: -gain, transmission),
     ),
     "distance to a singular position": (
         ROCKER,
         "transmission",
-        changed("distance_to_singular", lambda found: found + SEEN, transmission),
+        changed("distance_to_singular", lambda distance: distance + SEEN, transmission),
     ),
-    "time ratio": (ROCKER, "transmission", changed("time_ratio", lambda found: 1.0 / found)),
-    "no time ratio": (ROCKER, "transmission", changed("time_ratio", lambda found: None)),
+    "time ratio": (ROCKER, "transmission", changed("time_ratio", lambda ratio: 1.0 / ratio)),
+    "no time ratio": (ROCKER, "transmission", changed("time_ratio", lambda ratio: None)),
     "branch through a change point": (CHANGE, "through", changed("follow_smooth_path", np.negative)),
 }
 
@@ -167,8 +173,8 @@ def test_each_error_in_a_statement_is_seen(fault: str, monkeypatch: pytest.Monke
 def test_an_engine_that_does_not_answer_agrees_with_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     true = Exact.answer
 
-    def silent(self: Exact, scene: Scene, at: fourbar.scene.Command) -> Any:
-        answer = true(self, scene, at)
+    def silent(self: Exact, scene: Scene, command: fourbar.scene.Command) -> Any:
+        answer = true(self, scene, command)
         answer.quantities = {name: np.full_like(value, np.nan) for name, value in answer.quantities.items()}
         return answer
 
@@ -183,9 +189,11 @@ class Shy:
 
     name = "shy"
 
-    def answer(self, scene: Scene, at: Command) -> Answer:
+    def answer(self, scene: Scene, command: Command) -> Answer:
         return (
-            PinocchioInverse().answer(scene, at) if scene.title else Answer("shy", "exact", refusal="too near a limit")
+            PinocchioInverse().answer(scene, command)
+            if scene.title
+            else Answer("shy", "exact", refusal="too near a limit")
         )
 
 

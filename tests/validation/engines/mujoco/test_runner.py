@@ -80,7 +80,7 @@ def test_an_overrun_is_put_back_only_if_it_is_a_rounding() -> None:
 
 
 def changed(right: Callable[..., Any], factor: float) -> Callable[..., Any]:
-    return lambda *given: factor * right(*given)
+    return lambda *arguments: factor * right(*arguments)
 
 
 @pytest.mark.parametrize("factor", [-1.0, 2.0, 0.0], ids=["wrong sign", "applied twice", "missing"])

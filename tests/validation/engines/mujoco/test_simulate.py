@@ -42,13 +42,13 @@ def scene(
         fourbar.Load(3, (2.0, 0.3), (0.03, 0.2), frame="bar"),
         fourbar.Load(2, moment=-0.2),
     )
-    whole: dict[str, object] = {
+    expected: dict[str, object] = {
         "linkage": fourbar.FourBar(d, bars[0], bars[1], bars[2], 0.2),
         "motion": fourbar.Motion(sweep, omega, 0.0),
         "loads": loads,
         "effects": (fourbar.Gravity(),),
     }
-    return fourbar.Scene(**{**whole, **parts})  # type: ignore[arg-type]
+    return fourbar.Scene(**{**expected, **parts})  # type: ignore[arg-type]
 
 
 DRAG, ROCKER, TRIPLE = (0.1, 0.3, 0.25, 0.28), (0.3, 0.25, 0.1, 0.28), (0.35, 0.25, 0.2, 0.25)
@@ -103,16 +103,22 @@ def test_an_input_that_speeds_up_covers_the_end_of_its_window_in_as_many_steps()
 def test_it_is_run_near_the_requested_positions() -> None:
     posed = SCENES["crank-rocker"]
     command = fourbar.command(posed)
-    at = MujocoSimulated().answer(posed, command).at
-    assert at is not None
-    assert np.abs(at.theta_2 - command.theta_2).max() <= math.pi / 600  # half a step of some 628 a turn
+    moved = MujocoSimulated().answer(posed, command).at
+    assert moved is not None
+    assert np.abs(moved.theta_2 - command.theta_2).max() <= math.pi / 600  # half a step of some 628 a turn
 
 
 def test_a_wrong_load_is_seen() -> None:
     posed = SCENES["crank-rocker"]
     answer = MujocoSimulated().answer(posed, fourbar.command(posed))
-    other = replace(posed, loads=(replace(posed.loads[0], bar=3), *posed.loads[1:]))
-    assert {row.quantity for row in compared(other, answer) if not row.passed} >= {"F12", "F32", "F43", "F14", "torque"}
+    on_coupler = replace(posed, loads=(replace(posed.loads[0], bar=3), *posed.loads[1:]))
+    assert {row.quantity for row in compared(on_coupler, answer) if not row.passed} >= {
+        "F12",
+        "F32",
+        "F43",
+        "F14",
+        "torque",
+    }
 
 
 def test_positions_outside_the_range_are_not_assembled() -> None:
@@ -254,7 +260,7 @@ def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(what: str, mon
         assert closes.sum() >= 4
         np.testing.assert_allclose(speeds[closes], due, rtol=1e-6)
     right = Lead.alpha_2
-    monkeypatch.setattr(Lead, "alpha_2", lambda *given: 0.9 * right(*given))
+    monkeypatch.setattr(Lead, "alpha_2", lambda *arguments: 0.9 * right(*arguments))
     failed = [row for row in judge("", scene, SIMULATION).rows if row.failed]
     assert any("speed_error" in row.reason for row in failed)
 

@@ -30,22 +30,22 @@ def rows_of(scene: Scene, engine: str = "") -> list[Row]:
     return [row for check in CHECKS if engine in ("", check.__name__) for row in check(question)]
 
 
-def failing(found: list[Row]) -> set[str]:
-    return {row.quantity for row in found if row.failed}
+def failing(rows: list[Row]) -> set[str]:
+    return {row.quantity for row in rows if row.failed}
 
 
 def test_every_engine_compares_and_holds() -> None:
-    found = rows_of(SHIPPED)
-    compared = {row.engine for row in found if row.compared}
+    rows = rows_of(SHIPPED)
+    compared = {row.engine for row in rows if row.compared}
     assert compared == ENGINES == {check.__name__ for check in CHECKS} == set(SHIPPED_ROWS)
-    assert not failing(found)
+    assert not failing(rows)
 
 
 def altered(call: Callable[..., Any], change: Callable[[Any], None]) -> Callable[..., Any]:
     def wrong(*arguments: Any, **options: Any) -> Any:
-        found = call(*arguments, **options)
-        change(found)
-        return found
+        answer = call(*arguments, **options)
+        change(answer)
+        return answer
 
     return wrong
 
@@ -54,16 +54,16 @@ def swapped(solution: Any) -> None:
     solution.torque[[1, 2]] = solution.torque[[2, 1]]
 
 
-def steeper(found: Any) -> None:
-    found.by["torque"] *= 1.000001
+def steeper(answer: Any) -> None:
+    answer.by["torque"] *= 1.000001
 
 
-def stiffer(found: Any) -> None:
-    found.V[1, 2] *= 1.0 + 1e-8
+def stiffer(answer: Any) -> None:
+    answer.V[1, 2] *= 1.0 + 1e-8
 
 
-def narrower(found: Any) -> None:
-    found.spreads["torque"].deviation[:] *= 0.9
+def narrower(answer: Any) -> None:
+    answer.spreads["torque"].deviation[:] *= 0.9
 
 
 @pytest.mark.parametrize(
@@ -84,21 +84,21 @@ def test_a_public_call_that_errs_fails(
 
 
 def changed(**numbers: Any) -> Callable[[Any], Any]:
-    return lambda found: found._replace(found=(found.found[0]._replace(**numbers), *found.found[1:]))
+    return lambda answer: answer._replace(found=(answer.found[0]._replace(**numbers), *answer.found[1:]))
 
 
-def turned(found: Any) -> Any:
-    place = found.found[0].place
-    return changed(place=place._replace(theta_2=place.theta_2 + 1e-7))(found)
+def turned(answer: Any) -> Any:
+    place = answer.found[0].place
+    return changed(place=place._replace(theta_2=place.theta_2 + 1e-7))(answer)
 
 
 @pytest.mark.parametrize(
     ("change", "quantities"),
     [
-        (lambda found: found._replace(found=found.found[1:]), {"missed"}),
+        (lambda answer: answer._replace(found=answer.found[1:]), {"missed"}),
         (turned, {"torque"}),
-        (lambda found: changed(slope=-found.found[0].slope)(found), {"slope"}),
-        (lambda found: changed(inertia=1.000001 * found.found[0].inertia)(found), {"inertia"}),
+        (lambda answer: changed(slope=-answer.found[0].slope)(answer), {"slope"}),
+        (lambda answer: changed(inertia=1.000001 * answer.found[0].inertia)(answer), {"inertia"}),
         (changed(frequency=3.0), {"frequency"}),
     ],
 )
@@ -195,20 +195,20 @@ def test_other_commands_are_judged_too_and_what_is_not_is_named(name: str) -> No
     assert compared >= ENGINES - {"extremes", "sdf", "usd"} and {"status", "blocks"} <= {
         r.quantity for r in record.rows
     }
-    named = [line.split(":")[0] for line in record.left_out if line.endswith(f"; {name} is commanded")]
+    left_out = [line.split(":")[0] for line in record.left_out if line.endswith(f"; {name} is commanded")]
     wanted = ["error bars", "reversals of dry friction", "statements of the linkage", "MJCF as shipped", "sdf", "usd"]
-    assert named == wanted
+    assert left_out == wanted
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_study_of_another_command_that_errs_fails(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     scene, call = commanding(name), fourbar.solve
 
-    def wrong(of: Any, *arguments: Any, **options: Any) -> Any:
-        found = call(of, *arguments, **options)
-        if not isinstance(of, Scene):
-            found.drive_force[[1, 2]] = found.drive_force[[2, 1]]
-        return found
+    def wrong(subject: Any, *arguments: Any, **options: Any) -> Any:
+        answer = call(subject, *arguments, **options)
+        if not isinstance(subject, Scene):
+            answer.drive_force[[1, 2]] = answer.drive_force[[2, 1]]
+        return answer
 
     monkeypatch.setattr(fourbar, "solve", wrong)
     assert "drive_force" in failing(rows_of(scene, "study"))
@@ -220,12 +220,12 @@ def test_bounds_that_are_narrower_fail(monkeypatch: pytest.MonkeyPatch, sign: fl
     call = fourbar.extremes
 
     def narrow(*arguments: Any) -> Any:
-        found = call(*arguments)
-        ends = found.greatest if sign > 0 else found.least
+        answer = call(*arguments)
+        ends = answer.greatest if sign > 0 else answer.least
         end = ends["torque"]
         off = 1e-3 * abs(end.high)
         ends["torque"] = end._replace(high=end.high - off) if sign > 0 else end._replace(low=end.low + off)
-        return found
+        return answer
 
     monkeypatch.setattr(fourbar, "extremes", narrow)
     assert failing(rows_of(SHIPPED, "extremes")) == {"torque"}
@@ -266,9 +266,9 @@ def test_what_a_file_cannot_hold_is_refused() -> None:
 @pytest.mark.parametrize("name", ["crank-rocker", "damped", "sprung", "flywheel", "sliding pins", "table"])
 def test_every_number_that_a_scene_states_is_found_in_its_file(name: str) -> None:
     scene = FAULT_SCENES[name]
-    known = read_numbers(scene).keys()
-    found = SceneFile(scene).find_stated(known)
-    assert found.keys() >= known - {key for key in known if ".centre." in key or ".inertia" in key}
+    keys = read_numbers(scene).keys()
+    stated = SceneFile(scene).find_stated(keys)
+    assert stated.keys() >= keys - {key for key in keys if ".centre." in key or ".inertia" in key}
     changed = SceneFile(scene).move({"lengths.coupler": 0.01})
     assert changed.linkage.coupler.length == scene.linkage.coupler.length + 0.01
     assert np.array_equal(command(changed).theta_2, command(scene).theta_2)
@@ -278,8 +278,8 @@ def test_a_check_that_raises_costs_its_own_rows_alone(monkeypatch: pytest.Monkey
     def check_nothing(_: Question) -> list[Row]:
         raise ArithmeticError("lost")
 
-    whole = judge.judge("", SHIPPED, ()).rows
+    all_rows = judge.judge("", SHIPPED, ()).rows
     monkeypatch.setattr(judge, "CHECKS", (judge.Check(check_nothing), *judge.CHECKS))
-    (row,) = (row for row in judge.judge("", SHIPPED, ()).rows if row not in whole)
+    (row,) = (row for row in judge.judge("", SHIPPED, ()).rows if row not in all_rows)
     assert (row.engine, row.setting, row.quantity, row.verdict) == ("formulas", "check_nothing", "all", FAILS)
-    assert len(whole) > 3
+    assert len(all_rows) > 3
