@@ -15,10 +15,6 @@ from fourbar.formulas.mobility import classify as classify
 from fourbar.formulas.mobility import limit_positions as limit_positions
 from fourbar.formulas.mobility import swing as swing
 from fourbar.formulas.mobility import time_ratio as time_ratio
-from fourbar.formulas.points import coupler_curve as coupler_curve
-from fourbar.formulas.points import instant_centres as instant_centres
-from fourbar.formulas.points import point_coefficients as point_coefficients
-from fourbar.formulas.transmission import transmission_extremes as transmission_extremes
 from fourbar.linkage import Bar as Bar
 from fourbar.linkage import FourBar as FourBar
 from fourbar.linkage import uniform as uniform
@@ -55,6 +51,10 @@ if _TYPE_CHECKING:
     from fourbar.files import dump as dump
     from fourbar.files import load as load
     from fourbar.files import save as save
+    from fourbar.formulas.points import coupler_curve as coupler_curve
+    from fourbar.formulas.points import instant_centres as instant_centres
+    from fourbar.formulas.points import point_coefficients as point_coefficients
+    from fourbar.formulas.transmission import transmission_extremes as transmission_extremes
     from fourbar.show.duty import bearing_load as bearing_load
     from fourbar.show.duty import motor_duty as motor_duty
     from fourbar.show.duty import shaking_force as shaking_force
@@ -78,10 +78,12 @@ _EFFECTS = (
 _ON_FIRST_USE = {
     **{name: "fourbar.effects" for name in _EFFECTS},
     **{name: "fourbar.files" for name in ("dump", "load", "save")},
+    **{name: "fourbar.formulas.points" for name in ("coupler_curve", "instant_centres", "point_coefficients")},
     **{name: "fourbar.show.duty" for name in ("bearing_load", "motor_duty", "shaking_force", "shaking_moment")},
     **{name: "fourbar.studies.derivatives" for name in ("Sensitivity", "sensitivity")},
     **{name: "fourbar.studies.study" for name in ("Study", "vary")},
     **{name: "fourbar.evaluation.free_motion" for name in ("Released", "release")},
+    "transmission_extremes": "fourbar.formulas.transmission",
     "extremes": "fourbar.studies.enclosure",
     "equilibrium": "fourbar.studies.equilibrium",
     "function": "fourbar.studies.function",
@@ -90,7 +92,7 @@ _ON_FIRST_USE = {
     "in_units": "fourbar.show.notebook",
     "units": "fourbar.show.units",
 }
-"""The file edge needs a units library, most scenes few effects: `import fourbar` loads neither."""
+"""Modules of the names that many programs never use, or that need more than numpy: `import fourbar` loads none."""
 
 
 def __getattr__(name: str) -> _Any:
